@@ -1,0 +1,106 @@
+// A typed device buffer, counted against the memory account. Reads wait; writes and fills do not (in-order queue),
+// except that a write copies the host data before it returns.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/opencl/state.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::opencl {
+
+template <class T>
+class DeviceArray {
+ public:
+  DeviceArray() = default;
+  /// Throws ResourceError or DeviceError before anything is allocated when it cannot fit.
+  DeviceArray(State& state, std::uint64_t count, const std::string& what) : state_(&state), count_(count), what_(what) {
+    const std::uint64_t bytes = size_bytes();
+    if (bytes > state.info.max_allocation) {
+      throw ResourceError(fmt::format("{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device",
+                                      what, bytes, state.info.name, state.info.max_allocation));
+    }
+    state.memory.take(bytes, what);
+    try {
+      buffer_ = cl::Buffer(state.context, CL_MEM_READ_WRITE, bytes);
+    } catch (const cl::Error& e) {
+      state.memory.give(bytes);
+      throw ResourceError(fmt::format("{}: '{}' refused {} bytes: {}", what, state.info.name, bytes, code_name(e.err())));
+    }
+  }
+  DeviceArray(State& state, std::span<const T> values, const std::string& what) : DeviceArray(state, values.size(), what) {
+    write(values);
+  }
+  ~DeviceArray() {
+    if (state_) state_->memory.give(size_bytes());
+  }
+  DeviceArray(DeviceArray&& o) noexcept
+      : state_(std::exchange(o.state_, nullptr)), count_(std::exchange(o.count_, 0)), what_(std::move(o.what_)),
+        buffer_(std::move(o.buffer_)) {}
+  DeviceArray& operator=(DeviceArray&& o) noexcept {
+    if (this != &o) {
+      if (state_) state_->memory.give(size_bytes());
+      state_ = std::exchange(o.state_, nullptr);
+      count_ = std::exchange(o.count_, 0);
+      what_ = std::move(o.what_);
+      buffer_ = std::move(o.buffer_);
+    }
+    return *this;
+  }
+  DeviceArray(const DeviceArray&) = delete;
+  DeviceArray& operator=(const DeviceArray&) = delete;
+
+  [[nodiscard]] std::uint64_t size() const { return count_; }
+  [[nodiscard]] const cl::Buffer& buffer() const { return buffer_; }
+
+  void write(std::span<const T> values, std::uint64_t first = 0) {
+    if (values.empty()) return;
+    check(first, values.size());
+    guard("write", [&] {
+      state_->queue.enqueueWriteBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(), values.data());
+    });
+  }
+  void read(std::span<T> values, std::uint64_t first = 0) const {
+    if (values.empty()) return;
+    check(first, values.size());
+    guard("read", [&] {
+      state_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(), values.data());
+    });
+  }
+  [[nodiscard]] std::vector<T> to_host() const {
+    std::vector<T> values(count_);
+    read(values);
+    return values;
+  }
+  void fill(const T& value) {
+    guard("fill", [&] { state_->queue.enqueueFillBuffer(buffer_, value, 0, size_bytes()); });
+  }
+
+ private:
+  // OpenCL has no empty buffers: an empty array holds one element.
+  [[nodiscard]] std::uint64_t size_bytes() const { return (count_ == 0 ? 1 : count_) * sizeof(T); }
+  void check(std::uint64_t first, std::uint64_t n) const {
+    if (first > count_ || n > count_ - first)
+      throw DeviceError(fmt::format("{}: range {}+{} outside an array of {}", what_, first, n, count_));
+  }
+  template <class F>
+  void guard(const char* call, F&& f) const {
+    try {
+      f();
+    } catch (const cl::Error& e) {
+      throw DeviceError(fmt::format("{} of {} ({} elements) on '{}': {}", call, what_, count_, state_->info.name, code_name(e.err())));
+    }
+  }
+
+  State* state_ = nullptr;
+  std::uint64_t count_ = 0;
+  std::string what_;
+  cl::Buffer buffer_;
+};
+
+}  // namespace vdvr::opencl

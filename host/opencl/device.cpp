@@ -1,0 +1,154 @@
+// Enumerates and chooses OpenCL devices, and keeps the account of allocations.
+#include "vdvr/device.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "host/opencl/state.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace opencl {
+
+void MemoryAccount::take(std::uint64_t bytes, const std::string& what) {
+  if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
+    throw ResourceError(fmt::format(
+        "{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or choose a smaller --size", what,
+        static_cast<double>(bytes) / (1 << 20), static_cast<double>(left()) / (1 << 20),
+        static_cast<double>(limit_) / (1 << 20)));
+  }
+  used_ += bytes;
+  peak_ = std::max(peak_, used_);
+}
+
+}  // namespace opencl
+
+namespace {
+
+using Found = std::vector<std::pair<cl::Device, DeviceInfo>>;
+
+bool has_linear_float_image(const cl::Device& device) {
+  const cl::Context context(device);
+  std::vector<cl::ImageFormat> formats;
+  context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
+  return std::any_of(formats.begin(), formats.end(), [](const cl::ImageFormat& f) {
+    return f.image_channel_order == CL_R && f.image_channel_data_type == CL_FLOAT;
+  });
+}
+
+std::string trimmed(std::string s) {
+  while (!s.empty() && (s.back() == '\0' || std::isspace(static_cast<unsigned char>(s.back())))) s.pop_back();
+  return s;
+}
+
+DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int index) {
+  DeviceInfo d;
+  d.index = index;
+  d.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
+  d.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
+  d.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
+  d.version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
+  d.driver = trimmed(device.getInfo<CL_DRIVER_VERSION>());
+  const cl_device_type type = device.getInfo<CL_DEVICE_TYPE>();
+  d.is_gpu = (type & CL_DEVICE_TYPE_GPU) != 0;
+  d.is_cpu = (type & CL_DEVICE_TYPE_CPU) != 0;
+  d.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+  d.max_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  d.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+  d.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  d.max_work_group = static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+  d.images = device.getInfo<CL_DEVICE_IMAGE_SUPPORT>() == CL_TRUE;
+  if (d.images) {
+    d.image3d_max[0] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_WIDTH>();
+    d.image3d_max[1] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_HEIGHT>();
+    d.image3d_max[2] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_DEPTH>();
+    d.linear_float_image = has_linear_float_image(device);
+  }
+  return d;
+}
+
+Found enumerate() {
+  Found found;
+  std::vector<cl::Platform> platforms;
+  try {
+    cl::Platform::get(&platforms);
+  } catch (const cl::Error&) {
+    return found;  // the loader reports "no platform" as an error
+  }
+  for (const auto& platform : platforms) {
+    std::vector<cl::Device> devices;
+    try {
+      platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+    } catch (const cl::Error&) {
+      continue;
+    }
+    for (const auto& device : devices) {
+      if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
+      found.emplace_back(device, describe(platform, device, static_cast<int>(found.size())));
+    }
+  }
+  return found;
+}
+
+std::string lower(std::string s) {
+  std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return s;
+}
+
+bool matches(const DeviceInfo& d, const std::string& selector) {
+  if (selector == "cpu") return d.is_cpu;
+  if (selector == "gpu") return d.is_gpu;
+  if (!selector.empty() && std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c); }))
+    return selector == std::to_string(d.index);
+  return lower(d.name).find(lower(selector)) != std::string::npos ||
+         lower(d.platform).find(lower(selector)) != std::string::npos;
+}
+
+}  // namespace
+
+std::vector<DeviceInfo> Device::list() {
+  std::vector<DeviceInfo> infos;
+  for (const auto& [device, info] : enumerate()) infos.push_back(info);
+  return infos;
+}
+
+Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) : state_(std::make_unique<opencl::State>()) {
+  const Found found = enumerate();
+  if (found.empty()) {
+    throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
+  }
+  auto chosen = found.end();
+  if (selector.empty()) {
+    chosen = std::find_if(found.begin(), found.end(), [](const auto& f) { return f.second.is_gpu; });
+    if (chosen == found.end()) chosen = found.begin();
+  } else {
+    chosen = std::find_if(found.begin(), found.end(), [&](const auto& f) { return matches(f.second, selector); });
+  }
+  if (chosen == found.end()) {
+    std::string names;
+    for (const auto& [device, info] : found) names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
+    throw DeviceError(fmt::format("no device matches --device '{}'; there are:{}", selector, names));
+  }
+  try {
+    state_->device = chosen->first;
+    state_->info = chosen->second;
+    state_->context = cl::Context(state_->device);
+    state_->queue = cl::CommandQueue(state_->context, state_->device);
+  } catch (const cl::Error& e) {
+    throw DeviceError(fmt::format("cannot open '{}': {} {}", chosen->second.name, e.what(), opencl::code_name(e.err())));
+  }
+  const std::uint64_t device_memory = state_->info.global_memory;
+  state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));
+}
+
+Device::~Device() = default;
+Device::Device(Device&&) noexcept = default;
+Device& Device::operator=(Device&&) noexcept = default;
+
+const DeviceInfo& Device::info() const { return state_->info; }
+std::uint64_t Device::memory_left() const { return state_->memory.left(); }
+std::uint64_t Device::peak_memory() const { return state_->memory.peak(); }
+
+}  // namespace vdvr

@@ -1,0 +1,66 @@
+// Builds embedded kernel programs, once per set of defines.
+//
+// Flags: -cl-std=CL1.2 only. No relaxed arithmetic: what a certificate covers must round as the bound assumes.
+#include <fmt/format.h>
+
+#include <set>
+#include <sstream>
+
+#include "host/opencl/embedded.hpp"
+#include "host/opencl/state.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::opencl {
+namespace {
+
+void append_resolved(const std::string& name, std::set<std::string>& seen, std::string& out) {
+  const auto& sources = embedded_sources();
+  const auto found = sources.find(name);
+  if (found == sources.end()) throw BuildError(fmt::format("kernel source '{}' is not embedded", name));
+  if (!seen.insert(name).second) return;
+  out += fmt::format("#line 1 \"kernels/{}\"\n", name);
+  std::istringstream lines{std::string(found->second)};
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const std::string key = "#include \"";
+    if (line.rfind(key, 0) == 0) {
+      append_resolved(line.substr(key.size(), line.find('"', key.size()) - key.size()), seen, out);
+      out += fmt::format("#line {} \"kernels/{}\"\n", number + 1, name);
+    } else {
+      out += line + '\n';
+    }
+  }
+}
+
+}  // namespace
+
+std::string resolve_source(const std::string& name) {
+  std::set<std::string> seen;
+  std::string out;
+  append_resolved(name, seen, out);
+  return out;
+}
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  std::string options = "-cl-std=CL1.2 -DVDVR_DIALECT_OPENCL";
+  for (const auto& [key, value] : defines) options += fmt::format(" -D{}={}", key, value);
+  const std::string cache_key = name + ' ' + options;
+  if (const auto found = state.programs.find(cache_key); found != state.programs.end()) return found->second;
+
+  cl::Program built(state.context, resolve_source(name + ".cl"));
+  try {
+    built.build({state.device}, options.c_str());
+  } catch (const cl::Error& e) {
+    std::string log;
+    try {
+      log = built.getBuildInfo<CL_PROGRAM_BUILD_LOG>(state.device);
+    } catch (const cl::Error&) {
+      log = "(no log)";
+    }
+    throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}", name,
+                                 state.info.name, options, e.what(), code_name(e.err()), log));
+  }
+  return state.programs.emplace(cache_key, std::move(built)).first->second;
+}
+
+}  // namespace vdvr::opencl

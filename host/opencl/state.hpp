@@ -1,0 +1,57 @@
+// What a Device holds: context, in-order queue, program cache, and the account of our allocations.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "host/opencl/cl.hpp"
+#include "vdvr/device.hpp"
+
+namespace vdvr::opencl {
+
+/// Host and device allocations of ours, counted together against --max-memory.
+class MemoryAccount {
+ public:
+  void set_limit(std::uint64_t bytes) { limit_ = bytes; }
+  [[nodiscard]] std::uint64_t limit() const { return limit_; }
+  /// Throws ResourceError naming `what` and the remedy when the limit would be passed.
+  void take(std::uint64_t bytes, const std::string& what);
+  void give(std::uint64_t bytes) noexcept { used_ -= bytes; }
+  [[nodiscard]] std::uint64_t used() const { return used_; }
+  [[nodiscard]] std::uint64_t peak() const { return peak_; }
+  [[nodiscard]] std::uint64_t left() const { return limit_ > used_ ? limit_ - used_ : 0; }
+
+ private:
+  std::uint64_t limit_ = 0, used_ = 0, peak_ = 0;
+};
+
+struct State {
+  DeviceInfo info;
+  cl::Device device;
+  cl::Context context;
+  cl::CommandQueue queue;
+  std::map<std::string, cl::Program> programs;  ///< by name and defines
+  MemoryAccount memory;
+};
+
+/// "CL_OUT_OF_RESOURCES (-5)".
+std::string code_name(int code);
+
+/// A define passed to the kernel compiler: meaning (no default in the kernel) or tuning (default in the kernel).
+using Defines = std::vector<std::pair<std::string, std::string>>;
+
+/// Builds kernels/<name>.cl for the state's device, or returns the cached program. `#include "shared/x.h"` is resolved
+/// from the embedded sources with #line directives. Throws BuildError with device, options and the compiler's log.
+const cl::Program& program(State& state, const std::string& name, const Defines& defines = {});
+
+/// Full source text after resolving includes; what the compiler sees.
+std::string resolve_source(const std::string& name);
+
+/// Rounds up to a multiple.
+constexpr std::uint64_t round_up(std::uint64_t n, std::uint64_t multiple) {
+  return (n + multiple - 1) / multiple * multiple;
+}
+
+}  // namespace vdvr::opencl

@@ -1,0 +1,85 @@
+// What is promised about a volume, and by which argument. An error is a value with its method, never a loose float.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdvr/grid.hpp"
+
+namespace vdvr {
+
+struct ErrorTerm {
+  double value = 0;    ///< largest, in density units
+  std::string method;  ///< "measured", "curvature", "amplitude", "rounding", "device probe", ...
+};
+
+/// The field options that define F (docs/geometry.md); stored in the certificate, taken from it by `verify`.
+struct FieldOptions {
+  std::string filter = "ram-lak";   ///< ram-lak | shepp-logan | cosine | hamming | hann
+  double cutoff = 1.0;              ///< fraction of the detector's Nyquist frequency
+  std::optional<double> center;     ///< overrides the scan's
+};
+
+struct SamplerTerms {
+  ErrorTerm buffer;
+  std::optional<ErrorTerm> image3d;  ///< absent where the device has no such sampler
+};
+
+struct ErrorBudget {
+  ErrorTerm grid;        ///< |V - gold| at gold nodes
+  ErrorTerm gold;        ///< T: gold's own trilinear interpolation
+  ErrorTerm projection;  ///< P: interpolation of the projections in u
+  ErrorTerm arithmetic;  ///< rounding in fp32
+  SamplerTerms sampler;
+};
+
+/// One bound as computed by the plan, by stage and rate; shown side by side.
+struct Bound {
+  std::string stage;   ///< "projection" or "gold"
+  std::string method;  ///< "amplitude", "paper Eq. 7", "curvature signed, node-wise", ...
+  int rate = 1;
+  double value = 0;
+  bool rigorous = false;
+};
+
+struct Certificate {
+  double epsilon = 0;          ///< fraction of reference_range
+  double epsilon_abs = 0;      ///< density units
+  double reference_range = 0;  ///< max - min of F over covered 1x samples
+  bool holds_buffer = false;
+  std::optional<bool> holds_image3d;
+  double total_buffer = 0;
+  std::optional<double> total_image3d;
+  ErrorBudget budget;
+  double measured_max = 0;    ///< max |V - gold| over tested gold nodes
+  double measured_total = 0;  ///< max over them of |V - gold| + T + P
+  Vec3 worst_at{0, 0, 0};
+  int upsampling_u = 8;
+  std::string u_filter = "linear";
+  int gold_rate = 8;
+  std::vector<Bound> bounds;
+  FieldOptions field;
+  std::int64_t padding = 0;  ///< length of the ramp filter's FFT
+  std::optional<std::pair<double, double>> window;
+  std::optional<std::array<double, 6>> roi;
+  std::int64_t not_covered_count = 0;
+  double not_covered_fraction = 0;
+  std::string not_covered_rule;
+  std::string input_name, input_sha256;
+  std::vector<std::int64_t> input_shape;  ///< views, rows, columns
+  std::int64_t input_angles = 0;
+  std::string content_sha256;
+  std::string device, driver, version;
+  std::string options_json = "{}";  ///< the options the volume was built with, as a JSON object
+  std::vector<std::string> notes;   ///< what the certificate does not cover, and what was noticed
+};
+
+/// The JSON of docs/file-format.md; finite numbers only.
+std::string to_json(const Certificate& certificate);
+/// Throws FileError naming the missing or ill-typed member.
+Certificate certificate_from_json(const std::string& text);
+
+}  // namespace vdvr

@@ -1,0 +1,57 @@
+// Exceptions of the library. Each carries the exit code a command line should end with; stages add one line of
+// context on the way up with `add_context`. Library code never prints and never exits.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace vdvr {
+
+class Error : public std::exception {
+ public:
+  Error(int exit_code, std::string message) : exit_code_(exit_code), message_(std::move(message)) {}
+  [[nodiscard]] const char* what() const noexcept override { return message_.c_str(); }
+  [[nodiscard]] int exit_code() const noexcept { return exit_code_; }
+  /// Puts "context: " before the message; used by the stage that knows more than the thrower.
+  void add_context(const std::string& context) { message_ = context + ": " + message_; }
+
+ private:
+  int exit_code_;
+  std::string message_;
+};
+
+/// Bad usage: an option or a value the caller gave.
+struct InputError : Error {
+  explicit InputError(std::string message) : Error(2, std::move(message)) {}
+};
+/// A file that is missing, truncated, of the wrong type, or fails a checksum. Message: path, dataset, value, remedy.
+struct FileError : Error {
+  explicit FileError(std::string message) : Error(2, std::move(message)) {}
+};
+/// A readable file whose certificate, hash or input does not match.
+struct MismatchError : Error {
+  explicit MismatchError(std::string message) : Error(1, std::move(message)) {}
+};
+/// A tolerance that cannot be reached: names the binding term and what would do.
+struct ToleranceError : Error {
+  explicit ToleranceError(std::string message) : Error(1, std::move(message)) {}
+};
+/// A failing OpenCL or clFFT call: call, code by name, kernel, ranges, device.
+struct DeviceError : Error {
+  explicit DeviceError(std::string message) : Error(3, std::move(message)) {}
+};
+/// A kernel program that does not build: program, defines, device, log.
+struct BuildError : Error {
+  explicit BuildError(std::string message) : Error(3, std::move(message)) {}
+};
+/// Memory, disk or another resource; names the remedy.
+struct ResourceError : Error {
+  explicit ResourceError(std::string message) : Error(3, std::move(message)) {}
+};
+/// The user asked to stop (SIGINT: 130, SIGTERM: 143).
+struct Interrupted : Error {
+  explicit Interrupted(int exit_code) : Error(exit_code, "interrupted") {}
+};
+
+}  // namespace vdvr

@@ -1,0 +1,31 @@
+// F itself, in double precision on the host, with no FFT and no device: the definition written out (docs/geometry.md).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/grid.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+class ExactField {
+ public:
+  /// Cost: views * rows * columns^2 (ramp filter and cosine coefficients as direct sums), once.
+  ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress = {});
+
+  /// F at world points. Cost per point: views * columns (plus rows * columns * views once per distinct z).
+  /// Points that are not covered give the value of the mirror extension.
+  [[nodiscard]] std::vector<double> at(std::span<const Vec3> points, const Progress& progress = {}) const;
+
+  [[nodiscard]] bool covered(const Vec3& point) const;
+  [[nodiscard]] const ParallelGeometry& geometry() const { return geometry_; }
+
+ private:
+  ParallelGeometry geometry_;
+  std::vector<double> coefficients_;  ///< [view][column coefficient m][row coefficient l], weights included
+};
+
+}  // namespace vdvr

@@ -1,0 +1,69 @@
+// The certified volume: base samples, an index of bricks, and tiles per level triple (docs/file-format.md).
+//
+// A brick is granularity^3 base cells. Its level triple (lz, ly, lx) sets the spacing spacing / 2^l per axis. A brick of
+// level (0,0,0) reads `base`; any other reads tile number `tile` of its triple: float tile[g*2^lz+1][g*2^ly+1][g*2^lx+1],
+// on the brick's closed box. Beyond the grid a tile repeats its last plane, which is never read.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "vdvr/grid.hpp"
+
+namespace vdvr {
+
+/// Levels per axis in file order: z, y, x.
+using LevelTriple = std::array<std::uint8_t, 3>;
+
+struct MixedVolume {
+  Grid grid;
+  int granularity = 4;
+  int rate = 1;                          ///< gold rate: no level is finer than log2(rate)
+  std::vector<float> base;               ///< [nz+1][ny+1][nx+1]
+  std::vector<LevelTriple> level;        ///< [bz][by][bx]
+  std::vector<std::uint32_t> tile;       ///< [bz][by][bx]
+  std::map<LevelTriple, std::vector<float>> tiles;  ///< per triple: [count][sz][sy][sx]
+
+  /// ceil(cells / granularity) per axis x, y, z.
+  [[nodiscard]] Index3 bricks() const {
+    Index3 b{};
+    for (int a = 0; a < 3; ++a) b[a] = (grid.cells[a] + granularity - 1) / granularity;
+    return b;
+  }
+  [[nodiscard]] std::int64_t brick_count() const {
+    const Index3 b = bricks();
+    return b[0] * b[1] * b[2];
+  }
+  /// Samples of one tile per axis z, y, x.
+  [[nodiscard]] std::array<std::int64_t, 3> tile_shape(const LevelTriple& l) const {
+    const auto side = [this](std::uint8_t level_of_axis) {
+      return (static_cast<std::int64_t>(granularity) << level_of_axis) + 1;
+    };
+    return {side(l[0]), side(l[1]), side(l[2])};
+  }
+  [[nodiscard]] std::int64_t tile_size(const LevelTriple& l) const {
+    const auto s = tile_shape(l);
+    return s[0] * s[1] * s[2];
+  }
+};
+
+/// A volume with every brick at level 0: the uniform grid as a mixed one, so that one sampler serves both.
+MixedVolume as_mixed(const Volume& volume, int granularity = 4);
+
+/// The value of the certified field at a world point, by the sampler of kernels/shared/mixed_sampler.h on the host
+/// (`buffer` arithmetic, the same bits as the device). The point must lie in the grid's box; it is clamped to it.
+float sample_at(const MixedVolume& volume, const Vec3& point);
+
+/// Storage, as defined in docs/file-format.md.
+struct Storage {
+  double samples_ratio = 1;   ///< (base + index + tile samples) / base samples
+  double bytes_ratio = 1;     ///< device-resident bytes / bytes of the float32 base volume
+  std::uint64_t device_bytes = 0;
+  std::uint64_t file_bytes = 0;
+};
+/// `interior`: only bricks wholly within 7/8 of the box in x and y, all z.
+Storage storage_of(const MixedVolume& volume, bool interior);
+
+}  // namespace vdvr

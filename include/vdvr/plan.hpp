@@ -1,0 +1,48 @@
+// Bounds at each rate, and the choice of rates that fit a tolerance. Builds nothing.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/reconstruct.hpp"
+
+namespace vdvr {
+
+struct Tolerance {
+  std::optional<double> relative;  ///< fraction of the reference range
+  std::optional<double> absolute;  ///< density units; one of the two is set
+};
+
+struct RateOptions {
+  std::optional<int> upsampling;    ///< none: auto
+  std::string u_filter = "auto";    ///< auto | linear | cubic
+  std::optional<int> gold;          ///< none: auto
+};
+
+struct Plan {
+  Grid grid;
+  FieldOptions field;
+  double epsilon = 0, epsilon_abs = 0, reference_range = 0;
+  int upsampling_u = 8;
+  std::string u_filter = "linear";
+  int gold_rate = 8;
+  std::vector<Bound> bounds;    ///< all that were computed
+  ErrorBudget budget;           ///< foreseen shares at the chosen rates; grid: what is left for it
+  std::uint64_t gold_samples = 0;      ///< to be back-projected, per pass
+  std::uint64_t memory_bytes = 0;      ///< peak of our allocations foreseen
+  double seconds = 0;                  ///< foreseen for build, from a measured back-projection rate
+  double samples_ratio = 0;            ///< storage foreseen, from a sample of bricks
+  std::int64_t not_covered_count = 0;
+  double not_covered_fraction = 0;
+  Volume base;                         ///< the 1x reconstruction it rests on
+  std::vector<std::string> notes;
+};
+
+/// Throws ToleranceError naming the binding term and the smallest epsilon that would do.
+Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
+               const RateOptions& rates, const Tolerance& tolerance, const Progress& progress = {});
+
+}  // namespace vdvr

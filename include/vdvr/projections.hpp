@@ -1,0 +1,50 @@
+// A scan: parallel-beam projections with their geometry (docs/geometry.md).
+//
+// Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column `center`.
+// u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace vdvr {
+
+struct ParallelGeometry {
+  std::int64_t columns = 0;  ///< U
+  std::int64_t rows = 0;     ///< V
+  double pitch_u = 1.0;      ///< world units per column
+  double pitch_v = 1.0;      ///< world units per row
+  double center = 0.0;       ///< column onto which the rotation axis projects; (U - 1)/2 in a centred scan
+  std::string unit = "pixel";
+  std::vector<double> theta_rad;  ///< one angle per view
+
+  [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
+};
+
+/// Cone beam joins here.
+using Geometry = std::variant<ParallelGeometry>;
+
+/// What reading and pre-processing did, reported to the user and stored with the certificate.
+struct InputReport {
+  std::string name;                  ///< file or folder name as given, without its directory
+  std::string sha256;                ///< of the file, or of a folder's sorted lines "sha256 name"
+  std::string format;                ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
+  std::int64_t dead_pixels = 0;      ///< samples replaced by the median of their neighbours
+  double transmission_floor = 0;     ///< the floor under -log
+  std::string center_source;         ///< "file", "option", "found", "default"
+  bool air_background = false;       ///< a linear air background was fitted and taken off
+  std::vector<std::string> notes;    ///< one line each, shown to the user
+};
+
+/// Line integrals, float data[view][row v][column u].
+struct ProjectionSet {
+  ParallelGeometry geometry;
+  std::vector<float> data;
+  InputReport report;
+
+  [[nodiscard]] std::int64_t size() const { return geometry.views() * geometry.rows * geometry.columns; }
+};
+
+}  // namespace vdvr

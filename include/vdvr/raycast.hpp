@@ -1,0 +1,104 @@
+// Headless ray-casting of certified and uniform volumes: DVR, iso-surface, MIP, slice, error.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdvr/device.hpp"
+#include "vdvr/image.hpp"
+#include "vdvr/mixed_volume.hpp"
+
+namespace vdvr {
+
+/// Control points of density -> colour and opacity per base cell; linear between them.
+struct TransferPoint {
+  double value = 0;
+  std::array<double, 3> rgb{1, 1, 1};
+  double opacity = 0;  ///< over a path of one base cell
+};
+struct TransferFunction {
+  std::string name;
+  std::vector<TransferPoint> points;
+};
+/// A named preset ("default", "grey", "bone", "soft", "mip") stretched over [lo, hi].
+TransferFunction transfer_preset(const std::string& name, double lo, double hi);
+/// JSON: {"points": [{"value", "rgb", "opacity"}]}. Throws FileError.
+TransferFunction read_transfer_function(const std::filesystem::path& path);
+
+struct Camera {
+  Vec3 position{0, 3, 0};
+  Vec3 focal_point{0, 0, 0};
+  Vec3 view_up{0, 0, -1};
+  double view_angle_deg = 30;  ///< vertical, perspective
+};
+/// Azimuth 0 looks along -y with +x to the right, view-up -z (docs/geometry.md); the azimuth turns about z.
+/// zoom 1 fits the grid's bounding sphere.
+Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
+
+enum class RenderMode { dvr, iso, mip, slice, error };
+enum class SamplerKind { automatic, image3d, buffer };
+
+struct RenderOptions {
+  RenderMode mode = RenderMode::dvr;
+  std::int64_t width = 512, height = 512;
+  Camera camera;
+  TransferFunction transfer;
+  double step = 1;                   ///< base cells
+  double iso = 0;
+  int slice_axis = 2;                ///< 0 x, 1 y, 2 z
+  std::optional<double> slice_position;  ///< world; default the middle
+  std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
+  bool shading = true;
+  double termination = 0.99;         ///< early ray termination: opacity at which a ray stops
+  bool skip_empty = true;            ///< brick min/max skipping; the picture is the same to the bit without it
+  SamplerKind sampler = SamplerKind::automatic;
+};
+
+struct RenderResult {
+  Image image;
+  SamplerKind sampler = SamplerKind::buffer;
+  std::string sampler_reason;        ///< why this sampler: measured rates, or what the device lacks
+  std::int64_t samples = 0;          ///< taken along rays
+  double seconds = 0;                ///< kernel and read-back
+};
+
+/// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max, and the image3d atlas
+/// where the device has one that fits.
+class ResidentVolume {
+ public:
+  ResidentVolume(Device& device, const MixedVolume& volume);
+  ~ResidentVolume();
+  ResidentVolume(ResidentVolume&&) noexcept;
+  ResidentVolume& operator=(ResidentVolume&&) noexcept;
+
+  [[nodiscard]] bool has_image3d() const;
+  [[nodiscard]] std::string image3d_reason() const;  ///< why not, or the atlas' size
+  [[nodiscard]] std::uint64_t bytes() const;
+  [[nodiscard]] std::pair<float, float> value_range() const;
+  [[nodiscard]] const Grid& grid() const;
+
+  struct Impl;
+  [[nodiscard]] Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
+
+/// What the device's image3d sampler does to weights and constants (docs/error-bounds.md, section on samplers).
+struct SamplerProbe {
+  bool image3d = false;          ///< the device has a linear CL_R/CL_FLOAT 3D image sampler
+  double weight_error = 0;       ///< largest measured error of an interpolation weight
+  double delta = 0;              ///< charged: 2^-23 exact fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, or the measured one
+  double constant_error = 0;     ///< rho: largest relative error on constant and affine tiles, beyond delta
+  double buffer_rate = 0, image3d_rate = 0;  ///< samples per second, measured
+  std::string chosen;            ///< "buffer" or "image3d": what `auto` takes, by those rates
+};
+SamplerProbe probe_sampler(Device& device);
+
+}  // namespace vdvr

@@ -1,0 +1,46 @@
+// Uniform filtered back-projection, and the grid it runs on.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/grid.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+struct GridOptions {
+  std::optional<Index3> size;     ///< cells x, y, z; default: the smallest box of cells around the covered cylinder
+  std::optional<double> spacing;  ///< default: the detector pitch (pitch_u in x and y, pitch_v in z)
+  std::optional<Vec3> origin;     ///< first sample; default centred on the axis and on the middle row
+};
+
+/// Throws InputError for an empty, non-finite or overflowing grid, or a scan with no covered region.
+Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options);
+
+/// How far inside (positive) or outside (negative) the covered region a point lies, in world units; a lower bound of the
+/// distance to the region's boundary outside it. Covered: margin >= 0.
+double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point);
+inline bool is_covered(const ParallelGeometry& geometry, double center, const Vec3& point) {
+  return coverage_margin(geometry, center, point) >= 0;
+}
+
+struct ReconstructOptions {
+  FieldOptions field;
+  int upsampling = 8;               ///< in u; a power of two
+  std::string u_filter = "linear";  ///< linear | cubic
+};
+
+/// F on the samples of `grid` by FBP on the device; samples farther than a cell's diagonal outside the covered region are 0.
+/// Cost: views * samples updates. Memory: views * (columns * upsampling) * rows of one slab, sized by --max-memory.
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid, const ReconstructOptions& options,
+                   const Progress& progress = {});
+
+/// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
+/// Returns notes for the user: limited angle, grouped views.
+std::vector<std::string> check_scan(const ParallelGeometry& geometry);
+
+}  // namespace vdvr
