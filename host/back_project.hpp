@@ -1,0 +1,27 @@
+// Back-projection of an upsampled slab onto blocks of sample columns. Called by reconstruct.cpp and gold_stream.cpp.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "host/filter_projections.hpp"
+
+namespace vdvr {
+
+/// Equal blocks of nx x ny columns; block b's first column lies at `first[b]` (world x, y), the next at + step.
+struct ColumnBlocks {
+  std::int64_t nx = 0, ny = 0;
+  double step_x = 1, step_y = 1;
+  std::vector<std::array<double, 2>> first;
+};
+
+/// float out[block][y][x][z padded] = sum over the slab's views of q at t(x, y). `filter`: linear | cubic.
+/// Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,
+                  const std::string& filter, opencl::DeviceArray<float>& out);
+
+/// A bound on the fp32 error of the positions s, in upsampled columns, for such blocks (docs/error-bounds.md, section 7).
+double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks);
+
+}  // namespace vdvr

@@ -1,0 +1,112 @@
+// F by its definition: direct sums in double precision over host threads (docs/geometry.md). Shares nothing with the device
+// path but the angular weights and the ramp kernel.
+#include "vdvr/exact_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "host/coverage.hpp"
+#include "host/parallel.hpp"
+#include "host/ramp_kernel.hpp"
+#include "vdvr/reconstruct.hpp"
+#include "host/view_weights.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// cos(pi m (i + 1/2) / n) for all m, i: [m][i].
+std::vector<double> cosine_table(std::int64_t n) {
+  std::vector<double> table(static_cast<std::size_t>(n * n));
+  for (std::int64_t m = 0; m < n; ++m)
+    for (std::int64_t i = 0; i < n; ++i)
+      table[static_cast<std::size_t>(m * n + i)] =
+          std::cos(pi * static_cast<double>(m * (2 * i + 1) % (4 * n)) / static_cast<double>(2 * n));
+  return table;
+}
+
+// Clenshaw's recurrence for sum_m a[m * stride] cos(m x).
+double cosine_sum(const double* a, std::int64_t n, double x) {
+  const double c = 2 * std::cos(x);
+  double b1 = 0, b2 = 0;
+  for (std::int64_t m = n - 1; m > 0; --m) {
+    const double b0 = a[m] + c * b1 - b2;
+    b2 = b1;
+    b1 = b0;
+  }
+  return a[0] + 0.5 * c * b1 - b2;
+}
+
+}  // namespace
+
+ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress) : geometry_(scan.geometry) {
+  if (field.center) geometry_.center = *field.center;
+  const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
+  const auto g = ramp_kernel(field, geometry_.pitch_u, U);
+  const ViewWeights weights = view_weights(geometry_.theta_rad);
+  const auto cos_u = cosine_table(U), cos_v = cosine_table(V);
+  const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
+  coefficients_.assign(at(K * U * V), 0.0);
+  parallel_for(K, progress, "exact field", [&](std::int64_t k) {
+    std::vector<double> rows(at(V * U));  // [v][m]: cosine coefficients in u
+    std::vector<double> q(at(U));
+    const float* p = scan.data.data() + k * V * U;
+    for (std::int64_t v = 0; v < V; ++v) {
+      for (std::int64_t i = 0; i < U; ++i) {
+        double sum = 0;
+        for (std::int64_t j = 0; j < U; ++j) sum += g[at(std::abs(i - j))] * static_cast<double>(p[v * U + j]);
+        q[at(i)] = sum * weights.weight[at(k)];
+      }
+      for (std::int64_t m = 0; m < U; ++m) {
+        double sum = 0;
+        for (std::int64_t i = 0; i < U; ++i) sum += q[at(i)] * cos_u[at(m * U + i)];
+        rows[at(v * U + m)] = sum * (m == 0 ? 1.0 : 2.0) / static_cast<double>(U);
+      }
+    }
+    for (std::int64_t m = 0; m < U; ++m)
+      for (std::int64_t l = 0; l < V; ++l) {
+        double sum = 0;
+        for (std::int64_t v = 0; v < V; ++v) sum += rows[at(v * U + m)] * cos_v[at(l * V + v)];
+        coefficients_[at((k * U + m) * V + l)] = sum * (l == 0 ? 1.0 : 2.0) / static_cast<double>(V);
+      }
+  });
+}
+
+std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress& progress) const {
+  const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
+  std::map<double, std::vector<std::size_t>> by_height;
+  for (std::size_t i = 0; i < points.size(); ++i) by_height[points[i][2]].push_back(i);
+  std::vector<std::pair<double, const std::vector<std::size_t>*>> heights;
+  for (const auto& [z, members] : by_height) heights.emplace_back(z, &members);
+
+  std::vector<double> values(points.size());
+  parallel_for(static_cast<std::int64_t>(heights.size()), progress, "exact points", [&](std::int64_t h) {
+    const auto& [z, members] = heights[static_cast<std::size_t>(h)];
+    const double row = z / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
+    const double y = pi * (row + 0.5) / static_cast<double>(V);
+    std::vector<double> basis(static_cast<std::size_t>(V)), line(static_cast<std::size_t>(U));
+    for (std::int64_t l = 0; l < V; ++l) basis[static_cast<std::size_t>(l)] = std::cos(static_cast<double>(l) * y);
+    for (std::int64_t k = 0; k < K; ++k) {
+      const double c = std::cos(geometry_.theta_rad[static_cast<std::size_t>(k)]), s = std::sin(geometry_.theta_rad[static_cast<std::size_t>(k)]);
+      for (std::int64_t m = 0; m < U; ++m) {
+        const double* a = coefficients_.data() + (k * U + m) * V;
+        double sum = 0;
+        for (std::int64_t l = 0; l < V; ++l) sum += a[l] * basis[static_cast<std::size_t>(l)];
+        line[static_cast<std::size_t>(m)] = sum;
+      }
+      for (const std::size_t i : *members) {
+        const double t = points[i][0] * c + points[i][1] * s;
+        const double column = t / geometry_.pitch_u + geometry_.center;
+        values[i] += cosine_sum(line.data(), U, pi * (column + 0.5) / static_cast<double>(U));
+      }
+    }
+  });
+  return values;
+}
+
+bool ExactField::covered(const Vec3& point) const { return is_covered(geometry_, geometry_.center, point); }
+
+}  // namespace vdvr

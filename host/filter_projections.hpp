@@ -1,0 +1,76 @@
+// Ramp filter on the device, and upsampling of slabs of rows (docs/geometry.md: ramp first, then upsample).
+// Called by reconstruct.cpp, plan.cpp, gold_stream.cpp.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "host/cosine_series.hpp"
+#include "host/opencl/array.hpp"
+#include "vdvr/certificate.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+/// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
+struct FilteredScan {
+  ParallelGeometry geometry;      ///< with the centre in use
+  std::vector<float> samples;     ///< [view][u][v]
+  std::int64_t fft_length = 0;
+  std::vector<double> view_max;   ///< max |q| of each view's samples
+  double ramp_error = 0;          ///< sum over views of a bound on the fp32 error of any filtered sample (docs/error-bounds.md)
+  bool limited_angle = false;
+};
+
+/// Cost: views * rows FFTs of at least twice the columns. Memory: the filtered scan on the host, one chunk on the device.
+FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                                const Progress& progress = {});
+
+/// Lanes to which z is padded, and the launch shape of the column kernels, by device class.
+struct ColumnTuning {
+  int lanes = 16;
+  std::array<std::uint64_t, 3> local{1, 8, 4};
+};
+ColumnTuning column_tuning(const DeviceInfo& device);
+
+/// float values[view][column][z padded]: one slab of rows, upsampled in u.
+struct UpsampledSlab {
+  opencl::DeviceArray<float> values;
+  UpsampledColumns columns;
+  std::int64_t first_view = 0, views = 0, rows = 0, rows_padded = 0;
+};
+
+/// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.
+class Upsampler {
+ public:
+  Upsampler(opencl::State& state, const FilteredScan& scan) : state_(&state), scan_(&scan) {}
+
+  /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0: the rows are
+  /// multiples of 1 / row_lattice. Views [first_view, first_view + views).
+  /// Cost: views * rows * U * (V + columns) multiply-adds.
+  UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0, int order_v = 0,
+                           int row_lattice = 0, std::int64_t first_view = 0, std::int64_t views = -1);
+
+  /// The largest absolute row sum of the value matrix in u: how much an error of the samples can grow.
+  double gain_u(const UpsampledColumns& columns);
+
+  /// Bytes of one slab.
+  [[nodiscard]] std::uint64_t slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const;
+
+ private:
+  struct Matrix {
+    opencl::DeviceArray<float> values;
+    double gain = 0;
+  };
+  const Matrix& matrix_u(const UpsampledColumns& columns, int order);
+
+  opencl::State* state_;
+  const FilteredScan* scan_;
+  std::map<std::tuple<int, std::int64_t, std::int64_t, int>, Matrix> matrices_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,90 @@
+// Uniform FBP in slabs of rows and blocks of columns. Called by the command line and by plan.cpp (the 1x base volume).
+#include "vdvr/reconstruct.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/back_project.hpp"
+#include "host/coverage.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/reconstruct_field.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+std::vector<double> detector_rows(const ParallelGeometry& g, double first_z, double step, std::int64_t count) {
+  std::vector<double> rows(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = (first_z + static_cast<double>(i) * step) / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1);
+  return rows;
+}
+
+double kept_margin(const Grid& grid, int rate) {
+  const double cell = std::hypot(grid.spacing[0], grid.spacing[1]);
+  return cell * (1 + 1.0 / rate) * (1 + 1e-6);
+}
+
+UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int upsampling) {
+  // Everything that may be kept, and the stencil around it.
+  return upsampled_columns(g.columns, upsampling, (kept_margin(grid, 1) + grid.spacing[0]) / g.pitch_u);
+}
+
+Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const Grid& grid, int upsampling,
+                         const std::string& u_filter, const Progress& progress) {
+  const ParallelGeometry& g = filtered.geometry;
+  const Coverage coverage(g);
+  const Index3 n = grid.samples();
+  const UpsampledColumns columns = columns_for(g, grid, upsampling);
+
+  // A slab's projections take half of what is left, its columns at most a quarter.
+  const std::uint64_t budget = state.memory.left() / 2;
+  std::int64_t rows = std::min<std::int64_t>(n[2], 256);
+  while (rows > 16 && upsampler.slab_bytes(columns, rows) > budget) rows = (rows + 1) / 2;
+  if (upsampler.slab_bytes(columns, rows) > std::min(budget, state.info.max_allocation)) {
+    throw ResourceError(fmt::format("{} views of {} upsampled columns need {} MiB per slab of {} rows; raise --max-memory or lower --upsampling",
+                                    g.views(), columns.count, upsampler.slab_bytes(columns, rows) >> 20, rows));
+  }
+  const std::int64_t rows_padded = static_cast<std::int64_t>(opencl::round_up(static_cast<std::uint64_t>(rows), 16));
+  const std::int64_t wanted = static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * rows_padded * 4);
+  const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
+
+  Volume volume{grid, std::vector<float>(static_cast<std::size_t>(grid.sample_count()))};
+  std::vector<float> columns_host;
+  for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
+    const std::int64_t nz = std::min(rows, n[2] - z0);
+    const auto positions = detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz);
+    const UpsampledSlab slab = upsampler(columns, positions);
+    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * slab.rows_padded), "reconstructed columns");
+    columns_host.resize(out.size());
+    for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
+      report(progress, "reconstruct", (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) / static_cast<double>(n[2]));
+      ColumnBlocks blocks{n[0], std::min(band, n[1] - y0), grid.spacing[0], grid.spacing[1],
+                          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}}};
+      back_project(state, g, slab, blocks, u_filter, out);
+      out.read(columns_host);
+      for (std::int64_t y = 0; y < blocks.ny; ++y)
+        for (std::int64_t x = 0; x < n[0]; ++x) {
+          const Vec3 p = grid.position({x, y0 + y, z0});
+          if (coverage.margin(p[0], p[1]) < -kept_margin(grid, 1)) continue;
+          const float* column = columns_host.data() + (y * n[0] + x) * slab.rows_padded;
+          for (std::int64_t z = 0; z < nz; ++z)
+            volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] = column[z];
+        }
+    }
+  }
+  return volume;
+}
+
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid, const ReconstructOptions& options, const Progress& progress) {
+  if (options.upsampling < 1 || options.upsampling > 64 || (options.upsampling & (options.upsampling - 1)) != 0)
+    throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
+  if (options.u_filter != "linear" && options.u_filter != "cubic")
+    throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
+  const FilteredScan filtered = filter_projections(device.state(), scan, options.field, progress);
+  Upsampler upsampler(device.state(), filtered);
+  return reconstruct_field(device.state(), filtered, upsampler, grid, options.upsampling, options.u_filter, progress);
+}
+
+}  // namespace vdvr

@@ -1,0 +1,58 @@
+// out[b][i][z] = sum_j a[b][i][j] v[b][j][z]: the dense products of cosine-series resampling (rows to the grid's z positions,
+// columns to the upsampled positions in u, and their derivatives; docs/geometry.md).
+// `out_first` is where the first batch begins.
+// z is contiguous and padded to a multiple of VDVR_LANES; a_batch or v_batch is 0 where all batches share the matrix.
+// Sums run in runs of 32 terms that are then added, so that the rounding error grows with 32 + terms / 32 instead of terms.
+// Called by host/filter_projections.cpp.
+#pragma OPENCL FP_CONTRACT ON
+
+#ifndef VDVR_LANES
+#define VDVR_LANES 16
+#endif
+#ifndef VDVR_ROWS
+#define VDVR_ROWS 8
+#endif
+
+#if VDVR_LANES == 1
+#define VEC float
+#define LOAD(p) (*(p))
+#define STORE(v, p) (*(p) = (v))
+#elif VDVR_LANES == 4
+#define VEC float4
+#define LOAD(p) vload4(0, p)
+#define STORE(v, p) vstore4(v, 0, p)
+#else
+#define VEC float16
+#define LOAD(p) (*(__global const float16*)(p))
+#define STORE(v, p) (*(__global float16*)(p) = (v))
+#endif
+
+__kernel void batched_product(__global float* out, __global const float* a, __global const float* v, int rows, int terms,
+                              int z_padded, int batches, ulong out_first, ulong out_batch, ulong a_batch,
+                              ulong v_batch) {
+  const int z = (int)get_global_id(0) * VDVR_LANES;
+  const int i = (int)get_global_id(1) * VDVR_ROWS;
+  const int b = (int)get_global_id(2);
+  if (z >= z_padded || i >= rows || b >= batches) return;
+  __global const float* column = v + (size_t)b * v_batch + z;
+
+  // Rows beyond the matrix repeat its last one and are not stored.
+  __global const float* row[VDVR_ROWS];
+  VEC total[VDVR_ROWS];
+  for (int r = 0; r < VDVR_ROWS; ++r) {
+    row[r] = a + (size_t)b * a_batch + (size_t)min(i + r, rows - 1) * terms;
+    total[r] = (VEC)(0.0f);
+  }
+  for (int first = 0; first < terms; first += 32) {
+    const int last = min(first + 32, terms);
+    VEC sum[VDVR_ROWS];
+    for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = (VEC)(0.0f);
+    for (int j = first; j < last; ++j) {
+      const VEC x = LOAD(column + (size_t)j * z_padded);
+      for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = fma((VEC)(row[r][j]), x, sum[r]);
+    }
+    for (int r = 0; r < VDVR_ROWS; ++r) total[r] += sum[r];
+  }
+  for (int r = 0; r < VDVR_ROWS; ++r)
+    if (i + r < rows) STORE(total[r], out + out_first + (size_t)b * out_batch + (size_t)(i + r) * z_padded + z);
+}
