@@ -1,6 +1,7 @@
 // Launcher of kernels/back_project.cl.
 #include "host/back_project.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "host/opencl/kernel.hpp"
@@ -20,11 +21,16 @@ ViewStep view_step(const ParallelGeometry& g, const UpsampledColumns& c, const C
 
 }  // namespace
 
+std::int64_t column_stride(std::int64_t rows) {
+  const std::int64_t chunks = (rows + 15) / 16;
+  return 16 * (chunks % 2 == 0 ? chunks + 1 : chunks);
+}
+
 double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks) {
-  // Both steps are rounded (u each), both products and sums round once; the fraction of the start is below 1.
+  // Start and steps are rounded (u each), both fused products round once, and no intermediate passes the block's reach + 1.
   const double scale = columns.rate / geometry.pitch_u;
   const double reach = scale * (static_cast<double>(blocks.nx) * blocks.step_x + static_cast<double>(blocks.ny) * blocks.step_y);
-  return 0x1p-24 * (3 * reach + 2);
+  return 0x1p-24 * (5 * reach + 5);
 }
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,
@@ -39,21 +45,25 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
       const std::size_t view = k + static_cast<std::size_t>(slab.first_view);
       const ViewStep step = view_step(geometry, slab.columns, blocks, view);
       const double t = blocks.first[b][0] * std::cos(geometry.theta_rad[view]) + blocks.first[b][1] * std::sin(geometry.theta_rad[view]);
-      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center), whole = std::floor(s);
+      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center);
+      // The lowest s of the block, less one so that rounding cannot make a local position negative.
+      const double lowest = s + std::min(0.0, step.along_x * static_cast<double>(blocks.nx + 4)) +
+                            std::min(0.0, step.along_y * static_cast<double>(blocks.ny + 2));
+      const double whole = std::floor(lowest) - 1;
       steps[b * views + k] = {{static_cast<float>(step.along_x), static_cast<float>(step.along_y), static_cast<float>(s - whole),
                                static_cast<float>(whole)}};
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "view positions");
 
-  const int columns_per_item = state.info.is_gpu ? 1 : 2;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
+  const int tile_x = state.info.is_gpu ? 1 : 4, tile_y = state.info.is_gpu ? 1 : 2;
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
       state, "back_project", "back_project",
       {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
        {"VDVR_LANES", std::to_string(tuning.lanes)},
-       {"VDVR_COLUMNS", std::to_string(columns_per_item)}});
+       {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + columns_per_item - 1) / columns_per_item), count(blocks.ny) * n}, tuning.local},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), ints(slab.views), ints(slab.columns.count), ints(slab.rows_padded),
+  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x), count((blocks.ny + tile_y - 1) / tile_y) * n}, tuning.local},
+         out.buffer(), slab.values.buffer(), device_steps.buffer(), ints(slab.views), ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)),
          ints(blocks.nx), ints(blocks.ny), ints(n));
 }
 

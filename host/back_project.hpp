@@ -16,10 +16,13 @@ struct ColumnBlocks {
   std::vector<std::array<double, 2>> first;
 };
 
-/// float out[block][y][x][z padded] = sum over the slab's views of q at t(x, y). `filter`: linear | cubic.
+/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear | cubic.
 /// Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,
                   const std::string& filter, opencl::DeviceArray<float>& out);
+
+/// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not share cache sets.
+std::int64_t column_stride(std::int64_t rows);
 
 /// A bound on the fp32 error of the positions s, in upsampled columns, for such blocks (docs/error-bounds.md, section 7).
 double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks);

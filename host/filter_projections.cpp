@@ -177,12 +177,12 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
   slab.rows = static_cast<std::int64_t>(rows.size());
   slab.rows_padded = static_cast<std::int64_t>(opencl::round_up(rows.size(), 16));
 
-  // Rows first: v and z lie in the same order everywhere, so the transposed matrix is float [v][z padded].
+  // Rows first: v and z lie in the same order everywhere, so the transposed matrix is float [z / 16][v][16].
   const auto exact = resampling_matrix(g.rows, rows, order_v, g.pitch_v, row_lattice);
   std::vector<float> transposed(static_cast<std::size_t>(g.rows * slab.rows_padded), 0.0f);
   for (std::size_t z = 0; z < rows.size(); ++z)
     for (std::size_t v = 0; v < static_cast<std::size_t>(g.rows); ++v)
-      transposed[v * static_cast<std::size_t>(slab.rows_padded) + z] = static_cast<float>(exact[z * static_cast<std::size_t>(g.rows) + v]);
+      transposed[(z / 16 * static_cast<std::size_t>(g.rows) + v) * 16 + z % 16] = static_cast<float>(exact[z * static_cast<std::size_t>(g.rows) + v]);
   const opencl::DeviceArray<float> row_matrix(*state_, std::span<const float>(transposed), "row resampling matrix");
   const Matrix& column_matrix = matrix_u(columns, order_u);
 
@@ -194,7 +194,8 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
   opencl::DeviceArray<float> resampled(*state_, count(chunk * g.columns * slab.rows_padded), "rows of a slab");
 
   const int block_rows = 8;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_ulong, cl_ulong, cl_ulong, cl_ulong> product(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_ulong, cl_ulong, cl_ulong, cl_ulong,
+                 cl_ulong, cl_ulong> product(
       *state_, "batched_product", "batched_product",
       {{"VDVR_LANES", std::to_string(tuning.lanes)}, {"VDVR_ROWS", std::to_string(block_rows)}});
   const auto range = [&](std::int64_t product_rows, std::int64_t batches) {
@@ -205,11 +206,12 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
     const std::int64_t n = std::min(chunk, views - first);
     filtered.write(std::span<const float>(scan_->samples)
                        .subspan(static_cast<std::size_t>((first_view + first) * g.columns * g.rows), static_cast<std::size_t>(n * g.columns * g.rows)));
+    const std::uint64_t resampled_chunk = count(n * g.columns * 16), slab_chunk = count(views * columns.count * 16);
     product(range(n * g.columns, 1), resampled.buffer(), filtered.buffer(), row_matrix.buffer(), to_int(n * g.columns), to_int(g.rows),
-            to_int(slab.rows_padded), 1, cl_ulong{0}, cl_ulong{0}, cl_ulong{0}, cl_ulong{0});
-    const std::uint64_t out_batch = count(columns.count * slab.rows_padded);
+            to_int(slab.rows_padded), 1, cl_ulong{0}, cl_ulong{0}, resampled_chunk, cl_ulong{0}, cl_ulong{0}, count(g.rows * 16));
     product(range(columns.count, n), slab.values.buffer(), column_matrix.values.buffer(), resampled.buffer(), to_int(columns.count), to_int(g.columns),
-            to_int(slab.rows_padded), to_int(n), count(first) * out_batch, out_batch, cl_ulong{0}, count(g.columns * slab.rows_padded));
+            to_int(slab.rows_padded), to_int(n), count(first * columns.count * 16), count(columns.count * 16), slab_chunk, cl_ulong{0},
+            count(g.columns * 16), resampled_chunk);
   }
   return slab;
 }

@@ -33,11 +33,11 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
 /// Lanes to which z is padded, and the launch shape of the column kernels, by device class.
 struct ColumnTuning {
   int lanes = 16;
-  std::array<std::uint64_t, 3> local{1, 8, 4};
+  std::array<std::uint64_t, 3> local{1, 8, 16};
 };
 ColumnTuning column_tuning(const DeviceInfo& device);
 
-/// float values[view][column][z padded]: one slab of rows, upsampled in u.
+/// float values[row / 16][view][column][16]: one slab of rows, upsampled in u.
 struct UpsampledSlab {
   opencl::DeviceArray<float> values;
   UpsampledColumns columns;

@@ -46,8 +46,7 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
     throw ResourceError(fmt::format("{} views of {} upsampled columns need {} MiB per slab of {} rows; raise --max-memory or lower --upsampling",
                                     g.views(), columns.count, upsampler.slab_bytes(columns, rows) >> 20, rows));
   }
-  const std::int64_t rows_padded = static_cast<std::int64_t>(opencl::round_up(static_cast<std::uint64_t>(rows), 16));
-  const std::int64_t wanted = static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * rows_padded * 4);
+  const std::int64_t wanted = static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
   Volume volume{grid, std::vector<float>(static_cast<std::size_t>(grid.sample_count()))};
@@ -56,7 +55,7 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
     const std::int64_t nz = std::min(rows, n[2] - z0);
     const auto positions = detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz);
     const UpsampledSlab slab = upsampler(columns, positions);
-    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * slab.rows_padded), "reconstructed columns");
+    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * column_stride(nz)), "reconstructed columns");
     columns_host.resize(out.size());
     for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
       report(progress, "reconstruct", (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) / static_cast<double>(n[2]));
@@ -68,7 +67,7 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
         for (std::int64_t x = 0; x < n[0]; ++x) {
           const Vec3 p = grid.position({x, y0 + y, z0});
           if (coverage.margin(p[0], p[1]) < -kept_margin(grid, 1)) continue;
-          const float* column = columns_host.data() + (y * n[0] + x) * slab.rows_padded;
+          const float* column = columns_host.data() + (y * n[0] + x) * column_stride(nz);
           for (std::int64_t z = 0; z < nz; ++z)
             volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] = column[z];
         }

@@ -1,8 +1,9 @@
 // Back-projection onto columns of z samples: out[block][y][x][z] = sum_k q_k(t_k(x, y), z), the paper's Eq. 2 with the
 // view weights folded into q.
-// Layouts: float filtered[view][column n][z], z padded to a multiple of VDVR_LANES; float out[block][y][x][z] alike;
-// per block and view a float4 {step of s along x, along y, fraction of s at the block's first sample, its integer part}.
-// One work-item carries VDVR_LANES samples of z for VDVR_COLUMNS neighbours in x: position, index and weights are shared by
+// Layouts: float filtered[z / 16][view][column n][16], so that neighbouring columns are neighbouring cache lines and no
+// power-of-two stride maps them onto one cache set; float out[block][y][x][out_stride];
+// per block and view a float4 {step of s along x, along y, s at the block's first sample less an integer, that integer}.
+// One work-item carries VDVR_LANES samples of z for a tile of neighbours in x and y: position, index and weights are shared by
 // the whole column, and the loads are contiguous. Positions are relative to the block, so fp32 holds them (docs/error-bounds.md).
 // Called by host/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
@@ -14,8 +15,8 @@
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
-#ifndef VDVR_COLUMNS
-#define VDVR_COLUMNS 2
+#ifndef VDVR_TILE
+#define VDVR_TILE 8
 #endif
 
 #if VDVR_LANES == 1
@@ -36,44 +37,86 @@
 #define STORE(v, p) (*(__global float16*)(p) = (v))
 #endif
 
+// A tile of 1 or 4 x 2 neighbours; lane i of a TILE value belongs to column i % 4, row i / 4.
+#if VDVR_TILE == 8
+#define TILE float8
+#define ITILE int8
+#define TO_ITILE convert_int8
+#define TO_TILE convert_float8
+#define TILE_X 4
+#define TILE_Y 2
+#define OFFSET_X (float8)(0, 1, 2, 3, 0, 1, 2, 3)
+#define OFFSET_Y (float8)(0, 0, 0, 0, 1, 1, 1, 1)
+#define FOR_TILE(M) M(a0, s0, 0, 0) M(a1, s1, 1, 0) M(a2, s2, 2, 0) M(a3, s3, 3, 0) \
+                    M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) M(b3, s7, 3, 1)
+#define LANE(v, i) v.i
+#elif VDVR_TILE == 1
+#define TILE float
+#define ITILE int
+#define TO_ITILE convert_int
+#define TO_TILE convert_float
+#define TILE_X 1
+#define TILE_Y 1
+#define OFFSET_X 0.0f
+#define OFFSET_Y 0.0f
+#define FOR_TILE(M) M(a0, s0, 0, 0)
+#define LANE(v, i) v
+#else
+#error "VDVR_TILE is 1 or 8"
+#endif
+
+#if VDVR_CUBIC
+#define ADD(sum, i, c, r)                                        \
+  {                                                              \
+    __global const float* q = plane + LANE(at, i);               \
+    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);                 \
+    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum);            \
+    sum = fma((VEC)(LANE(w2, i)), LOAD(q + 32), sum);            \
+    sum = fma((VEC)(LANE(w3, i)), LOAD(q + 48), sum);            \
+  }
+#else
+#define ADD(sum, i, c, r)                                        \
+  {                                                              \
+    __global const float* q = plane + LANE(at, i);               \
+    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);                 \
+    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum);            \
+  }
+#endif
+// Named sums, not an array: compilers keep these in registers.
+#define CLEAR(sum, i, c, r) VEC sum = (VEC)(0.0f);
+#define PUT(sum, i, c, r) \
+  if (x + c < nx && y + r < ny) STORE(sum, target + (size_t)(r * nx + c) * out_stride);
+
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps, int views,
-                           int columns, int z_padded, int nx, int ny, int blocks) {
+                           int columns, int z_padded, int out_stride, int nx, int ny, int blocks) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
-  const int x = (int)get_global_id(1) * VDVR_COLUMNS;
-  const int row = (int)get_global_id(2);
-  const int block = row / ny, y = row - block * ny;
+  const int x = (int)get_global_id(1) * TILE_X;
+  const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
+  const int block = row / tile_rows, y = (row - block * tile_rows) * TILE_Y;
   if (z >= z_padded || x >= nx || block >= blocks) return;
 
-  VEC sum[VDVR_COLUMNS];
-  for (int c = 0; c < VDVR_COLUMNS; ++c) sum[c] = (VEC)(0.0f);
-
-  __global const float* plane = filtered + z;
-  for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
-    const float4 step = steps[block * views + k];
-    const int first = (int)step.w;
-    const float at_y = fma(step.y, (float)y, step.z);
-    for (int c = 0; c < VDVR_COLUMNS; ++c) {
-      const float s = fma(step.x, (float)(x + c), at_y);
-      const float below = floor(s);
-      const float f = s - below;
+  const TILE tile_x = (float)x + OFFSET_X, tile_y = (float)y + OFFSET_Y;
+  FOR_TILE(CLEAR)
+  __global const float* plane = filtered + (size_t)(z / 16) * views * columns * 16 + z % 16;
+  __global const float4* view = steps + (size_t)block * views;
+  for (int k = 0; k < views; ++k, plane += columns * 16) {
+    const float4 step = view[k];
+    // s >= 0 inside the block (the host chooses its integer part so), so that truncation is floor: CPUs have one
+    // instruction for that and none for a scalar floor.
+    const TILE s = fma((TILE)(step.x), tile_x, fma((TILE)(step.y), tile_y, (TILE)(step.z)));
+    const ITILE below = TO_ITILE(s);
+    const TILE f = s - TO_TILE(below), g = 1.0f - f;
 #if VDVR_CUBIC
-      const int n = clamp(first + (int)below, 1, columns - 3);
-      __global const float* q = plane + (size_t)(n - 1) * z_padded;
-      // Lagrange weights on the nodes -1, 0, 1, 2.
-      const float g = 1.0f - f, h = 2.0f - f, e = 1.0f + f;
-      sum[c] = fma((VEC)(-f * g * h * (1.0f / 6.0f)), LOAD(q), sum[c]);
-      sum[c] = fma((VEC)(e * g * h * 0.5f), LOAD(q + z_padded), sum[c]);
-      sum[c] = fma((VEC)(e * f * h * 0.5f), LOAD(q + 2 * z_padded), sum[c]);
-      sum[c] = fma((VEC)(-e * f * g * (1.0f / 6.0f)), LOAD(q + 3 * z_padded), sum[c]);
+    // Lagrange weights on the nodes -1, 0, 1, 2.
+    const TILE h = 2.0f - f, e = 1.0f + f, outer = f * g * (-1.0f / 6.0f), inner = e * h * 0.5f;
+    const TILE w0 = outer * h, w1 = inner * g, w2 = inner * f, w3 = outer * e;
+    const ITILE at = (clamp((int)step.w + below, (ITILE)1, (ITILE)(columns - 3)) - 1) * 16;
 #else
-      const int n = clamp(first + (int)below, 0, columns - 2);
-      __global const float* q = plane + (size_t)n * z_padded;
-      sum[c] = fma((VEC)(1.0f - f), LOAD(q), sum[c]);
-      sum[c] = fma((VEC)(f), LOAD(q + z_padded), sum[c]);
+    const TILE w0 = g, w1 = f;
+    const ITILE at = clamp((int)step.w + below, (ITILE)0, (ITILE)(columns - 2)) * 16;
 #endif
-    }
+    FOR_TILE(ADD)
   }
-  __global float* target = out + (((size_t)block * ny + y) * nx + x) * z_padded + z;
-  for (int c = 0; c < VDVR_COLUMNS; ++c)
-    if (x + c < nx) STORE(sum[c], target + (size_t)c * z_padded);
+  __global float* target = out + (((size_t)block * ny + y) * nx + x) * out_stride + z;
+  FOR_TILE(PUT)
 }

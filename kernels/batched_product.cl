@@ -1,7 +1,7 @@
 // out[b][i][z] = sum_j a[b][i][j] v[b][j][z]: the dense products of cosine-series resampling (rows to the grid's z positions,
 // columns to the upsampled positions in u, and their derivatives; docs/geometry.md).
-// `out_first` is where the first batch begins.
-// z is contiguous and padded to a multiple of VDVR_LANES; a_batch or v_batch is 0 where all batches share the matrix.
+// z-vectors are stored in chunks of 16: element (i, z) of batch b of a matrix lies at b * batch + (z / 16) * chunk + 16 i + z % 16.
+// a_batch or v_batch is 0 where all batches share the matrix; `out_first` is where the first batch begins.
 // Sums run in runs of 32 terms that are then added, so that the rounding error grows with 32 + terms / 32 instead of terms.
 // Called by host/filter_projections.cpp.
 #pragma OPENCL FP_CONTRACT ON
@@ -28,13 +28,13 @@
 #endif
 
 __kernel void batched_product(__global float* out, __global const float* a, __global const float* v, int rows, int terms,
-                              int z_padded, int batches, ulong out_first, ulong out_batch, ulong a_batch,
-                              ulong v_batch) {
+                              int z_padded, int batches, ulong out_first, ulong out_batch,
+                              ulong out_chunk, ulong a_batch, ulong v_batch, ulong v_chunk) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
   const int i = (int)get_global_id(1) * VDVR_ROWS;
   const int b = (int)get_global_id(2);
   if (z >= z_padded || i >= rows || b >= batches) return;
-  __global const float* column = v + (size_t)b * v_batch + z;
+  __global const float* column = v + (size_t)b * v_batch + (size_t)(z / 16) * v_chunk + z % 16;
 
   // Rows beyond the matrix repeat its last one and are not stored.
   __global const float* row[VDVR_ROWS];
@@ -48,11 +48,11 @@ __kernel void batched_product(__global float* out, __global const float* a, __gl
     VEC sum[VDVR_ROWS];
     for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = (VEC)(0.0f);
     for (int j = first; j < last; ++j) {
-      const VEC x = LOAD(column + (size_t)j * z_padded);
+      const VEC x = LOAD(column + (size_t)j * 16);
       for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = fma((VEC)(row[r][j]), x, sum[r]);
     }
     for (int r = 0; r < VDVR_ROWS; ++r) total[r] += sum[r];
   }
   for (int r = 0; r < VDVR_ROWS; ++r)
-    if (i + r < rows) STORE(total[r], out + out_first + (size_t)b * out_batch + (size_t)(i + r) * z_padded + z);
+    if (i + r < rows) STORE(total[r], out + out_first + (size_t)b * out_batch + (size_t)(z / 16) * out_chunk + (size_t)(i + r) * 16 + z % 16);
 }
