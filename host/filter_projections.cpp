@@ -163,7 +163,7 @@ const Upsampler::Matrix& Upsampler::matrix_u(const UpsampledColumns& columns, in
   return matrices_.emplace(key, std::move(m)).first->second;
 }
 
-double Upsampler::gain_u(const UpsampledColumns& columns) { return matrix_u(columns, 0).gain; }
+double Upsampler::gain_u(const UpsampledColumns& columns, int order) { return matrix_u(columns, order).gain; }
 
 UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u, int order_v,
                                     int row_lattice, std::int64_t first_view, std::int64_t views) {

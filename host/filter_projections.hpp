@@ -55,8 +55,8 @@ class Upsampler {
   UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0, int order_v = 0,
                            int row_lattice = 0, std::int64_t first_view = 0, std::int64_t views = -1);
 
-  /// The largest absolute row sum of the value matrix in u: how much an error of the samples can grow.
-  double gain_u(const UpsampledColumns& columns);
+  /// The largest absolute row sum of the matrix in u of a value or derivative: how much an error of the samples can grow.
+  double gain_u(const UpsampledColumns& columns, int order);
 
   /// Bytes of one slab.
   [[nodiscard]] std::uint64_t slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const;

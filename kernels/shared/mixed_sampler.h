@@ -77,13 +77,15 @@ VDVR_INLINE VdvrLocal vdvr_local(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 g
   return l;
 }
 
-// Trilinear interpolation in the cell whose lowest sample is `s`: x first, then y, then z.
+// Bilinear interpolation in the lower z face of the cell whose lowest sample is `s`: x first, then y.
+VDVR_INLINE float vdvr_bilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, float fx, float fy) {
+  return vdvr_lerp(vdvr_lerp(s[0], s[1], fx), vdvr_lerp(s[stride_y], s[stride_y + 1], fx), fy);
+}
+
+// Trilinear interpolation in that cell: x first, then y, then z.
 VDVR_INLINE float vdvr_trilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, vdvr_u32 stride_z, float fx, float fy,
                                  float fz) {
-  VDVR_GLOBAL const float* t = s + stride_z;
-  const float a = vdvr_lerp(vdvr_lerp(s[0], s[1], fx), vdvr_lerp(s[stride_y], s[stride_y + 1], fx), fy);
-  const float b = vdvr_lerp(vdvr_lerp(t[0], t[1], fx), vdvr_lerp(t[stride_y], t[stride_y + 1], fx), fy);
-  return vdvr_lerp(a, b, fz);
+  return vdvr_lerp(vdvr_bilinear(s, stride_y, fx, fy), vdvr_bilinear(s + stride_z, stride_y, fx, fy), fz);
 }
 
 // The field at a cell coordinate of a known brick; `first` is the brick's first sample.

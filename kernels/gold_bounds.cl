@@ -1,0 +1,137 @@
+// Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered projections, T from
+// second differences of gold, and the node slack that the node test adds to |V - gold|.
+// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[base cell z][view][n] = sup of the positive and
+// of the negative part over the rows of a base cell and the stencil of column cell n; p float[block][base cell y][base cell x]
+// [stride], constant over the gold cells of a base cell; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one
+// node of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack float[block][y][x][stride], node z at z.
+// Called by host/gold_stream.cpp and host/projection_bounds.cpp.
+
+#define UNTESTED (-1e30f)
+
+// Largest |d| over the columns of every row: sup[view][z].
+__kernel void row_sup(__global float* sup, __global const float* d, int views, int columns, int z_padded) {
+  const int z = (int)get_global_id(0), k = (int)get_global_id(1);
+  if (z >= z_padded || k >= views) return;
+  __global const float* p = d + ((size_t)(z / 16) * views + k) * columns * 16 + z % 16;
+  float largest = 0.0f;
+  for (int n = 0; n < columns; ++n) largest = fmax(largest, fabs(p[(size_t)n * 16]));
+  sup[(size_t)k * z_padded + z] = largest;
+}
+
+// `below`, `above`: the stencil of interpolation in column cell n is n - below .. n + above. `remainder` times the row's sup is
+// how far a derivative can rise between columns; `rounding` what its fp32 evaluation can err.
+__kernel void bound_table(__global float2* table, __global const float* d, __global const float* sup,
+                          __global const float* rounding, int first_view, int chunk_views, int all_views, int columns,
+                          int z_padded, int rows, int rate, int cells_z, int below, int above, float remainder) {
+  const int n = (int)get_global_id(0), k = (int)get_global_id(1), c = (int)get_global_id(2);
+  if (n >= columns || k >= chunk_views || c >= cells_z) return;
+  // Rows one gold step beyond the cell: second differences at its nodes reach there.
+  const int first = c * rate, last = min(c * rate + rate + 2, rows - 1);
+  float plus = 0.0f, minus = 0.0f;
+  for (int z = first; z <= last; ++z) {
+    __global const float* p = d + ((size_t)(z / 16) * chunk_views + k) * columns * 16 + z % 16;
+    const float rise = remainder * sup[(size_t)k * z_padded + z] + rounding[first_view + k];
+    for (int m = max(n - below, 0); m <= min(n + above, columns - 1); ++m) {
+      const float v = p[(size_t)m * 16];
+      plus = fmax(plus, v + rise);
+      minus = fmax(minus, rise - v);
+    }
+  }
+  table[((size_t)c * all_views + first_view + k) * columns + n] = (float2)(plus, minus);
+}
+
+// P per base cell: for each view the largest table entry over the columns that the cell, widened by one gold step, can hit.
+// steps: per block and view {s per base cell along x, along y, s at the first cell's centre, half width in columns}.
+__kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps, int views,
+                            int columns, int cells_x, int cells_y, int cells_z, int blocks, int rate, int stride,
+                            float factor) {
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / cells_z, z = (int)get_global_id(2) - block * cells_z;
+  if (x >= cells_x || y >= cells_y || block >= blocks) return;
+  float plus = 0.0f, minus = 0.0f;
+  for (int k = 0; k < views; ++k) {
+    const float4 step = steps[(size_t)block * views + k];
+    const float s = step.z + step.x * (float)x + step.y * (float)y;
+    const int first = clamp((int)floor(s - step.w), 0, columns - 1), last = clamp((int)floor(s + step.w), 0, columns - 1);
+    __global const float2* row = table + ((size_t)z * views + k) * columns;
+    float2 largest = (float2)(0.0f);
+    for (int n = first; n <= last; ++n) largest = fmax(largest, row[n]);
+    plus += largest.x;
+    minus += largest.y;
+  }
+  __global float* target = p + (((size_t)block * cells_y + y) * cells_x + x) * stride + (size_t)z * rate;
+  for (int i = 0; i < rate; ++i) target[i] = factor * fmax(plus, minus);
+}
+
+// Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.
+#define DIFFERENCES(node)                                                                       \
+  {                                                                                             \
+    __global const float* at = node;                                                            \
+    const float16 twice = 2.0f * vload16(0, at);                                                \
+    const float16 dx = vload16(0, at - gold_stride) + vload16(0, at + gold_stride) - twice;     \
+    const float16 dy = vload16(0, at - row) + vload16(0, at + row) - twice;                     \
+    const float16 dz = vload16(0, at - 1) + vload16(0, at + 1) - twice;                         \
+    px = fmax(px, dx); mx = fmin(mx, dx);                                                       \
+    py = fmax(py, dy); my = fmin(my, dy);                                                       \
+    pz = fmax(pz, dz); mz = fmin(mz, dz);                                                       \
+  }
+#define RANGE(node)                                                                             \
+  {                                                                                             \
+    const float16 v = vload16(0, node);                                                         \
+    low = fmin(low, v); high = fmax(high, v);                                                   \
+  }
+#define CORNERS(M)                                                                              \
+  M(at) M(at + 1) M(at + gold_stride) M(at + gold_stride + 1)                                   \
+  M(at + row) M(at + row + 1) M(at + row + gold_stride) M(at + row + gold_stride + 1)
+
+// Slack of each gold cell: T + P, T = (larger signed sum of the largest second differences at the cell's corners) / 8 +
+// t_constant + 1.5 P. Cells beyond the block, and with `windowed` those whose range misses the window, are UNTESTED.
+// The host pads gold and the strides so that no 16-lane access leaves its column's room.
+__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* p, int nx, int ny, int nz,
+                         int gold_stride, int stride, int rate, int cells_x, int cells_y, int blocks, float t_constant,
+                         int windowed, float window_low, float window_high) {
+  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
+  if (z >= nz - 1 || x >= nx - 1 || block >= blocks) return;
+  const int row = (nx + 2) * gold_stride;
+  __global const float* at = gold + ((size_t)block * (ny + 2) + y + 1) * row + (size_t)(x + 1) * gold_stride + z + 1;
+  float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
+  CORNERS(DIFFERENCES)
+  const float16 bound = vload16(0, p + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
+  float16 slack = fmax(px + py + pz, -(mx + my + mz)) * 0.125f + t_constant + 2.5f * bound;
+  if (windowed) {
+    float16 low = vload16(0, at), high = low;
+    CORNERS(RANGE)
+    slack = select(slack, (float16)(UNTESTED), (low > window_high) | (high < window_low));
+  }
+  const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  slack = select(slack, (float16)(UNTESTED), k > nz - 2);
+  __global float* target = cells + (((size_t)block * ny + y) * nx + x) * stride;
+  vstore16(slack, 0, target + z + 1);
+  if (z == 0) target[0] = UNTESTED;
+}
+
+// Slack of each node: the largest of the cells around it, UNTESTED where no such cell meets the covered region.
+// margin: per block and column the coverage margin across z; nodes with less than `lowest` are untested, as are those outside
+// [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
+__kernel void node_slack(__global float* slack, __global const float* cells, __global const float* margin,
+                         __global const int2* last, int nx, int ny, int nz, int stride, int blocks, float lowest, int z_first,
+                         int z_last) {
+  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
+  if (z >= nz || x >= nx || block >= blocks) return;
+  const size_t column = ((size_t)block * ny + y) * nx + x;
+  float16 largest = (float16)(UNTESTED);
+  const int2 end = last[block];
+  if (margin[column] >= lowest && x <= end.x && y <= end.y) {
+    for (int dy = -1; dy <= 0; ++dy)
+      for (int dx = -1; dx <= 0; ++dx) {
+        if (x + dx < 0 || y + dy < 0 || x + dx >= end.x || y + dy >= end.y) continue;
+        __global const float* at = cells + (column + dy * nx + dx) * stride + z;
+        largest = fmax(largest, fmax(vload16(0, at), vload16(0, at + 1)));
+      }
+    const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    largest = select(largest, (float16)(UNTESTED), (k < z_first) | (k > z_last) | (k > nz - 1));
+  }
+  vstore16(largest, 0, slack + column * stride + z);
+}

@@ -1,0 +1,63 @@
+// Measures the stored field V against gold at every tested node of a block, through the sampler that renders it
+// (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, and which of its 27
+// parts (corners, edges, faces, inside) hold a node above the tolerance.
+// Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
+// Called by host/gold_stream.cpp.
+#include "shared/mixed_sampler.h"
+
+// The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
+inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
+
+__kernel void verify_nodes(volatile __global int* total, volatile __global int* error, volatile __global int* violated,
+                           __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
+                           __global const float* gold, __global const float* slack, __global const int4* first_brick,
+                           __global const uchar* selected, int nx, int ny, int gold_stride, int stride, int rate,
+                           int bricks_x, int bricks_y, int bricks_z, int blocks, float tolerance) {
+  const int side = grid.granularity * rate + 1;
+  const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
+  const int iy = (int)get_global_id(1) % side, brick_y = (int)get_global_id(1) / side;
+  const int block = (int)get_global_id(2) / bricks_z, brick_z = (int)get_global_id(2) - block * bricks_z;
+  if (brick_x >= bricks_x || brick_y >= bricks_y || block >= blocks) return;
+  const int4 first = first_brick[block];
+  const int bx = first.x + brick_x, by = first.y + brick_y, bz = first.z + brick_z;
+  if (bx >= grid.bricks_x || by >= grid.bricks_y || bz >= grid.bricks_z) return;
+  const size_t brick = ((size_t)bz * grid.bricks_y + by) * grid.bricks_x + bx;
+  if (!selected[brick]) return;
+
+  const int g = grid.granularity;
+  const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
+  const int last_z = min(g, grid.cells_z - bz * g) * rate;
+  if (ix > last_x || iy > last_y) return;
+  const VdvrBrick b = bricks[brick];
+  // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
+  const VdvrLocal x = vdvr_local((float)(bx * g) + (float)ix / (float)rate, bx, b.level_x, g, grid.cells_x);
+  const VdvrLocal y = vdvr_local((float)(by * g) + (float)iy / (float)rate, by, b.level_y, g, grid.cells_y);
+  __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
+
+  const int node_x = brick_x * g * rate + ix, node_y = brick_y * g * rate + iy, node_z = brick_z * g * rate;
+  __global const float* gold_column = gold + (((size_t)block * (ny + 2) + node_y + 1) * (nx + 2) + node_x + 1) * gold_stride + node_z + 1;
+  __global const float* slack_column = slack + (((size_t)block * ny + node_y) * nx + node_x) * stride + node_z;
+  float largest_total = -1.0f, largest_error = 0.0f;
+  int parts = 0, index = -1;
+  float low = 0.0f, high = 0.0f;
+  for (int k = 0; k <= last_z; ++k) {
+    const float s = slack_column[k];
+    if (s < 0.0f) continue;
+    const VdvrLocal z = vdvr_local((float)(bz * g) + (float)k / (float)rate, bz, b.level_z, g, grid.cells_z);
+    if (z.index != index) {  // the two faces that vdvr_trilinear would interpolate, kept from node to node
+      index = z.index;
+      low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+    }
+    const float e = fabs(vdvr_lerp(low, high, z.fraction) - gold_column[k]);
+    largest_total = fmax(largest_total, e + s);
+    largest_error = fmax(largest_error, e);
+    // Written so that NaN counts as a violation.
+    if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
+  }
+  if (largest_total < 0.0f) return;
+  const size_t out = (((size_t)block * bricks_z + brick_z) * bricks_y + brick_y) * bricks_x + brick_x;
+  atomic_max(total + out, as_int(largest_total));
+  atomic_max(error + out, as_int(largest_error));
+  if (parts) atomic_or(violated + out, parts);
+}
