@@ -30,6 +30,7 @@ constexpr int newest_version = 1;
 constexpr int largest_rate = 64;
 // Cell coordinates are fp32 in the sampler: beyond 2^24 neighbouring cells are no longer told apart.
 constexpr std::int64_t most_cells = std::int64_t{1} << 24;
+constexpr std::size_t longest_unit = 255;
 constexpr std::uint64_t longest_certificate = 64u << 20;
 constexpr LevelTriple in_base{0, 0, 0};
 
@@ -79,7 +80,8 @@ std::optional<Problem> grid_problem(const MixedVolume& v) {
     return at_grid(fmt::format("granularity {}, expected 1, 2, 4 or 8", v.granularity));
   if (v.rate < 1 || v.rate > largest_rate || !std::has_single_bit(static_cast<unsigned>(v.rate)))
     return at_grid(fmt::format("rate {}, expected a power of two up to {}", v.rate, largest_rate));
-  if (v.grid.unit.find('\0') != std::string::npos) return at_grid("the unit contains a zero byte");
+  if (v.grid.unit.find('\0') != std::string::npos || v.grid.unit.size() > longest_unit)
+    return at_grid(fmt::format("the unit has a zero byte or more than {} bytes", longest_unit));
   return std::nullopt;
 }
 

@@ -20,6 +20,11 @@ constexpr std::uint64_t chunk_bytes_wanted = 512 * 1024;
 constexpr std::uint64_t header_text_bytes = 60'000;
 constexpr std::uint64_t fletcher32_bytes = 4;  // appended to every chunk
 
+// A file whose last flush failed (disk full) cannot be closed; HDF5 1.10 tries once more when the process exits and
+// crashes. Every handle here is closed by its owner, so its exit handler has nothing else to do. Before main, because only
+// a call before HDF5's first use has an effect.
+[[maybe_unused]] const herr_t without_exit_handler = H5dont_atexit();
+
 /// The innermost message of HDF5's error stack: "Data error detected by Fletcher32 checksum", "truncated file ...".
 std::string hdf5_reason() {
   std::string reason;
@@ -187,10 +192,10 @@ void Writer::attribute(const std::string& object, const std::string& name, std::
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, const std::string& text) {
-  // Variable length: h5py and MATLAB hand these out as text, fixed-length ones as bytes.
-  const Handle type = text_type(H5T_VARIABLE), space(H5Screate(H5S_SCALAR), H5Sclose);
-  const char* first = text.c_str();
-  create_attribute(object, name, type.get(), space.get(), type.get(), &first);
+  // Fixed length: variable-length text goes to HDF5's global heap, which has no checksum; a flipped bit there makes the
+  // library itself crash on reading (1.10.8).
+  const Handle type = text_type(std::max<std::size_t>(1, text.size())), space(H5Screate(H5S_SCALAR), H5Sclose);
+  create_attribute(object, name, type.get(), space.get(), type.get(), text.c_str());
 }
 
 void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given,
@@ -338,7 +343,7 @@ std::vector<double> Reader::reals(const std::string& object, const std::string& 
 
 namespace {
 
-/// One string through `read(type, buffer)`; empty optional semantics by the return value of HDF5.
+/// One string through `read(type, buffer)`; false when HDF5 fails. Variable length is what h5py makes of an edited text.
 template <class Read>
 bool read_text(hid_t type, std::string& text, Read read) {
   if (H5Tis_variable_str(type) > 0) {
