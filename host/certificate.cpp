@@ -1,5 +1,5 @@
-// The certificate as JSON (docs/file-format.md): members in a fixed order, numbers that read back to the bit, no NaN and
-// no infinity. Called by vdvr_file.cpp and by every command that prints or stores a certificate.
+// The certificate as JSON (docs/file-format.md): members in a fixed order, numbers that read back to the bit,
+// no NaN and no infinity. Called by vdvr_file.cpp and by every command that prints or stores a certificate.
 #include "vdvr/certificate.hpp"
 
 #include <fmt/format.h>
@@ -15,16 +15,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// --- writing ----------------------------------------------------------------------------------------------------------
+// --- writing
+// ----------------------------------------------------------------------------------------------------------
 
 /// JSON has no NaN and no infinity; the JSON library would write null, which reads as "not measured".
 double finite(const char* member, double value) {
   if (!std::isfinite(value))
-    throw InputError(fmt::format("certificate: member '{}' is {}; only finite numbers can be certified", member, value));
+    throw InputError(
+        fmt::format("certificate: member '{}' is {}; only finite numbers can be certified", member, value));
   return value;
 }
 
-Json term(const char* member, const ErrorTerm& t) { return {{"value", finite(member, t.value)}, {"method", t.method}}; }
+Json term(const char* member, const ErrorTerm& t) {
+  return {{"value", finite(member, t.value)}, {"method", t.method}};
+}
 
 Json budget(const ErrorBudget& b) {
   Json sampler = {{"buffer", term("budget.sampler.buffer.value", b.sampler.buffer)}};
@@ -54,11 +58,13 @@ Json numbers(const char* member, const Numbers& values) {
 
 Json options(const std::string& text) {
   const Json parsed = Json::parse(text, nullptr, false);
-  if (!parsed.is_object()) throw InputError(fmt::format("certificate: options are not a JSON object: '{}'", text));
+  if (!parsed.is_object())
+    throw InputError(fmt::format("certificate: options are not a JSON object: '{}'", text));
   return parsed;
 }
 
-// --- reading ----------------------------------------------------------------------------------------------------------
+// --- reading
+// ----------------------------------------------------------------------------------------------------------
 
 /// A value with its place, so that every refusal names the member.
 class Member {
@@ -79,11 +85,14 @@ class Member {
   [[nodiscard]] const Json& list() const { return expect(value_->is_array(), "an array"); }
   [[nodiscard]] double number() const { return expect(value_->is_number(), "a number").get<double>(); }
   [[nodiscard]] bool flag() const { return expect(value_->is_boolean(), "true or false").get<bool>(); }
-  [[nodiscard]] std::string text() const { return expect(value_->is_string(), "a string").get<std::string>(); }
+  [[nodiscard]] std::string text() const {
+    return expect(value_->is_string(), "a string").get<std::string>();
+  }
   [[nodiscard]] std::int64_t integer() const {
     const bool fits = value_->is_number_integer() &&
                       (!value_->is_number_unsigned() ||
-                       value_->get<std::uint64_t>() <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
+                       value_->get<std::uint64_t>() <=
+                           static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
     return expect(fits, "a 64-bit integer").get<std::int64_t>();
   }
   [[nodiscard]] int rate() const {
@@ -95,7 +104,8 @@ class Member {
   template <std::size_t N>
   [[nodiscard]] std::array<double, N> numbers() const {
     if (list().size() != N)
-      throw FileError(fmt::format("certificate: member '{}' has {} entries, expected {}", path_, list().size(), N));
+      throw FileError(
+          fmt::format("certificate: member '{}' has {} entries, expected {}", path_, list().size(), N));
     std::array<double, N> values{};
     for (std::size_t i = 0; i < N; ++i) values[i] = item(i).number();
     return values;
@@ -105,7 +115,8 @@ class Member {
   const Json& expect(bool right, const char* expected) const {
     if (!right)
       throw FileError(fmt::format("certificate: {} is {}, expected {}",
-                                  path_.empty() ? "the JSON" : fmt::format("member '{}'", path_), value_->type_name(), expected));
+                                  path_.empty() ? "the JSON" : fmt::format("member '{}'", path_),
+                                  value_->type_name(), expected));
     return *value_;
   }
 
@@ -127,7 +138,8 @@ void read_budget(const Member& m, ErrorBudget& b) {
 
 int rate_of_name(const std::string& name, const std::string& stage) {
   std::int64_t rate = 0;
-  for (const char digit : name) rate = digit >= '0' && digit <= '9' && rate < 100'000'000 ? 10 * rate + (digit - '0') : -1;
+  for (const char digit : name)
+    rate = digit >= '0' && digit <= '9' && rate < 100'000'000 ? 10 * rate + (digit - '0') : -1;
   if (name.empty() || rate < 1)
     throw FileError(fmt::format("certificate: member 'bounds.{}.{}' is not named by a rate", stage, name));
   return static_cast<int>(rate);
@@ -141,7 +153,8 @@ std::vector<Bound> read_bounds(const Member& m) {
       const Member of_rate = of_stage.at(rate);
       for (std::size_t i = 0; i < of_rate.list().size(); ++i) {
         const Member b = of_rate.item(i);
-        all.push_back({stage, b.at("method").text(), rate_of_name(rate, stage), b.at("value").number(), b.at("rigorous").flag()});
+        all.push_back({stage, b.at("method").text(), rate_of_name(rate, stage), b.at("value").number(),
+                       b.at("rigorous").flag()});
       }
     }
   }
@@ -228,7 +241,10 @@ std::string to_json(const Certificate& c) {
   j["not_covered"] = {{"count", c.not_covered_count},
                       {"fraction", finite("not_covered.fraction", c.not_covered_fraction)},
                       {"rule", c.not_covered_rule}};
-  j["input"] = {{"name", c.input_name}, {"sha256", c.input_sha256}, {"shape", c.input_shape}, {"angles", c.input_angles}};
+  j["input"] = {{"name", c.input_name},
+                {"sha256", c.input_sha256},
+                {"shape", c.input_shape},
+                {"angles", c.input_angles}};
   j["content_sha256"] = c.content_sha256;
   j["device"] = c.device;
   j["driver"] = c.driver;

@@ -1,6 +1,6 @@
-// The .vdvr file (docs/file-format.md): written whole or not at all, read only after everything in it has been checked.
-// Datasets are [z][y][x] and triples "ZYX", as MixedVolume holds them; grid attributes are turned from x,y,z to z,y,x.
-// Called by build, verify, render, probe, export, info.
+// The .vdvr file (docs/file-format.md): written whole or not at all, read only after everything in it has
+// been checked. Datasets are [z][y][x] and triples "ZYX", as MixedVolume holds them; grid attributes are
+// turned from x,y,z to z,y,x. Called by build, verify, render, probe, export, info.
 #include "vdvr/vdvr_file.hpp"
 
 #include <fmt/format.h>
@@ -24,7 +24,8 @@ namespace {
 
 namespace h5 = io::hdf5_file;
 
-static_assert(std::endian::native == std::endian::little, "content_sha256 hashes memory, which must be little-endian");
+static_assert(std::endian::native == std::endian::little,
+              "content_sha256 hashes memory, which must be little-endian");
 
 constexpr int newest_version = 1;
 constexpr int largest_rate = 64;
@@ -60,7 +61,8 @@ h5::Shape base_shape(const MixedVolume& v) {
 
 std::string text_of(const h5::Shape& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
 
-// --- what a volume must satisfy ---------------------------------------------------------------------------------------
+// --- what a volume must satisfy
+// ---------------------------------------------------------------------------------------
 
 std::optional<Problem> grid_problem(const MixedVolume& v) {
   const auto at_grid = [](std::string what) { return Problem{"/grid", std::move(what)}; };
@@ -68,14 +70,18 @@ std::optional<Problem> grid_problem(const MixedVolume& v) {
     const char axis = "xyz"[a];
     if (v.grid.cells[a] < 1 || v.grid.cells[a] > most_cells)
       return at_grid(fmt::format("{} cells along {}, expected 1 to {}", v.grid.cells[a], axis, most_cells));
-    if (!std::isfinite(v.grid.origin[a])) return at_grid(fmt::format("origin along {} is {}", axis, v.grid.origin[a]));
+    if (!std::isfinite(v.grid.origin[a]))
+      return at_grid(fmt::format("origin along {} is {}", axis, v.grid.origin[a]));
     if (!(v.grid.spacing[a] > 0) || !std::isfinite(v.grid.spacing[a]))
-      return at_grid(fmt::format("spacing along {} is {}, expected a positive number", axis, v.grid.spacing[a]));
+      return at_grid(
+          fmt::format("spacing along {} is {}, expected a positive number", axis, v.grid.spacing[a]));
   }
   const Index3 s = v.grid.samples();
-  // The sampler's stride from plane to plane is 32 bits wide; below that no product of three overflows 64 bits.
+  // The sampler's stride from plane to plane is 32 bits wide; below that no product of three overflows 64
+  // bits.
   if (s[0] * s[1] > std::numeric_limits<std::uint32_t>::max())
-    return at_grid(fmt::format("a plane of {} x {} samples is beyond the sampler's 32-bit stride", s[0], s[1]));
+    return at_grid(
+        fmt::format("a plane of {} x {} samples is beyond the sampler's 32-bit stride", s[0], s[1]));
   if (v.granularity < 1 || v.granularity > 8 || !std::has_single_bit(static_cast<unsigned>(v.granularity)))
     return at_grid(fmt::format("granularity {}, expected 1, 2, 4 or 8", v.granularity));
   if (v.rate < 1 || v.rate > largest_rate || !std::has_single_bit(static_cast<unsigned>(v.rate)))
@@ -92,7 +98,8 @@ std::string brick_text(const MixedVolume& v, std::size_t brick) {
 }
 
 /// Levels within the rate, and every tile of every triple used by exactly one brick.
-std::optional<Problem> index_problem(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& counts) {
+std::optional<Problem> index_problem(const MixedVolume& v,
+                                     const std::map<LevelTriple, std::uint64_t>& counts) {
   const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
   std::map<LevelTriple, std::vector<bool>> used;
   for (const auto& [triple, count] : counts) used[triple].assign(count, false);
@@ -100,20 +107,24 @@ std::optional<Problem> index_problem(const MixedVolume& v, const std::map<LevelT
     const LevelTriple l = v.level[i];
     const std::uint32_t t = v.tile[i];
     if (*std::max_element(l.begin(), l.end()) > finest)
-      return Problem{"/level", fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i), l[0], l[1],
-                                           l[2], v.rate, finest)};
+      return Problem{"/level", fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i),
+                                           l[0], l[1], l[2], v.rate, finest)};
     if (l == in_base) {
-      if (t != 0) return Problem{"/tile", fmt::format("{} reads the base but has tile {}, expected 0", brick_text(v, i), t)};
+      if (t != 0)
+        return Problem{"/tile",
+                       fmt::format("{} reads the base but has tile {}, expected 0", brick_text(v, i), t)};
       continue;
     }
     const auto found = used.find(l);
     if (found == used.end())
-      return Problem{"/level", fmt::format("{} has level {}, but there is no {}", brick_text(v, i), name_of(l), path_of(l))};
+      return Problem{"/level", fmt::format("{} has level {}, but there is no {}", brick_text(v, i),
+                                           name_of(l), path_of(l))};
     if (t >= found->second.size())
-      return Problem{"/tile", fmt::format("{} has tile {} of {}, which holds {}", brick_text(v, i), t, path_of(l),
-                                          found->second.size())};
+      return Problem{"/tile", fmt::format("{} has tile {} of {}, which holds {}", brick_text(v, i), t,
+                                          path_of(l), found->second.size())};
     if (found->second[t])
-      return Problem{"/tile", fmt::format("{} has tile {} of {}, which another brick has", brick_text(v, i), t, path_of(l))};
+      return Problem{"/tile", fmt::format("{} has tile {} of {}, which another brick has", brick_text(v, i),
+                                          t, path_of(l))};
     found->second[t] = true;
   }
   for (const auto& [triple, flags] : used)
@@ -129,7 +140,8 @@ std::optional<Problem> sample_problem(const std::string& where, const std::vecto
   for (const float s : samples) bad |= static_cast<std::uint32_t>(is_bad(s));
   if (bad == 0) return std::nullopt;
   const auto first = std::find_if(samples.begin(), samples.end(), is_bad);
-  return Problem{where, fmt::format("sample {} is {}, expected finite numbers", first - samples.begin(), *first)};
+  return Problem{where,
+                 fmt::format("sample {} is {}, expected finite numbers", first - samples.begin(), *first)};
 }
 
 std::optional<Problem> size_problem(const std::string& where, std::uint64_t have, std::uint64_t expected) {
@@ -141,15 +153,18 @@ std::optional<Problem> size_problem(const std::string& where, std::uint64_t have
 std::optional<Problem> volume_problem(const MixedVolume& v) {
   if (auto p = grid_problem(v)) return p;
   const auto bricks = static_cast<std::uint64_t>(v.brick_count());
-  if (auto p = size_problem("/base", v.base.size(), static_cast<std::uint64_t>(v.grid.sample_count()))) return p;
+  if (auto p = size_problem("/base", v.base.size(), static_cast<std::uint64_t>(v.grid.sample_count())))
+    return p;
   if (auto p = size_problem("/level", v.level.size(), bricks)) return p;
   if (auto p = size_problem("/tile", v.tile.size(), bricks)) return p;
   std::map<LevelTriple, std::uint64_t> counts;
   for (const auto& [triple, samples] : v.tiles) {
     if (triple == in_base) return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
-    if (*std::max_element(triple.begin(), triple.end()) > 6) return Problem{path_of(triple), "a level above 6"};
+    if (*std::max_element(triple.begin(), triple.end()) > 6)
+      return Problem{path_of(triple), "a level above 6"};
     const auto size = static_cast<std::uint64_t>(v.tile_size(triple));
-    if (samples.size() % size != 0) return Problem{path_of(triple), fmt::format("{} samples are no whole number of tiles", samples.size())};
+    if (samples.size() % size != 0)
+      return Problem{path_of(triple), fmt::format("{} samples are no whole number of tiles", samples.size())};
     if (!samples.empty()) counts[triple] = samples.size() / size;
   }
   if (auto p = index_problem(v, counts)) return p;
@@ -159,7 +174,8 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
   return std::nullopt;
 }
 
-// --- writing ----------------------------------------------------------------------------------------------------------
+// --- writing
+// ----------------------------------------------------------------------------------------------------------
 
 void write_grid(h5::Writer& file, const MixedVolume& v) {
   file.group("/grid");
@@ -174,11 +190,13 @@ void write_grid(h5::Writer& file, const MixedVolume& v) {
 void write_index(h5::Writer& file, const MixedVolume& v) {
   const Index3 b = v.bricks();
   static_assert(sizeof(LevelTriple) == 3);
-  file.dataset("/level", shape_of({b[2], b[1], b[0], 3}), std::span<const std::uint8_t>(v.level.data()->data(), 3 * v.level.size()));
+  file.dataset("/level", shape_of({b[2], b[1], b[0], 3}),
+               std::span<const std::uint8_t>(v.level.data()->data(), 3 * v.level.size()));
   file.dataset("/tile", shape_of({b[2], b[1], b[0]}), std::span<const std::uint32_t>(v.tile));
 }
 
-// --- reading ----------------------------------------------------------------------------------------------------------
+// --- reading
+// ----------------------------------------------------------------------------------------------------------
 
 int read_version(const h5::Reader& file) {
   if (!file.has_attribute("/", "format") || file.text_attribute("/", "format") != "vdvr")
@@ -193,7 +211,8 @@ int read_version(const h5::Reader& file) {
 
 int read_small(const h5::Reader& file, const char* name) {
   // Anything outside int is outside every range checked later as well.
-  return static_cast<int>(std::clamp<std::int64_t>(file.integer("/grid", name), -1, std::numeric_limits<int>::max()));
+  return static_cast<int>(
+      std::clamp<std::int64_t>(file.integer("/grid", name), -1, std::numeric_limits<int>::max()));
 }
 
 void read_grid(const h5::Reader& file, MixedVolume& v) {
@@ -212,15 +231,20 @@ void read_grid(const h5::Reader& file, MixedVolume& v) {
 }
 
 /// A dataset of the right type and shape; a zero in `shape` stands for any extent.
-h5::Dataset expect(const h5::Reader& file, const std::string& path, h5::Element element, const h5::Shape& shape) {
+h5::Dataset expect(const h5::Reader& file, const std::string& path, h5::Element element,
+                   const h5::Shape& shape) {
   h5::Dataset d = file.dataset(path);
   if (d.element != element) {
-    const bool integer_samples = element == h5::Element::f32 && (d.element == h5::Element::u8 || d.element == h5::Element::u16);
+    const bool integer_samples =
+        element == h5::Element::f32 && (d.element == h5::Element::u8 || d.element == h5::Element::u16);
     if (integer_samples)
-      file.refuse(path, fmt::format("holds {} samples, which this version does not read: build with --storage f32",
-                                    d.element == h5::Element::u8 ? "uint8" : "uint16"));
+      file.refuse(path,
+                  fmt::format("holds {} samples, which this version does not read: build with --storage f32",
+                              d.element == h5::Element::u8 ? "uint8" : "uint16"));
     file.refuse(path, fmt::format("elements are of the wrong type, expected {}",
-                                  element == h5::Element::f32 ? "float32" : element == h5::Element::u8 ? "uint8" : "uint32"));
+                                  element == h5::Element::f32  ? "float32"
+                                  : element == h5::Element::u8 ? "uint8"
+                                                               : "uint32"));
   }
   bool fits = d.shape.size() == shape.size();
   for (std::size_t a = 0; fits && a < shape.size(); ++a) fits = shape[a] == 0 || d.shape[a] == shape[a];
@@ -233,7 +257,8 @@ h5::Dataset expect(const h5::Reader& file, const std::string& path, h5::Element 
 }
 
 LevelTriple triple_of(const h5::Reader& file, const std::string& name) {
-  const bool digits = name.size() == 3 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '6'; });
+  const bool digits =
+      name.size() == 3 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '6'; });
   if (!digits || name == "000")
     file.refuse("/tiles/" + name, "is not named by a level triple, three digits z, y, x such as 111 or 021");
   LevelTriple l{};
@@ -259,20 +284,23 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
   const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
   for (const std::string& name : file.members("/tiles")) {
     if (name.ends_with("_offset") || name.ends_with("_shift"))
-      file.refuse("/tiles/" + name, "belongs to integer tiles, which this version does not read: build with --storage f32");
+      file.refuse("/tiles/" + name,
+                  "belongs to integer tiles, which this version does not read: build with --storage f32");
     const LevelTriple l = triple_of(file, name);
     if (*std::max_element(l.begin(), l.end()) > finest)
       file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate, finest));
     const auto side = v.tile_shape(l);
     c.tiles[l] = expect(file, path_of(l), h5::Element::f32, shape_of({0, side[0], side[1], side[2]}));
     c.counts[l] = c.tiles[l].shape.front();
-    if (c.counts[l] > c.tile.count) file.refuse(path_of(l), fmt::format("{} tiles for {} bricks", c.counts[l], c.tile.count));
+    if (c.counts[l] > c.tile.count)
+      file.refuse(path_of(l), fmt::format("{} tiles for {} bricks", c.counts[l], c.tile.count));
   }
   return c;
 }
 
 /// Memory by declared sizes, before any of it is taken.
-void check_memory(const h5::Reader& file, const std::string& path, const Contents& c, std::uint64_t max_memory_bytes) {
+void check_memory(const h5::Reader& file, const std::string& path, const Contents& c,
+                  std::uint64_t max_memory_bytes) {
   std::uint64_t stored = c.base.stored_bytes + c.level.stored_bytes + c.tile.stored_bytes;
   std::uint64_t needed = c.base.bytes + c.level.bytes + c.tile.bytes + c.tile.count / 8;
   for (const auto& [triple, d] : c.tiles) {
@@ -280,10 +308,12 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
     needed += d.bytes;
   }
   if (stored > file.file_bytes())
-    file.refuse("/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
+    file.refuse(
+        "/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
   if (max_memory_bytes != 0 && needed > max_memory_bytes)
-    throw ResourceError(fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise --max-memory", path, needed,
-                                    max_memory_bytes));
+    throw ResourceError(
+        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise --max-memory", path, needed,
+                    max_memory_bytes));
 }
 
 void read_samples(const h5::Reader& file, const h5::Dataset& d, std::vector<float>& samples) {
@@ -311,7 +341,8 @@ Certificate read_certificate(const std::string& path, const std::string& json) {
   }
 }
 
-// --- content hash -----------------------------------------------------------------------------------------------------
+// --- content hash
+// -----------------------------------------------------------------------------------------------------
 
 template <class T>
 void add(Sha256& hash, std::span<const T> values) {
@@ -324,7 +355,8 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
   add(hash, std::span<const std::int64_t>(cells));
   add(hash, std::span<const double>(origin));
   add(hash, std::span<const double>(spacing));
-  // Unit texts hold no zero byte and the granularity ends in seven, so two different grids never give the same bytes.
+  // Unit texts hold no zero byte and the granularity ends in seven, so two different grids never give the
+  // same bytes.
   hash.update(v.grid.unit.data(), v.grid.unit.size());
   const std::array<std::int64_t, 2> counts{v.granularity, v.rate};
   add(hash, std::span<const std::int64_t>(counts));
@@ -343,7 +375,8 @@ std::string content_sha256(const MixedVolume& v) {
 }
 
 void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const Certificate& certificate) {
-  if (const auto p = volume_problem(v)) throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
+  if (const auto p = volume_problem(v))
+    throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
   Certificate stored = certificate;
   if (stored.content_sha256.empty()) stored.content_sha256 = content_sha256(v);
   const std::string json = to_json(stored);
@@ -362,7 +395,8 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
       if (samples.empty()) continue;
       const auto side = v.tile_shape(triple);
       const auto count = static_cast<std::int64_t>(samples.size()) / v.tile_size(triple);
-      file.dataset(path_of(triple), shape_of({count, side[0], side[1], side[2]}), std::span<const float>(samples));
+      file.dataset(path_of(triple), shape_of({count, side[0], side[1], side[2]}),
+                   std::span<const float>(samples));
     }
     file.text("/certificate", json);
     file.close();
@@ -378,7 +412,8 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
   result.generator = file.text_attribute("/", "generator");
   read_grid(file, result.volume);
   if (file.has_attribute("/", "step"))
-    file.refuse("attribute 'step' of /", "belongs to integer tiles, which this version does not read: build with --storage f32");
+    file.refuse("attribute 'step' of /",
+                "belongs to integer tiles, which this version does not read: build with --storage f32");
   const Contents contents = open_contents(file, result.volume);
   check_memory(file, path.string(), contents, max_memory_bytes);
   result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
@@ -386,7 +421,8 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
   try {
     read_volume_data(file, contents, result.volume);
   } catch (const std::bad_alloc&) {
-    throw ResourceError(fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
+    throw ResourceError(
+        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
   }
   return result;
 }

@@ -57,9 +57,11 @@ BOOST_AUTO_TEST_CASE(every_member_comes_back_to_the_bit) {
 
 BOOST_AUTO_TEST_CASE(members_have_the_names_of_the_file_format) {
   const json j = json::parse(to_json(full));
-  for (const char* name : {"epsilon", "epsilon_abs", "reference_range", "holds", "total", "budget", "measured_max",
-                           "measured_total", "worst_at", "rates", "bounds", "field", "window", "roi", "not_covered",
-                           "input", "content_sha256", "device", "driver", "version", "options", "notes"})
+  for (const char* name :
+       {"epsilon",        "epsilon_abs", "reference_range", "holds",  "total",  "budget",  "measured_max",
+        "measured_total", "worst_at",    "rates",           "bounds", "field",  "window",  "roi",
+        "not_covered",    "input",       "content_sha256",  "device", "driver", "version", "options",
+        "notes"})
     BOOST_TEST(j.contains(name), name);
   BOOST_TEST(j["holds"]["image3d"] == true);
   BOOST_TEST(j["total"]["buffer"] == full.total_buffer);
@@ -95,7 +97,8 @@ BOOST_AUTO_TEST_CASE(what_does_not_apply_is_null_or_absent) {
 
 BOOST_AUTO_TEST_CASE(nan_and_infinity_are_refused_by_name) {
   const auto refused = [](const Certificate& c, const std::string& member) {
-    BOOST_CHECK_EXCEPTION(to_json(c), InputError, [&](const InputError& e) { return names(e.what(), member); });
+    BOOST_CHECK_EXCEPTION(to_json(c), InputError,
+                          [&](const InputError& e) { return names(e.what(), member); });
   };
   Certificate c = full;
   c.budget.gold.value = std::numeric_limits<double>::quiet_NaN();
@@ -165,7 +168,9 @@ BOOST_AUTO_TEST_CASE(an_ill_typed_member_is_named) {
   BOOST_TEST(names(with("/field/padding", 18446744073709551615ull), "field.padding"));
   BOOST_TEST(names(with("/worst_at", json::parse("[1, 2]")), "worst_at"));
   BOOST_TEST(names(with("/window", json::parse("[1, \"2\"]")), "window[1]"));
-  BOOST_TEST(names(with("/bounds/gold/0x8", json::parse("[{\"method\": \"m\", \"value\": 1, \"rigorous\": true}]")), "bounds.gold.0x8"));
+  BOOST_TEST(
+      names(with("/bounds/gold/0x8", json::parse("[{\"method\": \"m\", \"value\": 1, \"rigorous\": true}]")),
+            "bounds.gold.0x8"));
 }
 
 BOOST_AUTO_TEST_CASE(text_that_is_no_json_is_refused) {

@@ -14,10 +14,12 @@ using namespace vdvr;
 
 namespace {
 
-// Cell coordinates on a lattice of 1/64 cell: exact in fp32, together with spacings and origins that are powers of two.
+// Cell coordinates on a lattice of 1/64 cell: exact in fp32, together with spacings and origins that are
+// powers of two.
 constexpr double lattice = 0x1p-6;
 
-const std::vector<LevelTriple> mixed_triples{{0, 0, 0}, {1, 1, 1}, {0, 2, 1}, {3, 0, 0}, {2, 2, 2}, {0, 0, 1}};
+const std::vector<LevelTriple> mixed_triples{{0, 0, 0}, {1, 1, 1}, {0, 2, 1},
+                                             {3, 0, 0}, {2, 2, 2}, {0, 0, 1}};
 
 Grid grid_of(const Index3& cells) { return {cells, {-0.5, 2.0, 0.25}, {0.25, 0.5, 2.0}, "pixel"}; }
 
@@ -45,10 +47,13 @@ struct Case {
 const std::vector<Case>& cases() {
   static const std::vector<Case> all{
       {{8, 8, 8}, 4, 8, mixed_triples},
-      {{9, 5, 7}, 4, 8, mixed_triples},                                           // partial last bricks on every axis
-      {{1, 1, 1}, 4, 8, {{3, 3, 3}}},                                             // one cell, one brick
+      {{9, 5, 7}, 4, 8, mixed_triples},  // partial last bricks on every axis
+      {{1, 1, 1}, 4, 8, {{3, 3, 3}}},    // one cell, one brick
       {{3, 17, 2}, 2, 4, {{0, 0, 0}, {2, 1, 0}, {0, 2, 2}}},
-      {{5, 4, 3}, 1, 64, {{0, 0, 0}, {6, 0, 0}, {0, 6, 0}, {0, 0, 6}, {1, 2, 3}}},  // finest levels, brick = cell
+      {{5, 4, 3},
+       1,
+       64,
+       {{0, 0, 0}, {6, 0, 0}, {0, 6, 0}, {0, 0, 6}, {1, 2, 3}}},  // finest levels, brick = cell
       {{13, 10, 9}, 8, 2, {{0, 0, 0}, {1, 0, 1}}},
   };
   return all;
@@ -65,8 +70,11 @@ BOOST_AUTO_TEST_CASE(samples_equal_the_double_precision_reference_inside_bricks_
     for (int i = 0; i < 20000; ++i) {
       Vec3 cell{};
       for (std::size_t a = 0; a < 3; ++a) {
-        // Every third coordinate on a cell boundary, so that faces, edges and corners of bricks are hit often.
-        const auto steps = static_cast<double>(std::uniform_int_distribution<std::int64_t>(0, c.cells[a] * 64)(random)) * lattice;
+        // Every third coordinate on a cell boundary, so that faces, edges and corners of bricks are hit
+        // often.
+        const auto steps =
+            static_cast<double>(std::uniform_int_distribution<std::int64_t>(0, c.cells[a] * 64)(random)) *
+            lattice;
         cell[a] = random() % 3 == 0 ? std::floor(steps) : steps;
       }
       if (!agrees(v, cell, reference::mixed_field(v, cell), 1.0)) ++wrong;
@@ -85,7 +93,8 @@ BOOST_AUTO_TEST_CASE(a_point_on_a_shared_face_belongs_to_the_brick_above_it) {
     const double expected = reference::field_of_brick(v, above, cell);
     BOOST_TEST(std::abs(expected - reference::field_of_brick(v, {0, 0, 0}, cell)) > trilinear_tolerance(1.0));
     BOOST_TEST(agrees(v, cell, expected, 1.0));
-    // One fp32 step below the face the lower brick answers; the field moves by at most its slope, 2 * 2^level per cell.
+    // One fp32 step below the face the lower brick answers; the field moves by at most its slope, 2 * 2^level
+    // per cell.
     cell[axis] = static_cast<double>(std::nextafter(4.0f, 0.0f));
     BOOST_TEST(agrees(v, cell, reference::field_of_brick(v, {0, 0, 0}, cell), 1.0));
   }
@@ -106,7 +115,8 @@ BOOST_AUTO_TEST_CASE(a_stored_sample_is_returned_to_the_bit) {
     for (std::int64_t y = 0; y < v.grid.cells[1] * 4; ++y)
       for (std::int64_t x = 0; x < v.grid.cells[0] * 4; ++x) {
         const Index3 quarter{x, y, z}, brick{x / 16, y / 16, z / 16};
-        const LevelTriple l = v.level[static_cast<std::size_t>(brick[0] + bricks[0] * (brick[1] + bricks[1] * brick[2]))];
+        const LevelTriple l =
+            v.level[static_cast<std::size_t>(brick[0] + bricks[0] * (brick[1] + bricks[1] * brick[2]))];
         Index3 sample{};
         bool on_sample = true;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -116,7 +126,9 @@ BOOST_AUTO_TEST_CASE(a_stored_sample_is_returned_to_the_bit) {
         }
         if (!on_sample) continue;
         const Vec3 cell{static_cast<double>(x) / 4, static_cast<double>(y) / 4, static_cast<double>(z) / 4};
-        if (static_cast<double>(sample_at(v, world(v.grid, cell))) != reference::stored_sample(v, brick, sample)) ++wrong;
+        if (static_cast<double>(sample_at(v, world(v.grid, cell))) !=
+            reference::stored_sample(v, brick, sample))
+          ++wrong;
       }
   BOOST_TEST(wrong == 0);
 }
@@ -129,14 +141,17 @@ BOOST_AUTO_TEST_CASE(an_affine_function_is_reproduced_by_every_level_at_any_poin
   double largest = 0;
   for (int corner = 0; corner < 8; ++corner)
     largest = std::max(largest, std::abs(f(corner & 1 ? 9 : 0, corner & 2 ? 6 : 0, corner & 4 ? 11 : 0)));
-  // One rounding of each cell coordinate times the slope, one of each stored sample, nine of the interpolation.
-  const double bound = tolerance::unit_roundoff * (0.25 * 9 + 0.5 * 6 + 0.0625 * 11) + tolerance::fp32_sum(10, largest);
+  // One rounding of each cell coordinate times the slope, one of each stored sample, nine of the
+  // interpolation.
+  const double bound =
+      tolerance::unit_roundoff * (0.25 * 9 + 0.5 * 6 + 0.0625 * 11) + tolerance::fp32_sum(10, largest);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
   double worst = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vec3 cell{9 * unit(random), 6 * unit(random), 11 * unit(random)};
-    worst = std::max(worst, std::abs(static_cast<double>(sample_at(v, world(grid, cell))) - f(cell[0], cell[1], cell[2])));
+    worst = std::max(
+        worst, std::abs(static_cast<double>(sample_at(v, world(grid, cell))) - f(cell[0], cell[1], cell[2])));
   }
   BOOST_TEST(worst <= tolerance::bound(bound));
 }

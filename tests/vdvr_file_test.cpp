@@ -1,8 +1,8 @@
 #define BOOST_TEST_MODULE vdvr_file
-#include <boost/test/unit_test.hpp>
 #include <hdf5.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <boost/test/unit_test.hpp>
 
 #include <bit>
 #include <csignal>
@@ -54,7 +54,8 @@ std::string bytes_of(const fs::path& path) {
 }
 
 void put(const fs::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary | std::ios::trunc).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(path, std::ios::binary | std::ios::trunc)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 /// Compares bits, so that -0 and 0 differ.
@@ -64,11 +65,12 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 }
 
 bool same_volume(const MixedVolume& a, const MixedVolume& b) {
-  bool same = a.grid.cells == b.grid.cells && a.grid.origin == b.grid.origin && a.grid.spacing == b.grid.spacing &&
-              a.grid.unit == b.grid.unit && a.granularity == b.granularity && a.rate == b.rate &&
-              same_bits(a.base, b.base) && same_bits(a.level, b.level) && same_bits(a.tile, b.tile) &&
-              a.tiles.size() == b.tiles.size();
-  for (const auto& [triple, samples] : a.tiles) same = same && b.tiles.contains(triple) && same_bits(samples, b.tiles.at(triple));
+  bool same = a.grid.cells == b.grid.cells && a.grid.origin == b.grid.origin &&
+              a.grid.spacing == b.grid.spacing && a.grid.unit == b.grid.unit &&
+              a.granularity == b.granularity && a.rate == b.rate && same_bits(a.base, b.base) &&
+              same_bits(a.level, b.level) && same_bits(a.tile, b.tile) && a.tiles.size() == b.tiles.size();
+  for (const auto& [triple, samples] : a.tiles)
+    same = same && b.tiles.contains(triple) && same_bits(samples, b.tiles.at(triple));
   return same;
 }
 
@@ -120,7 +122,8 @@ Edit replace(const char* path, hid_t type, hid_t memory, std::vector<hsize_t> sh
     if (protection != Protection::none) H5Pset_fletcher32(properties);
     const hid_t dataset = H5Dcreate2(file, path, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
     BOOST_REQUIRE(dataset >= 0);
-    if (!values.empty()) BOOST_REQUIRE(H5Dwrite(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
+    if (!values.empty())
+      BOOST_REQUIRE(H5Dwrite(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
     H5Dclose(dataset);
     H5Pclose(properties);
     H5Sclose(space);
@@ -142,7 +145,8 @@ Edit set_attribute(const char* object, const char* name, hid_t type, std::vector
     H5Adelete_by_name(file, object, name, H5P_DEFAULT);
     const hsize_t count = values.size();
     const hid_t space = H5Screate_simple(1, &count, nullptr);
-    const hid_t attribute = H5Acreate_by_name(file, object, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t attribute =
+        H5Acreate_by_name(file, object, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     BOOST_REQUIRE(H5Awrite(attribute, type, values.data()) >= 0);
     H5Aclose(attribute);
     H5Sclose(space);
@@ -163,7 +167,8 @@ Edit set_certificate(const std::string& text) {
     H5Ldelete(file, "/certificate", H5P_DEFAULT);
     const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
     H5Tset_size(type, H5T_VARIABLE);
-    const hid_t dataset = H5Dcreate2(file, "/certificate", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t dataset =
+        H5Dcreate2(file, "/certificate", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     const char* first = text.c_str();
     BOOST_REQUIRE(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &first) >= 0);
     H5Dclose(dataset);
@@ -187,7 +192,8 @@ std::size_t brick_with(const MixedVolume& v, const LevelTriple& l, std::uint32_t
 
 }  // namespace
 
-// --- round trips ------------------------------------------------------------------------------------------------------
+// --- round trips
+// ------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(round_trip_keeps_every_bit) {
   const Folder folder;
@@ -203,7 +209,8 @@ BOOST_AUTO_TEST_CASE(round_trip_keeps_every_bit) {
   BOOST_TEST(back.generator.starts_with("vdvr "));
   BOOST_TEST(back.file_bytes == fs::file_size(folder.path / "a.vdvr"));
   BOOST_TEST(back.certificate_json == to_json(back.certificate));
-  BOOST_TEST(back.certificate.content_sha256 == content_sha256(v));  // filled in where the caller left it empty
+  BOOST_TEST(back.certificate.content_sha256 ==
+             content_sha256(v));  // filled in where the caller left it empty
   BOOST_TEST(content_sha256(back.volume) == content_sha256(v));
 }
 
@@ -269,19 +276,22 @@ BOOST_AUTO_TEST_CASE(only_vdvr_files_are_recognised) {
 BOOST_AUTO_TEST_CASE(chunks_are_contiguous_and_hardly_padded) {
   using io::hdf5_file::chunk_shape;
   using io::hdf5_file::Shape;
-  BOOST_TEST((chunk_shape({65, 65, 65}, 4) == Shape{22, 65, 65}));       // 31 planes would fit: 65 = 22 + 22 + 21
+  BOOST_TEST((chunk_shape({65, 65, 65}, 4) == Shape{22, 65, 65}));  // 31 planes would fit: 65 = 22 + 22 + 21
   BOOST_TEST((chunk_shape({7, 1025, 1025}, 4) == Shape{1, 114, 1025}));  // 127 rows would fit: 9 parts
-  BOOST_TEST((chunk_shape({900, 9, 9, 9}, 4) == Shape{150, 9, 9, 9}));  // 179 tiles would fit: 6 parts
+  BOOST_TEST((chunk_shape({900, 9, 9, 9}, 4) == Shape{150, 9, 9, 9}));   // 179 tiles would fit: 6 parts
   BOOST_TEST((chunk_shape({2, 3}, 1) == Shape{2, 3}));
   BOOST_TEST((chunk_shape({1}, 70'000'000) == Shape{1}));
 }
 
-// --- content hash -----------------------------------------------------------------------------------------------------
+// --- content hash
+// -----------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(the_content_hash_is_over_the_documented_bytes) {
   const MixedVolume v = small_volume();
   std::string bytes;
-  const auto add = [&bytes](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
+  const auto add = [&bytes](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
   for (const std::int64_t n : {7, 5, 9}) add(n);
   for (const double o : {1e-7, 0.1, -4.5}) add(o);
   for (const double s : {0.7071067811865476, 0.5, 1.0}) add(s);
@@ -306,7 +316,9 @@ BOOST_AUTO_TEST_CASE(the_content_hash_sees_every_part) {
       [](MixedVolume& m) { m.base.back() = -m.base.back(); },
       [](MixedVolume& m) { m.level[3][1] ^= 1; },
       [](MixedVolume& m) { m.tile[3] ^= 1; },
-      [](MixedVolume& m) { m.tiles[{2, 2, 2}].back() += 1; }};
+      [](MixedVolume& m) {
+        m.tiles[{2, 2, 2}].back() += 1;
+      }};
   for (const auto& change : changes) {
     MixedVolume m = v;
     change(m);
@@ -314,14 +326,16 @@ BOOST_AUTO_TEST_CASE(the_content_hash_sees_every_part) {
   }
 }
 
-// --- damage -----------------------------------------------------------------------------------------------------------
+// --- damage
+// -----------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_truncated_file_is_rejected_at_every_length) {
   const Folder folder;
   const std::string whole = bytes_of(write_small(folder));
   const fs::path cut = folder.path / "cut.vdvr";
   BOOST_TEST(whole.size() > 10000u);
-  for (std::size_t length = 0; length < whole.size(); length += length < 128 || length + 64 > whole.size() ? 1 : 61) {
+  for (std::size_t length = 0; length < whole.size();
+       length += length < 128 || length + 64 > whole.size() ? 1 : 61) {
     put(cut, whole.substr(0, length));
     BOOST_TEST(says(refusal(cut), {"cut.vdvr"}), "length " << length);
   }
@@ -339,8 +353,10 @@ BOOST_AUTO_TEST_CASE(a_flipped_bit_anywhere_is_rejected_or_changes_nothing_certi
     put(flipped, bytes);
     try {
       const VdvrFile read = read_vdvr(flipped);
-      // What is left: HDF5's padding, and the texts of attributes (generator, unit), of which the hash covers the unit.
-      const bool same = same_volume(read.volume, original.volume) && read.certificate_json == original.certificate_json;
+      // What is left: HDF5's padding, and the texts of attributes (generator, unit), of which the hash covers
+      // the unit.
+      const bool same =
+          same_volume(read.volume, original.volume) && read.certificate_json == original.certificate_json;
       const bool hash_sees = content_sha256(read.volume) != read.certificate.content_sha256;
       if (!same && !hash_sees) ++wrong;
       ++harmless;
@@ -373,7 +389,8 @@ BOOST_AUTO_TEST_CASE(a_flipped_bit_in_a_dataset_is_reported_with_its_name) {
       std::string damaged = whole;
       damaged[address + at] = static_cast<char>(damaged[address + at] ^ 4);
       put(folder.path / "flipped.vdvr", damaged);
-      BOOST_TEST(says(refusal(folder.path / "flipped.vdvr"), {"flipped.vdvr", name, "Fletcher32"}), name << " byte " << at);
+      BOOST_TEST(says(refusal(folder.path / "flipped.vdvr"), {"flipped.vdvr", name, "Fletcher32"}),
+                 name << " byte " << at);
     }
   }
 }
@@ -398,18 +415,22 @@ BOOST_AUTO_TEST_CASE(what_is_no_file_is_rejected) {
   BOOST_TEST(says(refusal(folder.path / "text.vdvr"), {"text.vdvr", "HDF5"}));
 }
 
-// --- crafted files ----------------------------------------------------------------------------------------------------
+// --- crafted files
+// ----------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_newer_or_invalid_format_version_is_refused) {
   BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 2)), {"format_version", "2", "newer"}));
   BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 0)), {"format_version"}));
-  BOOST_TEST(says(refusal_after(set_attribute<double>("/", "format_version", H5T_NATIVE_DOUBLE, {1.0})), {"format_version", "integer"}));
+  BOOST_TEST(says(refusal_after(set_attribute<double>("/", "format_version", H5T_NATIVE_DOUBLE, {1.0})),
+                  {"format_version", "integer"}));
 }
 
 BOOST_AUTO_TEST_CASE(geometry_that_is_not_finite_or_not_positive_is_refused) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  for (const double bad : {nan, inf, 0.0, -1.0}) BOOST_TEST(says(refusal_after(set_spacing(1, bad, 1)), {"/grid", "spacing along y"}));
-  BOOST_TEST(says(refusal_after(set_attribute<double>("/grid", "origin", H5T_NATIVE_DOUBLE, {0, 0, nan})), {"/grid", "origin along x"}));
+  for (const double bad : {nan, inf, 0.0, -1.0})
+    BOOST_TEST(says(refusal_after(set_spacing(1, bad, 1)), {"/grid", "spacing along y"}));
+  BOOST_TEST(says(refusal_after(set_attribute<double>("/grid", "origin", H5T_NATIVE_DOUBLE, {0, 0, nan})),
+                  {"/grid", "origin along x"}));
 }
 
 BOOST_AUTO_TEST_CASE(cells_that_do_not_fit_are_refused_before_anything_is_allocated) {
@@ -420,52 +441,74 @@ BOOST_AUTO_TEST_CASE(cells_that_do_not_fit_are_refused_before_anything_is_alloca
   BOOST_TEST(says(refusal_after(set_cells(1 << 24, 1 << 24, 1 << 24)), {"/grid", "plane"}));
   BOOST_TEST(says(refusal_after(set_cells(1 << 24, 60000, 60000)), {"/base", "shape"}));
   BOOST_TEST(says(refusal_after(set_cells(9, 5, 7)), {"/base", "shape", "[8, 6, 10]", "[10, 6, 8]"}));
-  BOOST_TEST(says(refusal_after(set_attribute<std::int64_t>("/grid", "cells", H5T_NATIVE_INT64, {7, 5})), {"cells", "expected 3"}));
-  BOOST_TEST(says(refusal_after(set_attribute<double>("/grid", "cells", H5T_NATIVE_DOUBLE, {7, 5, 9})), {"cells", "integer"}));
+  BOOST_TEST(says(refusal_after(set_attribute<std::int64_t>("/grid", "cells", H5T_NATIVE_INT64, {7, 5})),
+                  {"cells", "expected 3"}));
+  BOOST_TEST(says(refusal_after(set_attribute<double>("/grid", "cells", H5T_NATIVE_DOUBLE, {7, 5, 9})),
+                  {"cells", "integer"}));
 }
 
 BOOST_AUTO_TEST_CASE(a_sparse_dataset_that_declares_terabytes_is_refused) {
   const auto sparse = replace<float>("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {10001, 10001, 10001}, {});
   BOOST_TEST(says(refusal_after([&](hid_t file) {
-    set_cells(10000, 10000, 10000)(file);
-    sparse(file);
-  }), {"/base", "stored"}));
-  BOOST_TEST(says(refusal_after(replace<float>("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {8, 6, 10}, {})), {"/base", "incomplete"}));
+                    set_cells(10000, 10000, 10000)(file);
+                    sparse(file);
+                  }),
+                  {"/base", "stored"}));
+  BOOST_TEST(says(refusal_after(replace<float>("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {8, 6, 10}, {})),
+                  {"/base", "incomplete"}));
 }
 
 BOOST_AUTO_TEST_CASE(granularity_and_rate_outside_the_format_are_refused) {
-  for (const std::int64_t bad : {std::int64_t{0}, std::int64_t{3}, std::int64_t{16}, std::int64_t{-4}, std::int64_t{1} << 40})
+  for (const std::int64_t bad :
+       {std::int64_t{0}, std::int64_t{3}, std::int64_t{16}, std::int64_t{-4}, std::int64_t{1} << 40})
     BOOST_TEST(says(refusal_after(set_integer("/grid", "granularity", bad)), {"/grid", "granularity"}));
-  for (const std::int64_t bad : {std::int64_t{0}, std::int64_t{3}, std::int64_t{128}, (std::int64_t{1} << 32) + 8})
+  for (const std::int64_t bad :
+       {std::int64_t{0}, std::int64_t{3}, std::int64_t{128}, (std::int64_t{1} << 32) + 8})
     BOOST_TEST(says(refusal_after(set_integer("/grid", "rate", bad)), {"/grid", "rate"}));
   BOOST_TEST(says(refusal_after(set_integer("/grid", "rate", 2)), {"/tiles/", "rate 2"}));
 }
 
 BOOST_AUTO_TEST_CASE(datasets_of_the_wrong_type_or_rank_are_refused) {
   const std::vector<float> samples(480, 1.0f);
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {480}, samples)), {"/base", "shape"}));
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {8, 6, 10, 1}, samples)), {"/base", "shape"}));
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F64LE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)), {"/base", "8-byte float"}));
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32BE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)), {"/base", "little-endian"}));
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_STD_U32LE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)), {"/base", "float32"}));
-  BOOST_TEST(says(refusal_after(replace("/tile", H5T_STD_I32LE, H5T_NATIVE_INT32, {2, 2, 3}, std::vector<std::int32_t>(12))), {"/tile"}));
-  BOOST_TEST(says(refusal_after(replace("/level", H5T_STD_U8LE, H5T_NATIVE_UINT8, {2, 2, 3}, std::vector<std::uint8_t>(12))), {"/level", "shape"}));
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {480}, samples)),
+                  {"/base", "shape"}));
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {8, 6, 10, 1}, samples)),
+                  {"/base", "shape"}));
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F64LE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)),
+                  {"/base", "8-byte float"}));
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_IEEE_F32BE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)),
+                  {"/base", "little-endian"}));
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_STD_U32LE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples)),
+                  {"/base", "float32"}));
+  BOOST_TEST(says(refusal_after(replace("/tile", H5T_STD_I32LE, H5T_NATIVE_INT32, {2, 2, 3},
+                                        std::vector<std::int32_t>(12))),
+                  {"/tile"}));
+  BOOST_TEST(says(refusal_after(replace("/level", H5T_STD_U8LE, H5T_NATIVE_UINT8, {2, 2, 3},
+                                        std::vector<std::uint8_t>(12))),
+                  {"/level", "shape"}));
   BOOST_TEST(says(refusal_after([](hid_t file) {
-    H5Ldelete(file, "/base", H5P_DEFAULT);
-    H5Gclose(H5Gcreate2(file, "/base", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
-  }), {"/base", "not a dataset"}));
-  BOOST_TEST(says(refusal_after([](hid_t file) { H5Ldelete(file, "/tile", H5P_DEFAULT); }), {"/tile", "missing"}));
-  BOOST_TEST(says(refusal_after([](hid_t file) { H5Ldelete(file, "/grid", H5P_DEFAULT); }), {"/grid", "missing"}));
+                    H5Ldelete(file, "/base", H5P_DEFAULT);
+                    H5Gclose(H5Gcreate2(file, "/base", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+                  }),
+                  {"/base", "not a dataset"}));
+  BOOST_TEST(
+      says(refusal_after([](hid_t file) { H5Ldelete(file, "/tile", H5P_DEFAULT); }), {"/tile", "missing"}));
+  BOOST_TEST(
+      says(refusal_after([](hid_t file) { H5Ldelete(file, "/grid", H5P_DEFAULT); }), {"/grid", "missing"}));
 }
 
 BOOST_AUTO_TEST_CASE(integer_samples_are_refused_with_the_dataset_and_the_remedy) {
-  BOOST_TEST(says(refusal_after(replace("/base", H5T_STD_U16LE, H5T_NATIVE_UINT16, {8, 6, 10}, std::vector<std::uint16_t>(480))),
+  BOOST_TEST(says(refusal_after(replace("/base", H5T_STD_U16LE, H5T_NATIVE_UINT16, {8, 6, 10},
+                                        std::vector<std::uint16_t>(480))),
                   {"/base", "uint16", "--storage f32"}));
-  BOOST_TEST(says(refusal_after(replace("/tiles/111", H5T_STD_U8LE, H5T_NATIVE_UINT8, {2, 9, 9, 9}, std::vector<std::uint8_t>(1458))),
+  BOOST_TEST(says(refusal_after(replace("/tiles/111", H5T_STD_U8LE, H5T_NATIVE_UINT8, {2, 9, 9, 9},
+                                        std::vector<std::uint8_t>(1458))),
                   {"/tiles/111", "uint8"}));
-  BOOST_TEST(says(refusal_after(replace("/tiles/111_shift", H5T_STD_U8LE, H5T_NATIVE_UINT8, {1}, std::vector<std::uint8_t>(1))),
+  BOOST_TEST(says(refusal_after(replace("/tiles/111_shift", H5T_STD_U8LE, H5T_NATIVE_UINT8, {1},
+                                        std::vector<std::uint8_t>(1))),
                   {"/tiles/111_shift", "integer tiles"}));
-  BOOST_TEST(says(refusal_after(set_attribute<double>("/", "step", H5T_NATIVE_DOUBLE, {0.5})), {"step", "integer tiles"}));
+  BOOST_TEST(says(refusal_after(set_attribute<double>("/", "step", H5T_NATIVE_DOUBLE, {0.5})),
+                  {"step", "integer tiles"}));
 }
 
 BOOST_AUTO_TEST_CASE(an_index_that_does_not_match_the_tiles_is_refused) {
@@ -474,7 +517,8 @@ BOOST_AUTO_TEST_CASE(an_index_that_does_not_match_the_tiles_is_refused) {
   const std::size_t refined = brick_with(v, {1, 1, 1}, 0), plain = brick_with(v, {0, 0, 0}, 0);
   auto tile = v.tile;
   tile[refined] = 1000000;
-  BOOST_TEST(says(refusal_after(overwrite("/tile", H5T_NATIVE_UINT32, tile)), {"/tile", "1000000", "/tiles/111"}));
+  BOOST_TEST(
+      says(refusal_after(overwrite("/tile", H5T_NATIVE_UINT32, tile)), {"/tile", "1000000", "/tiles/111"}));
   tile[refined] = 1;  // another brick's
   BOOST_TEST(says(refusal_after(overwrite("/tile", H5T_NATIVE_UINT32, tile)), {"/tile", "another brick"}));
   tile = v.tile;
@@ -495,7 +539,8 @@ BOOST_AUTO_TEST_CASE(tiles_of_the_wrong_shape_number_or_name_are_refused) {
   const auto tiles = [](const char* name, std::vector<hsize_t> shape) {
     std::size_t count = 1;
     for (const hsize_t n : shape) count *= n;
-    return refusal_after(replace(name, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, shape, std::vector<float>(count, 1.0f)));
+    return refusal_after(
+        replace(name, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, shape, std::vector<float>(count, 1.0f)));
   };
   const auto count = small_volume().tiles.at({1, 1, 1}).size() / 729;
   BOOST_TEST(says(tiles("/tiles/111", {count, 9, 9, 8}), {"/tiles/111", "[count, 9, 9, 9]"}));
@@ -513,19 +558,22 @@ BOOST_AUTO_TEST_CASE(samples_that_are_not_finite_are_refused_with_their_place) {
   BOOST_TEST(says(refusal_after(overwrite("/base", H5T_NATIVE_FLOAT, v.base)), {"/base", "sample 77"}));
   auto tiles = v.tiles.at({0, 2, 1});
   tiles[5] = -std::numeric_limits<float>::infinity();
-  BOOST_TEST(says(refusal_after(overwrite("/tiles/021", H5T_NATIVE_FLOAT, tiles)), {"/tiles/021", "sample 5"}));
+  BOOST_TEST(
+      says(refusal_after(overwrite("/tiles/021", H5T_NATIVE_FLOAT, tiles)), {"/tiles/021", "sample 5"}));
 }
 
 BOOST_AUTO_TEST_CASE(links_that_lead_elsewhere_are_refused) {
   BOOST_TEST(says(refusal_after([](hid_t file) {
-    H5Lmove(file, "/base", file, "/elsewhere", H5P_DEFAULT, H5P_DEFAULT);
-    H5Lcreate_soft("/elsewhere", file, "/base", H5P_DEFAULT, H5P_DEFAULT);
-  }), {"/base", "soft or external link"}));
+                    H5Lmove(file, "/base", file, "/elsewhere", H5P_DEFAULT, H5P_DEFAULT);
+                    H5Lcreate_soft("/elsewhere", file, "/base", H5P_DEFAULT, H5P_DEFAULT);
+                  }),
+                  {"/base", "soft or external link"}));
   for (const char* name : {"/base", "/grid", "/tiles", "/certificate"})
     BOOST_TEST(says(refusal_after([name](hid_t file) {
-      H5Ldelete(file, name, H5P_DEFAULT);
-      H5Lcreate_external("other.vdvr", name, file, name, H5P_DEFAULT, H5P_DEFAULT);
-    }), {name, "soft or external link"}));
+                      H5Ldelete(file, name, H5P_DEFAULT);
+                      H5Lcreate_external("other.vdvr", name, file, name, H5P_DEFAULT, H5P_DEFAULT);
+                    }),
+                    {name, "soft or external link"}));
 }
 
 BOOST_AUTO_TEST_CASE(datasets_without_the_checksum_or_with_other_filters_are_refused) {
@@ -539,16 +587,20 @@ BOOST_AUTO_TEST_CASE(datasets_without_the_checksum_or_with_other_filters_are_ref
 }
 
 BOOST_AUTO_TEST_CASE(a_missing_or_broken_certificate_is_refused) {
-  BOOST_TEST(says(refusal_after([](hid_t file) { H5Ldelete(file, "/certificate", H5P_DEFAULT); }), {"/certificate", "missing"}));
+  BOOST_TEST(says(refusal_after([](hid_t file) { H5Ldelete(file, "/certificate", H5P_DEFAULT); }),
+                  {"/certificate", "missing"}));
   BOOST_TEST(says(refusal_after(set_certificate("{\"epsilon\": 0.03")), {"/certificate", "JSON"}));
-  BOOST_TEST(says(refusal_after(set_certificate("{\"epsilon\": 0.03}")), {"/certificate", "'epsilon_abs' is missing"}));
-  BOOST_TEST(says(refusal_after(replace("/certificate", H5T_STD_U8LE, H5T_NATIVE_UINT8, {4}, std::vector<std::uint8_t>(4))),
+  BOOST_TEST(says(refusal_after(set_certificate("{\"epsilon\": 0.03}")),
+                  {"/certificate", "'epsilon_abs' is missing"}));
+  BOOST_TEST(says(refusal_after(replace("/certificate", H5T_STD_U8LE, H5T_NATIVE_UINT8, {4},
+                                        std::vector<std::uint8_t>(4))),
                   {"/certificate", "not a string"}));
   // Rewritten by h5py, say: readable; whether it is true is for verify to find.
   BOOST_TEST(refusal_after(set_certificate(to_json(support::full_certificate()))) == "accepted");
 }
 
-// --- limits and writing -----------------------------------------------------------------------------------------------
+// --- limits and writing
+// -----------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(reading_honours_the_memory_limit) {
   const Folder folder;
@@ -565,10 +617,18 @@ BOOST_AUTO_TEST_CASE(a_volume_the_reader_would_refuse_is_not_written) {
       [](MixedVolume& m) { m.base.pop_back(); },
       [](MixedVolume& m) { m.level.pop_back(); },
       [](MixedVolume& m) { m.tile.push_back(0); },
-      [](MixedVolume& m) { m.tiles[{1, 1, 1}].pop_back(); },
-      [](MixedVolume& m) { m.tiles.erase({1, 1, 1}); },
-      [](MixedVolume& m) { m.tiles[{0, 0, 0}].assign(125, 0.0f); },
-      [](MixedVolume& m) { m.tiles[{9, 0, 0}].assign(125, 0.0f); },
+      [](MixedVolume& m) {
+        m.tiles[{1, 1, 1}].pop_back();
+      },
+      [](MixedVolume& m) {
+        m.tiles.erase({1, 1, 1});
+      },
+      [](MixedVolume& m) {
+        m.tiles[{0, 0, 0}].assign(125, 0.0f);
+      },
+      [](MixedVolume& m) {
+        m.tiles[{9, 0, 0}].assign(125, 0.0f);
+      },
       [](MixedVolume& m) { m.grid.spacing[0] = std::numeric_limits<double>::quiet_NaN(); },
       [](MixedVolume& m) { m.grid.unit = std::string("m\0m", 3); },
       [](MixedVolume& m) { m.rate = 6; },
@@ -589,7 +649,8 @@ BOOST_AUTO_TEST_CASE(a_write_that_fails_leaves_the_old_file_and_nothing_else) {
   const Folder folder;
   const fs::path path = write_small(folder);
   const std::string before = bytes_of(path);
-  const MixedVolume large = as_mixed({Grid{{100, 100, 100}, {0, 0, 0}, {1, 1, 1}, ""}, std::vector<float>(101 * 101 * 101)}, 4);
+  const MixedVolume large =
+      as_mixed({Grid{{100, 100, 100}, {0, 0, 0}, {1, 1, 1}, ""}, std::vector<float>(101 * 101 * 101)}, 4);
   std::signal(SIGXFSZ, SIG_IGN);  // the limit then shows as a failing write, as a full disk does
   rlimit old{};
   getrlimit(RLIMIT_FSIZE, &old);
@@ -605,6 +666,7 @@ BOOST_AUTO_TEST_CASE(a_write_that_fails_leaves_the_old_file_and_nothing_else) {
 
 BOOST_AUTO_TEST_CASE(a_folder_that_does_not_exist_is_named) {
   const Folder folder;
-  BOOST_CHECK_EXCEPTION(write_vdvr(folder.path / "no" / "a.vdvr", small_volume(), support::full_certificate()), FileError,
-                        [](const FileError& e) { return says(e.what(), {"does not exist"}); });
+  BOOST_CHECK_EXCEPTION(
+      write_vdvr(folder.path / "no" / "a.vdvr", small_volume(), support::full_certificate()), FileError,
+      [](const FileError& e) { return says(e.what(), {"does not exist"}); });
 }

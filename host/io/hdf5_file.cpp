@@ -13,19 +13,21 @@
 namespace vdvr::io::hdf5_file {
 namespace {
 
-// One chunk is one read, one checksum and one write: large enough to amortise a call, small enough for HDF5's 1 MiB chunk
-// cache and for readers that want a part. Between 256 KiB and 1 MiB the throughput does not change.
+// One chunk is one read, one checksum and one write: large enough to amortise a call, small enough for HDF5's
+// 1 MiB chunk cache and for readers that want a part. Between 256 KiB and 1 MiB the throughput does not
+// change.
 constexpr std::uint64_t chunk_bytes_wanted = 512 * 1024;
 // An object header message holds at most 65,535 bytes.
 constexpr std::uint64_t header_text_bytes = 60'000;
 constexpr std::uint64_t fletcher32_bytes = 4;  // appended to every chunk
 
-// A file whose last flush failed (disk full) cannot be closed; HDF5 1.10 tries once more when the process exits and
-// crashes. Every handle here is closed by its owner, so its exit handler has nothing else to do. Before main, because only
-// a call before HDF5's first use has an effect.
+// A file whose last flush failed (disk full) cannot be closed; HDF5 1.10 tries once more when the process
+// exits and crashes. Every handle here is closed by its owner, so its exit handler has nothing else to do.
+// Before main, because only a call before HDF5's first use has an effect.
 [[maybe_unused]] const herr_t without_exit_handler = H5dont_atexit();
 
-/// The innermost message of HDF5's error stack: "Data error detected by Fletcher32 checksum", "truncated file ...".
+/// The innermost message of HDF5's error stack: "Data error detected by Fletcher32 checksum", "truncated file
+/// ...".
 std::string hdf5_reason() {
   std::string reason;
   H5Ewalk2(
@@ -63,11 +65,16 @@ Handle dataset_properties() {
 
 std::string class_name(H5T_class_t c, std::size_t size) {
   switch (c) {
-    case H5T_INTEGER: return fmt::format("a {}-byte integer", size);
-    case H5T_FLOAT: return fmt::format("a {}-byte float", size);
-    case H5T_STRING: return "a string";
-    case H5T_COMPOUND: return "a compound";
-    default: return "another type";
+    case H5T_INTEGER:
+      return fmt::format("a {}-byte integer", size);
+    case H5T_FLOAT:
+      return fmt::format("a {}-byte float", size);
+    case H5T_STRING:
+      return "a string";
+    case H5T_COMPOUND:
+      return "a compound";
+    default:
+      return "another type";
   }
 }
 
@@ -83,22 +90,30 @@ Element element_of(hid_t type) {
 
 std::uint64_t element_bytes(Element e) {
   switch (e) {
-    case Element::u8: return 1;
-    case Element::u16: return 2;
-    default: return 4;
+    case Element::u8:
+      return 1;
+    case Element::u16:
+      return 2;
+    default:
+      return 4;
   }
 }
 
 hid_t native_type(Element e) {
   switch (e) {
-    case Element::f32: return H5T_NATIVE_FLOAT;
-    case Element::u8: return H5T_NATIVE_UINT8;
-    case Element::u16: return H5T_NATIVE_UINT16;
-    default: return H5T_NATIVE_UINT32;
+    case Element::f32:
+      return H5T_NATIVE_FLOAT;
+    case Element::u8:
+      return H5T_NATIVE_UINT8;
+    case Element::u16:
+      return H5T_NATIVE_UINT16;
+    default:
+      return H5T_NATIVE_UINT32;
   }
 }
 
-/// a b, or the largest number when that does not fit: then no file is long enough and the comparison refuses it.
+/// a b, or the largest number when that does not fit: then no file is long enough and the comparison refuses
+/// it.
 std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
   std::uint64_t product = 0;
   return __builtin_mul_overflow(a, b, &product) ? std::numeric_limits<std::uint64_t>::max() : product;
@@ -146,11 +161,14 @@ Shape chunk_shape(const Shape& shape, std::uint64_t bytes_per_element) {
   return chunk;
 }
 
-// --- writing ----------------------------------------------------------------------------------------------------------
+// --- writing
+// ----------------------------------------------------------------------------------------------------------
 
-Writer::Writer(const std::filesystem::path& file, const std::filesystem::path& shown) : shown_(shown.string()) {
+Writer::Writer(const std::filesystem::path& file, const std::filesystem::path& shown)
+    : shown_(shown.string()) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose), create(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
-  // From 1.10 on all metadata carries checksums; a fixed upper bound keeps the bytes the same under newer libraries.
+  // From 1.10 on all metadata carries checksums; a fixed upper bound keeps the bytes the same under newer
+  // libraries.
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_obj_track_times(create.get(), false);
@@ -165,14 +183,15 @@ void Writer::fail(const std::string& what) const {
 void Writer::group(const std::string& path) {
   const Handle properties(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
   H5Pset_obj_track_times(properties.get(), false);
-  const Handle group(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose);
+  const Handle group(H5Gcreate2(file_.get(), path.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+                     H5Gclose);
   if (!group) fail(fmt::format("group {} cannot be written", path));
 }
 
-void Writer::create_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space, hid_t given,
-                              const void* values) {
-  const Handle attribute(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type, space, H5P_DEFAULT,
-                                           H5P_DEFAULT, H5P_DEFAULT),
+void Writer::create_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space,
+                              hid_t given, const void* values) {
+  const Handle attribute(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type, space,
+                                           H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                          H5Aclose);
   if (!attribute || H5Awrite(attribute.get(), given, values) < 0)
     fail(fmt::format("attribute '{}' of {} cannot be written", name, object));
@@ -183,18 +202,22 @@ void Writer::attribute(const std::string& object, const std::string& name, std::
   create_attribute(object, name, H5T_STD_I64LE, space.get(), H5T_NATIVE_INT64, &value);
 }
 
-void Writer::attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values) {
-  create_attribute(object, name, H5T_STD_I64LE, simple_space({values.size()}).get(), H5T_NATIVE_INT64, values.data());
+void Writer::attribute(const std::string& object, const std::string& name,
+                       std::span<const std::int64_t> values) {
+  create_attribute(object, name, H5T_STD_I64LE, simple_space({values.size()}).get(), H5T_NATIVE_INT64,
+                   values.data());
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, std::span<const double> values) {
-  create_attribute(object, name, H5T_IEEE_F64LE, simple_space({values.size()}).get(), H5T_NATIVE_DOUBLE, values.data());
+  create_attribute(object, name, H5T_IEEE_F64LE, simple_space({values.size()}).get(), H5T_NATIVE_DOUBLE,
+                   values.data());
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, const std::string& text) {
-  // Fixed length: variable-length text goes to HDF5's global heap, which has no checksum; a flipped bit there makes the
-  // library itself crash on reading (1.10.8).
-  const Handle type = text_type(std::max<std::size_t>(1, text.size())), space(H5Screate(H5S_SCALAR), H5Sclose);
+  // Fixed length: variable-length text goes to HDF5's global heap, which has no checksum; a flipped bit there
+  // makes the library itself crash on reading (1.10.8).
+  const Handle type = text_type(std::max<std::size_t>(1, text.size())),
+               space(H5Screate(H5S_SCALAR), H5Sclose);
   create_attribute(object, name, type.get(), space.get(), type.get(), text.c_str());
 }
 
@@ -207,7 +230,8 @@ void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t s
       H5Pset_fletcher32(properties.get()) < 0)
     fail(fmt::format("{} cannot be chunked under Fletcher32", path));
   const Handle dataset(
-      H5Dcreate2(file_.get(), path.c_str(), stored, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose);
+      H5Dcreate2(file_.get(), path.c_str(), stored, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+      H5Dclose);
   if (!dataset || H5Dwrite(dataset.get(), given, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
     fail(fmt::format("{} cannot be written", path));
 }
@@ -224,11 +248,13 @@ void Writer::dataset(const std::string& path, const Shape& shape, std::span<cons
 
 void Writer::text(const std::string& path, const std::string& text) {
   const Handle type = text_type(std::max<std::size_t>(1, text.size()));
-  if (text.size() > header_text_bytes) return create_dataset(path, {1}, type.get(), type.get(), text.size(), text.data());
+  if (text.size() > header_text_bytes)
+    return create_dataset(path, {1}, type.get(), type.get(), text.size(), text.data());
   const Handle properties = dataset_properties(), space(H5Screate(H5S_SCALAR), H5Sclose);
   H5Pset_layout(properties.get(), H5D_COMPACT);
-  const Handle dataset(
-      H5Dcreate2(file_.get(), path.c_str(), type.get(), space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose);
+  const Handle dataset(H5Dcreate2(file_.get(), path.c_str(), type.get(), space.get(), H5P_DEFAULT,
+                                  properties.get(), H5P_DEFAULT),
+                       H5Dclose);
   if (!dataset || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) < 0)
     fail(fmt::format("{} cannot be written", path));
 }
@@ -237,11 +263,13 @@ void Writer::close() {
   if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0 || !file_.reset()) fail("cannot be flushed");
 }
 
-// --- reading ----------------------------------------------------------------------------------------------------------
+// --- reading
+// ----------------------------------------------------------------------------------------------------------
 
 Reader::Reader(const std::filesystem::path& path) : shown_(path.string()) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) throw FileError(fmt::format("{}: no such file", shown_));
+  if (!std::filesystem::is_regular_file(path, error))
+    throw FileError(fmt::format("{}: no such file", shown_));
   file_bytes_ = std::filesystem::file_size(path, error);
   if (error) throw FileError(fmt::format("{}: {}", shown_, error.message()));
   if (file_bytes_ == 0) throw FileError(fmt::format("{}: the file is empty", shown_));
@@ -264,7 +292,8 @@ bool Reader::has(const std::string& path) const {
     if (exists == 0) return false;
     H5L_info_t info{};
     if (H5Lget_info(file_.get(), step.c_str(), &info, H5P_DEFAULT) < 0) refuse(step, hdf5_reason());
-    if (info.type != H5L_TYPE_HARD) refuse(step, "is a soft or external link; only data inside the file is read");
+    if (info.type != H5L_TYPE_HARD)
+      refuse(step, "is a soft or external link; only data inside the file is read");
     if (end == std::string::npos) return true;
   }
 }
@@ -286,10 +315,12 @@ std::vector<std::string> Reader::members(const std::string& group) const {
   if (H5Gget_info(object.get(), &info) < 0) refuse(group, hdf5_reason());
   std::vector<std::string> names;
   for (hsize_t i = 0; i < info.nlinks; ++i) {
-    const ssize_t length = H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, nullptr, 0, H5P_DEFAULT);
+    const ssize_t length =
+        H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, nullptr, 0, H5P_DEFAULT);
     if (length < 0) refuse(group, hdf5_reason());
     std::string name(static_cast<std::size_t>(length) + 1, '\0');
-    H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(), H5P_DEFAULT);
+    H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(),
+                       H5P_DEFAULT);
     name.pop_back();
     names.push_back(std::move(name));
   }
@@ -312,14 +343,16 @@ Handle Reader::open_attribute(const std::string& object, const std::string& name
   const H5T_class_t c = H5Tget_class(type.get());
   const bool fits = number ? c == H5T_INTEGER || c == H5T_FLOAT : c == H5T_STRING;
   if (!fits)
-    refuse(shown, fmt::format("is {}, expected {}", class_name(c, H5Tget_size(type.get())), number ? "a number" : "a string"));
+    refuse(shown, fmt::format("is {}, expected {}", class_name(c, H5Tget_size(type.get())),
+                              number ? "a number" : "a string"));
   const hssize_t have = H5Sget_simple_extent_npoints(space.get());
   if (have < 0 || static_cast<std::uint64_t>(have) != count || H5Sget_simple_extent_ndims(space.get()) > 1)
     refuse(shown, fmt::format("holds {} values, expected {}", have, count));
   return attribute;
 }
 
-std::vector<std::int64_t> Reader::integers(const std::string& object, const std::string& name, std::uint64_t count) const {
+std::vector<std::int64_t> Reader::integers(const std::string& object, const std::string& name,
+                                           std::uint64_t count) const {
   const Handle attribute = open_attribute(object, name, true, count);
   const Handle type(H5Aget_type(attribute.get()), H5Tclose);
   const std::string shown = fmt::format("attribute '{}' of {}", name, object);
@@ -333,7 +366,8 @@ std::int64_t Reader::integer(const std::string& object, const std::string& name)
   return integers(object, name, 1).front();
 }
 
-std::vector<double> Reader::reals(const std::string& object, const std::string& name, std::uint64_t count) const {
+std::vector<double> Reader::reals(const std::string& object, const std::string& name,
+                                  std::uint64_t count) const {
   const Handle attribute = open_attribute(object, name, true, count);
   std::vector<double> values(count);
   if (H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, values.data()) < 0)
@@ -343,7 +377,8 @@ std::vector<double> Reader::reals(const std::string& object, const std::string& 
 
 namespace {
 
-/// One string through `read(type, buffer)`; false when HDF5 fails. Variable length is what h5py makes of an edited text.
+/// One string through `read(type, buffer)`; false when HDF5 fails. Variable length is what h5py makes of an
+/// edited text.
 template <class Read>
 bool read_text(hid_t type, std::string& text, Read read) {
   if (H5Tis_variable_str(type) > 0) {
@@ -367,29 +402,34 @@ std::string Reader::text_attribute(const std::string& object, const std::string&
   const Handle attribute = open_attribute(object, name, false, 1);
   const Handle type(H5Aget_type(attribute.get()), H5Tclose);
   std::string text;
-  if (!read_text(type.get(), text, [&](hid_t memory, void* out) { return H5Aread(attribute.get(), memory, out); }))
+  if (!read_text(type.get(), text,
+                 [&](hid_t memory, void* out) { return H5Aread(attribute.get(), memory, out); }))
     refuse(fmt::format("attribute '{}' of {}", name, object), hdf5_reason());
   return text;
 }
 
 void Reader::check_storage(Dataset& d, std::uint64_t bytes_per_element) const {
   const Handle properties(H5Dget_create_plist(d.id.get()), H5Pclose);
-  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) refuse(d.path, "is not chunked, so it carries no checksum");
+  if (H5Pget_layout(properties.get()) != H5D_CHUNKED)
+    refuse(d.path, "is not chunked, so it carries no checksum");
   unsigned flags = 0, config = 0;
   std::size_t parameters = 0;
   const int filters = H5Pget_nfilters(properties.get());
   if (filters < 1) refuse(d.path, "has no Fletcher32 checksum");
   for (int i = 0; i < filters; ++i) {
-    const H5Z_filter_t filter =
-        H5Pget_filter2(properties.get(), static_cast<unsigned>(i), &flags, &parameters, nullptr, 0, nullptr, &config);
+    const H5Z_filter_t filter = H5Pget_filter2(properties.get(), static_cast<unsigned>(i), &flags,
+                                               &parameters, nullptr, 0, nullptr, &config);
     if (filter != H5Z_FILTER_FLETCHER32 || filters > 1)
-      refuse(d.path, fmt::format("has {} filters (number {} is HDF5's filter {}); only Fletcher32 alone is read: "
-                                 "h5repack -f FLET rewrites the file", filters, i, filter));
+      refuse(d.path,
+             fmt::format("has {} filters (number {} is HDF5's filter {}); only Fletcher32 alone is read: "
+                         "h5repack -f FLET rewrites the file",
+                         filters, i, filter));
   }
   std::vector<hsize_t> chunk(d.shape.size());
-  if (H5Pget_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data()) < 0) refuse(d.path, hdf5_reason());
-  // Without compression the stored size follows from the shape; anything else means missing chunks, which HDF5 would
-  // silently replace by its fill value, or chunks left out of the checksum.
+  if (H5Pget_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data()) < 0)
+    refuse(d.path, hdf5_reason());
+  // Without compression the stored size follows from the shape; anything else means missing chunks, which
+  // HDF5 would silently replace by its fill value, or chunks left out of the checksum.
   std::uint64_t chunks = 1, chunk_bytes = bytes_per_element;
   for (std::size_t a = 0; a < chunk.size(); ++a) {
     chunks = saturating_product(chunks, (d.shape[a] - 1) / chunk[a] + 1);
@@ -398,8 +438,8 @@ void Reader::check_storage(Dataset& d, std::uint64_t bytes_per_element) const {
   const std::uint64_t expected = saturating_product(chunks, chunk_bytes + fletcher32_bytes);
   d.stored_bytes = H5Dget_storage_size(d.id.get());
   if (d.stored_bytes != expected || expected > file_bytes_)
-    refuse(d.path, fmt::format("{} bytes are stored where its shape needs {}, in a file of {}: incomplete", d.stored_bytes,
-                               expected, file_bytes_));
+    refuse(d.path, fmt::format("{} bytes are stored where its shape needs {}, in a file of {}: incomplete",
+                               d.stored_bytes, expected, file_bytes_));
 }
 
 Dataset Reader::dataset(const std::string& path) const {
@@ -408,7 +448,8 @@ Dataset Reader::dataset(const std::string& path) const {
   d.id = open_object(path);
   if (H5Iget_type(d.id.get()) != H5I_DATASET) refuse(path, "is not a dataset");
   const Handle space(H5Dget_space(d.id.get()), H5Sclose), type(H5Dget_type(d.id.get()), H5Tclose);
-  const int rank = H5Sget_simple_extent_type(space.get()) == H5S_SIMPLE ? H5Sget_simple_extent_ndims(space.get()) : 0;
+  const int rank =
+      H5Sget_simple_extent_type(space.get()) == H5S_SIMPLE ? H5Sget_simple_extent_ndims(space.get()) : 0;
   if (rank < 1) refuse(path, "is not an array");
   std::vector<hsize_t> extent(static_cast<std::size_t>(rank));
   H5Sget_simple_extent_dims(space.get(), extent.data(), nullptr);

@@ -1,7 +1,7 @@
-// HDF5 files in which every stored number is under a checksum: move-only handles, a writer and a strict reader.
-// Datasets are chunked with the Fletcher32 filter; object headers, chunk indexes and superblock carry HDF5's own
-// checksums (format of HDF5 1.10). The reader hands out a dataset only after its type, shape, filters and stored bytes
-// have been checked, so that callers can size memory by it. Called by vdvr_file.cpp.
+// HDF5 files in which every stored number is under a checksum: move-only handles, a writer and a strict
+// reader. Datasets are chunked with the Fletcher32 filter; object headers, chunk indexes and superblock carry
+// HDF5's own checksums (format of HDF5 1.10). The reader hands out a dataset only after its type, shape,
+// filters and stored bytes have been checked, so that callers can size memory by it. Called by vdvr_file.cpp.
 //
 // The HDF5 library is not thread-safe: one thread at a time.
 #pragma once
@@ -50,7 +50,8 @@ class Silence {
 
 using Shape = std::vector<std::uint64_t>;  ///< slowest axis first
 
-/// Chunk of about 512 KiB whose elements are contiguous in the C order of `shape`, split evenly so that little is padded.
+/// Chunk of about 512 KiB whose elements are contiguous in the C order of `shape`, split evenly so that
+/// little is padded.
 Shape chunk_shape(const Shape& shape, std::uint64_t element_bytes);
 
 /// Writes a new file; `shown` is the path that messages name. Failures throw ResourceError (disk).
@@ -66,17 +67,17 @@ class Writer {
   void dataset(const std::string& path, const Shape& shape, std::span<const float> values);
   void dataset(const std::string& path, const Shape& shape, std::span<const std::uint8_t> values);
   void dataset(const std::string& path, const Shape& shape, std::span<const std::uint32_t> values);
-  /// A scalar string kept in its object header, where HDF5's checksum covers it; longer than 60,000 bytes, where a header
-  /// cannot hold it, a string dataset of one element under Fletcher32.
+  /// A scalar string kept in its object header, where HDF5's checksum covers it; longer than 60,000 bytes,
+  /// where a header cannot hold it, a string dataset of one element under Fletcher32.
   void text(const std::string& path, const std::string& text);
   /// Flushes and closes. Throws ResourceError.
   void close();
 
  private:
-  void create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given, std::uint64_t element_bytes,
-                      const void* values);
-  void create_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space, hid_t given,
-                        const void* values);
+  void create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given,
+                      std::uint64_t element_bytes, const void* values);
+  void create_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space,
+                        hid_t given, const void* values);
   [[noreturn]] void fail(const std::string& what) const;
 
   Silence silence_;
@@ -86,7 +87,8 @@ class Writer {
 
 enum class Element { f32, u8, u16, u32, other };
 
-/// A dataset whose declaration was checked: chunked, Fletcher32 alone, every chunk stored, shape without a zero.
+/// A dataset whose declaration was checked: chunked, Fletcher32 alone, every chunk stored, shape without a
+/// zero.
 struct Dataset {
   Handle id;
   std::string path;

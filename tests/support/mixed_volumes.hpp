@@ -11,8 +11,8 @@
 namespace vdvr::support {
 
 /// Every brick takes one of `triples` at random, tiles in shuffled order; all samples 0.
-inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate, const std::vector<LevelTriple>& triples,
-                               unsigned seed) {
+inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate,
+                               const std::vector<LevelTriple>& triples, unsigned seed) {
   MixedVolume v;
   v.grid = grid;
   v.granularity = granularity;
@@ -36,8 +36,8 @@ inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate, cons
 }
 
 /// Samples uniform in [-1, 1]: bricks disagree on shared faces, so that a test sees which brick answered.
-inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate, const std::vector<LevelTriple>& triples,
-                                unsigned seed) {
+inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate,
+                                const std::vector<LevelTriple>& triples, unsigned seed) {
   MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed);
   std::mt19937 random(seed + 1);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
@@ -48,8 +48,9 @@ inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate, con
 }
 
 /// Samples of `f` at cell coordinates x, y, z; beyond the grid a tile repeats its last plane.
-inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate, const std::vector<LevelTriple>& triples,
-                                 unsigned seed, const std::function<double(double, double, double)>& f) {
+inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate,
+                                 const std::vector<LevelTriple>& triples, unsigned seed,
+                                 const std::function<double(double, double, double)>& f) {
   MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed);
   const Index3 n = grid.samples(), bricks = v.bricks();
   for (std::int64_t z = 0, i = 0; z < n[2]; ++z)
@@ -68,10 +69,12 @@ inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate, co
                           static_cast<double>(sample) / static_cast<double>(1 << l[2 - axis]);
       return std::min(cell, static_cast<double>(grid.cells[axis]));
     };
-    float* sample = v.tiles[l].data() + static_cast<std::size_t>(v.tile[b]) * static_cast<std::size_t>(v.tile_size(l));
+    float* sample =
+        v.tiles[l].data() + static_cast<std::size_t>(v.tile[b]) * static_cast<std::size_t>(v.tile_size(l));
     for (std::int64_t z = 0; z < side[0]; ++z)
       for (std::int64_t y = 0; y < side[1]; ++y)
-        for (std::int64_t x = 0; x < side[2]; ++x) *sample++ = static_cast<float>(f(at(0, x), at(1, y), at(2, z)));
+        for (std::int64_t x = 0; x < side[2]; ++x)
+          *sample++ = static_cast<float>(f(at(0, x), at(1, y), at(2, z)));
   }
   return v;
 }
