@@ -19,7 +19,9 @@ struct VdvrFile {
   std::uint64_t file_bytes = 0;
 };
 
-/// Written whole or not at all, chunked, with Fletcher32 checksums.
+/// Written whole or not at all, chunked, with Fletcher32 checksums. An empty content_sha256 in the certificate is filled
+/// in; any other is stored as given. Throws InputError for a volume that read_vdvr would refuse or a certificate that is not
+/// finite, FileError (folder), ResourceError (disk). Not thread-safe with other users of HDF5.
 void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume, const Certificate& certificate);
 
 /// Reads and checks everything: types, shapes in 64 bits before allocating, tile indices, finite geometry, checksums.

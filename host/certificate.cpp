@@ -1,0 +1,274 @@
+// The certificate as JSON (docs/file-format.md): members in a fixed order, numbers that read back to the bit,
+// no NaN and no infinity. Called by vdvr_file.cpp and by every command that prints or stores a certificate.
+#include "vdvr/certificate.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// --- writing
+// ----------------------------------------------------------------------------------------------------------
+
+/// JSON has no NaN and no infinity; the JSON library would write null, which reads as "not measured".
+double finite(const char* member, double value) {
+  if (!std::isfinite(value))
+    throw InputError(
+        fmt::format("certificate: member '{}' is {}; only finite numbers can be certified", member, value));
+  return value;
+}
+
+Json term(const char* member, const ErrorTerm& t) {
+  return {{"value", finite(member, t.value)}, {"method", t.method}};
+}
+
+Json budget(const ErrorBudget& b) {
+  Json sampler = {{"buffer", term("budget.sampler.buffer.value", b.sampler.buffer)}};
+  if (b.sampler.image3d) sampler["image3d"] = term("budget.sampler.image3d.value", *b.sampler.image3d);
+  return {{"grid", term("budget.grid.value", b.grid)},
+          {"gold", term("budget.gold.value", b.gold)},
+          {"projection", term("budget.projection.value", b.projection)},
+          {"arithmetic", term("budget.arithmetic.value", b.arithmetic)},
+          {"sampler", sampler}};
+}
+
+/// {stage: {rate: [{method, value, rigorous}, ...]}}, stages and rates in the order of their first bound.
+Json bounds(const std::vector<Bound>& all) {
+  Json stages = Json::object();
+  for (const Bound& b : all)
+    stages[b.stage][fmt::format("{}", b.rate)].push_back(
+        {{"method", b.method}, {"value", finite("bounds", b.value)}, {"rigorous", b.rigorous}});
+  return stages;
+}
+
+template <class Numbers>
+Json numbers(const char* member, const Numbers& values) {
+  Json list = Json::array();
+  for (const double v : values) list.push_back(finite(member, v));
+  return list;
+}
+
+Json options(const std::string& text) {
+  const Json parsed = Json::parse(text, nullptr, false);
+  if (!parsed.is_object())
+    throw InputError(fmt::format("certificate: options are not a JSON object: '{}'", text));
+  return parsed;
+}
+
+// --- reading
+// ----------------------------------------------------------------------------------------------------------
+
+/// A value with its place, so that every refusal names the member.
+class Member {
+ public:
+  Member(const Json& value, std::string path) : value_(&value), path_(std::move(path)) {}
+
+  [[nodiscard]] bool has(const std::string& name) const {
+    return object().contains(name) && !object().at(name).is_null();
+  }
+  [[nodiscard]] Member at(const std::string& name) const {
+    const std::string path = path_.empty() ? name : path_ + "." + name;
+    if (!object().contains(name)) throw FileError(fmt::format("certificate: member '{}' is missing", path));
+    return {object().at(name), path};
+  }
+  [[nodiscard]] Member item(std::size_t i) const { return {value_->at(i), fmt::format("{}[{}]", path_, i)}; }
+  [[nodiscard]] bool is_null() const { return value_->is_null(); }
+  [[nodiscard]] const Json& object() const { return expect(value_->is_object(), "an object"); }
+  [[nodiscard]] const Json& list() const { return expect(value_->is_array(), "an array"); }
+  [[nodiscard]] double number() const { return expect(value_->is_number(), "a number").get<double>(); }
+  [[nodiscard]] bool flag() const { return expect(value_->is_boolean(), "true or false").get<bool>(); }
+  [[nodiscard]] std::string text() const {
+    return expect(value_->is_string(), "a string").get<std::string>();
+  }
+  [[nodiscard]] std::int64_t integer() const {
+    const bool fits = value_->is_number_integer() &&
+                      (!value_->is_number_unsigned() ||
+                       value_->get<std::uint64_t>() <=
+                           static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
+    return expect(fits, "a 64-bit integer").get<std::int64_t>();
+  }
+  [[nodiscard]] int rate() const {
+    const std::int64_t n = integer();
+    if (n < 1 || n > std::numeric_limits<int>::max())
+      throw FileError(fmt::format("certificate: member '{}' is {}, expected a rate of at least 1", path_, n));
+    return static_cast<int>(n);
+  }
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> numbers() const {
+    if (list().size() != N)
+      throw FileError(
+          fmt::format("certificate: member '{}' has {} entries, expected {}", path_, list().size(), N));
+    std::array<double, N> values{};
+    for (std::size_t i = 0; i < N; ++i) values[i] = item(i).number();
+    return values;
+  }
+
+ private:
+  const Json& expect(bool right, const char* expected) const {
+    if (!right)
+      throw FileError(fmt::format("certificate: {} is {}, expected {}",
+                                  path_.empty() ? "the JSON" : fmt::format("member '{}'", path_),
+                                  value_->type_name(), expected));
+    return *value_;
+  }
+
+  const Json* value_;
+  std::string path_;
+};
+
+ErrorTerm read_term(const Member& m) { return {m.at("value").number(), m.at("method").text()}; }
+
+void read_budget(const Member& m, ErrorBudget& b) {
+  b.grid = read_term(m.at("grid"));
+  b.gold = read_term(m.at("gold"));
+  b.projection = read_term(m.at("projection"));
+  b.arithmetic = read_term(m.at("arithmetic"));
+  const Member sampler = m.at("sampler");
+  b.sampler.buffer = read_term(sampler.at("buffer"));
+  if (sampler.has("image3d")) b.sampler.image3d = read_term(sampler.at("image3d"));
+}
+
+int rate_of_name(const std::string& name, const std::string& stage) {
+  std::int64_t rate = 0;
+  for (const char digit : name)
+    rate = digit >= '0' && digit <= '9' && rate < 100'000'000 ? 10 * rate + (digit - '0') : -1;
+  if (name.empty() || rate < 1)
+    throw FileError(fmt::format("certificate: member 'bounds.{}.{}' is not named by a rate", stage, name));
+  return static_cast<int>(rate);
+}
+
+std::vector<Bound> read_bounds(const Member& m) {
+  std::vector<Bound> all;
+  for (const auto& [stage, rates] : m.object().items()) {
+    const Member of_stage = m.at(stage);
+    for (const auto& [rate, list] : of_stage.object().items()) {
+      const Member of_rate = of_stage.at(rate);
+      for (std::size_t i = 0; i < of_rate.list().size(); ++i) {
+        const Member b = of_rate.item(i);
+        all.push_back({stage, b.at("method").text(), rate_of_name(rate, stage), b.at("value").number(),
+                       b.at("rigorous").flag()});
+      }
+    }
+  }
+  return all;
+}
+
+void read_promise(const Member& m, Certificate& c) {
+  c.epsilon = m.at("epsilon").number();
+  c.epsilon_abs = m.at("epsilon_abs").number();
+  c.reference_range = m.at("reference_range").number();
+  const Member holds = m.at("holds"), total = m.at("total");
+  c.holds_buffer = holds.at("buffer").flag();
+  if (holds.has("image3d")) c.holds_image3d = holds.at("image3d").flag();
+  c.total_buffer = total.at("buffer").number();
+  if (total.has("image3d")) c.total_image3d = total.at("image3d").number();
+  read_budget(m.at("budget"), c.budget);
+  c.measured_max = m.at("measured_max").number();
+  c.measured_total = m.at("measured_total").number();
+  c.worst_at = m.at("worst_at").numbers<3>();
+}
+
+void read_method(const Member& m, Certificate& c) {
+  const Member rates = m.at("rates"), field = m.at("field");
+  c.upsampling_u = rates.at("upsampling_u").rate();
+  c.u_filter = rates.at("u_filter").text();
+  c.gold_rate = rates.at("gold").rate();
+  c.bounds = read_bounds(m.at("bounds"));
+  c.field.filter = field.at("filter").text();
+  c.field.cutoff = field.at("cutoff").number();
+  if (const Member center = field.at("center"); !center.is_null()) c.field.center = center.number();
+  c.padding = field.at("padding").integer();
+}
+
+void read_scope(const Member& m, Certificate& c) {
+  if (const Member window = m.at("window"); !window.is_null()) {
+    const auto w = window.numbers<2>();
+    c.window = {w[0], w[1]};
+  }
+  if (const Member roi = m.at("roi"); !roi.is_null()) c.roi = roi.numbers<6>();
+  const Member not_covered = m.at("not_covered");
+  c.not_covered_count = not_covered.at("count").integer();
+  c.not_covered_fraction = not_covered.at("fraction").number();
+  c.not_covered_rule = not_covered.at("rule").text();
+}
+
+void read_origin(const Member& m, Certificate& c) {
+  const Member input = m.at("input"), shape = input.at("shape");
+  c.input_name = input.at("name").text();
+  c.input_sha256 = input.at("sha256").text();
+  for (std::size_t i = 0; i < shape.list().size(); ++i) c.input_shape.push_back(shape.item(i).integer());
+  c.input_angles = input.at("angles").integer();
+  c.content_sha256 = m.at("content_sha256").text();
+  c.device = m.at("device").text();
+  c.driver = m.at("driver").text();
+  c.version = m.at("version").text();
+  c.options_json = m.at("options").object().dump();
+  if (!m.has("notes")) return;
+  const Member notes = m.at("notes");
+  for (std::size_t i = 0; i < notes.list().size(); ++i) c.notes.push_back(notes.item(i).text());
+}
+
+}  // namespace
+
+std::string to_json(const Certificate& c) {
+  Json j;
+  j["epsilon"] = finite("epsilon", c.epsilon);
+  j["epsilon_abs"] = finite("epsilon_abs", c.epsilon_abs);
+  j["reference_range"] = finite("reference_range", c.reference_range);
+  j["holds"] = {{"buffer", c.holds_buffer}};
+  if (c.holds_image3d) j["holds"]["image3d"] = *c.holds_image3d;
+  j["total"] = {{"buffer", finite("total.buffer", c.total_buffer)}};
+  if (c.total_image3d) j["total"]["image3d"] = finite("total.image3d", *c.total_image3d);
+  j["budget"] = budget(c.budget);
+  j["measured_max"] = finite("measured_max", c.measured_max);
+  j["measured_total"] = finite("measured_total", c.measured_total);
+  j["worst_at"] = numbers("worst_at", c.worst_at);
+  j["rates"] = {{"upsampling_u", c.upsampling_u}, {"u_filter", c.u_filter}, {"gold", c.gold_rate}};
+  j["bounds"] = bounds(c.bounds);
+  j["field"] = {{"filter", c.field.filter}, {"cutoff", finite("field.cutoff", c.field.cutoff)}};
+  j["field"]["center"] = c.field.center ? Json(finite("field.center", *c.field.center)) : Json(nullptr);
+  j["field"]["padding"] = c.padding;
+  j["window"] = c.window ? numbers("window", std::array{c.window->first, c.window->second}) : Json(nullptr);
+  j["roi"] = c.roi ? numbers("roi", *c.roi) : Json(nullptr);
+  j["not_covered"] = {{"count", c.not_covered_count},
+                      {"fraction", finite("not_covered.fraction", c.not_covered_fraction)},
+                      {"rule", c.not_covered_rule}};
+  j["input"] = {{"name", c.input_name},
+                {"sha256", c.input_sha256},
+                {"shape", c.input_shape},
+                {"angles", c.input_angles}};
+  j["content_sha256"] = c.content_sha256;
+  j["device"] = c.device;
+  j["driver"] = c.driver;
+  j["version"] = c.version;
+  j["options"] = options(c.options_json);
+  j["notes"] = c.notes;
+  // File names need not be UTF-8; JSON must be.
+  return j.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+Certificate certificate_from_json(const std::string& text) {
+  Json parsed;
+  try {
+    parsed = Json::parse(text);
+  } catch (const nlohmann::json::exception& e) {
+    throw FileError(fmt::format("certificate: not valid JSON: {}", e.what()));
+  }
+  const Member m(parsed, "");
+  Certificate c;
+  read_promise(m, c);
+  read_method(m, c);
+  read_scope(m, c);
+  read_origin(m, c);
+  return c;
+}
+
+}  // namespace vdvr

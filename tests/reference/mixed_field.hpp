@@ -1,0 +1,72 @@
+// The mixed-resolution field in double precision, from the text of docs/file-format.md alone: find the brick
+// of a cell coordinate, find its samples, interpolate trilinearly. Does not use
+// kernels/shared/mixed_sampler.h.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "vdvr/mixed_volume.hpp"
+
+namespace vdvr::reference {
+
+/// The stored sample number `sample` (x, y, z) of a brick at the brick's own level.
+inline double stored_sample(const MixedVolume& v, const Index3& brick, const Index3& sample) {
+  const Index3 bricks = v.bricks(), n = v.grid.samples();
+  const auto b = static_cast<std::size_t>(brick[0] + bricks[0] * (brick[1] + bricks[1] * brick[2]));
+  const LevelTriple l = v.level.at(b);
+  if (l == LevelTriple{0, 0, 0}) {
+    const std::int64_t g = v.granularity;
+    const std::int64_t x = brick[0] * g + sample[0], y = brick[1] * g + sample[1],
+                       z = brick[2] * g + sample[2];
+    return static_cast<double>(v.base.at(static_cast<std::size_t>(x + n[0] * (y + n[1] * z))));
+  }
+  const std::int64_t sx = (v.granularity << l[2]) + 1, sy = (v.granularity << l[1]) + 1,
+                     sz = (v.granularity << l[0]) + 1;
+  const std::int64_t first = static_cast<std::int64_t>(v.tile.at(b)) * sz * sy * sx;
+  return static_cast<double>(
+      v.tiles.at(l).at(static_cast<std::size_t>(first + sample[0] + sx * (sample[1] + sy * sample[2]))));
+}
+
+/// The brick a cell coordinate belongs to along one axis: half-open, the last brick closed.
+inline std::int64_t brick_of(const MixedVolume& v, std::size_t axis, double cell) {
+  const auto brick = static_cast<std::int64_t>(std::floor(cell / v.granularity));
+  return std::min(std::max<std::int64_t>(brick, 0), v.bricks()[axis] - 1);
+}
+
+/// The field as one brick's samples give it at cell coordinates x, y, z within the brick's closed box.
+inline double field_of_brick(const MixedVolume& v, const Index3& brick, const Vec3& cell) {
+  const Index3 bricks = v.bricks();
+  const LevelTriple l =
+      v.level.at(static_cast<std::size_t>(brick[0] + bricks[0] * (brick[1] + bricks[1] * brick[2])));
+  Index3 low{};
+  Vec3 t{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double scale = std::ldexp(1.0, l[2 - a]);
+    const double local = (cell[a] - static_cast<double>(brick[a] * v.granularity)) * scale;
+    const std::int64_t width =
+        std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity);
+    const auto last = static_cast<std::int64_t>(static_cast<double>(width) * scale) - 1;
+    low[a] = std::min(static_cast<std::int64_t>(std::floor(local)), last);
+    t[a] = local - static_cast<double>(low[a]);
+  }
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    Index3 sample = low;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool high = ((corner >> a) & 1) != 0;
+      sample[a] += high ? 1 : 0;
+      weight *= high ? t[a] : 1 - t[a];
+    }
+    sum += weight * stored_sample(v, brick, sample);
+  }
+  return sum;
+}
+
+/// The field at cell coordinates x, y, z.
+inline double mixed_field(const MixedVolume& v, const Vec3& cell) {
+  return field_of_brick(v, {brick_of(v, 0, cell[0]), brick_of(v, 1, cell[1]), brick_of(v, 2, cell[2])}, cell);
+}
+
+}  // namespace vdvr::reference
