@@ -1,0 +1,339 @@
+// Builds the certified volume: classify, extract, close, pack, then measure the packed field and repair until it holds
+// (docs/error-bounds.md). Calls gold_stream.cpp and close_boundaries.cpp.
+#include "vdvr/build.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+
+#include "host/close_boundaries.hpp"
+#include "host/gold_stream.hpp"
+#include "host/reconstruct_field.hpp"
+#include "host/sampler_terms.hpp"
+#include "host/worst_node.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::map<std::string, double>& seconds) : seconds_(seconds) {}
+  void lap(const std::string& stage) {
+    const auto now = std::chrono::steady_clock::now();
+    seconds_[stage] += std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::map<std::string, double>& seconds_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// Granularity that does not waste tiles on a grid thinner than a brick.
+int fitting_granularity(int wanted, const Grid& grid) {
+  int g = wanted;
+  while (g > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < g) g /= 2;
+  return g;
+}
+
+// Bricks that meet the region of interest; all where there is none.
+std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b, const std::optional<std::array<double, 6>>& roi) {
+  const std::int64_t g = b.granularity;
+  Index3 n{};
+  for (std::size_t a = 0; a < 3; ++a) n[a] = (b.grid.cells[a] + g - 1) / g;
+  std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 1);
+  if (!roi) return selected;
+  for (std::size_t i = 0; i < selected.size(); ++i) {
+    const auto brick = static_cast<std::int64_t>(i);
+    const Index3 p{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double low = b.grid.origin[a] + static_cast<double>(p[a] * g) * b.grid.spacing[a];
+      const double high = b.grid.origin[a] + static_cast<double>(std::min(b.grid.cells[a], (p[a] + 1) * g)) * b.grid.spacing[a];
+      if (high < (*roi)[a] || low > (*roi)[a + 3]) selected[i] = 0;
+    }
+  }
+  return selected;
+}
+
+// What the classification pass learns besides the levels.
+struct Slack {
+  double total = 0;       // largest T + P of a tested node
+  double projection = 0;  // largest P
+  double gold = 0;        // largest T
+};
+
+class Builder {
+ public:
+  Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options, const Progress& progress)
+      : state_(device.state()), plan_(plan), progress_(progress), watch_(seconds_) {
+    bricks_.grid = plan.grid;
+    bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
+    bricks_.rate = plan.gold_rate;
+    bricks_.base = plan.base.samples;
+    selected_ = bricks_in_roi(bricks_, options.roi);
+    bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
+    bricks_.involved.assign(selected_.size(), 0);
+    bricks_.gold.resize(selected_.size());
+    if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end()) throw InputError("--roi meets no brick of the grid");
+
+    filtered_ = filter_projections(state_, scan, plan.field, progress);
+    upsampler_.emplace(state_, filtered_);
+    watch_.lap("filter");
+    sups_ = field_sups(state_, *upsampler_, filtered_);
+    GoldSettings settings{plan.grid, bricks_.granularity, plan.gold_rate, plan.upsampling_u, plan.u_filter,
+                          gold_remainder(filtered_, sups_, plan.grid, plan.gold_rate), options.window};
+    stream_.emplace(state_, filtered_, *upsampler_, settings);
+    watch_.lap("bounds");
+    probe_ = probe_sampler(device);
+    watch_.lap("probe");
+  }
+
+  // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
+  double node_tolerance(const SamplerTerms& sampler) const {
+    return plan_.epsilon_abs - stream_->arithmetic() - std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+  }
+
+  void classify(double tolerance) {
+    // Gold computed in two blocks differs by its rounding; a brick at the gold rate must pass all the same.
+    const double strict = tolerance - 2 * stream_->arithmetic();
+    const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
+    stream_->run(selected_, [&](GoldStream::Batch& batch) {
+      const auto errors = batch.classify();
+      const auto& ids = batch.bricks();
+      const auto p = batch.largest_p();
+      std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
+      for (std::size_t i = 0; i < ids.size(); ++i) {
+        const std::size_t id = at(ids[i]);
+        const auto& by_level = errors[i].by_level;
+        bricks_.involved[id] = by_level.back() >= 0;
+        if (!bricks_.involved[id]) continue;
+        slack_.total = std::max(slack_.total, static_cast<double>(by_level.back()));
+        slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
+        slack_.gold = std::max(slack_.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
+        if (!(static_cast<double>(by_level.back()) <= strict)) refuse(by_level.back(), strict);
+        int level = 0;
+        while (level < top && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= strict)) ++level;
+        set_level(ids[i], level);
+        if (level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
+      }
+      store(batch, tiles);
+    }, progress_, "classify");
+    watch_.lap("classify");
+  }
+
+  // Closes, packs, measures; raises bricks until every node is within the tolerance.
+  MixedVolume close_and_measure(double tolerance) {
+    std::vector<std::uint8_t> pending = bricks_.involved;
+    measures_.assign(bricks_.level.size(), {});
+    for (int round = 0;; ++round) {
+      MixedVolume volume = close_boundaries(bricks_);
+      watch_.lap("close");
+      const DeviceField field(state_, volume);
+      const opencl::DeviceArray<std::uint8_t> device_pending(state_, std::span<const std::uint8_t>(pending), "bricks to verify");
+      stream_->run(pending, [&](GoldStream::Batch& batch) {
+        for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending)) measures_[at(m.brick)] = m;
+      }, progress_, round == 0 ? "verify" : "repair");
+      watch_.lap("verify");
+      const std::vector<std::uint8_t> raised = raise_violating(pending);
+      repaired_ += std::count(raised.begin(), raised.end(), 1);
+      if (std::find(raised.begin(), raised.end(), 1) == raised.end()) return volume;
+      stream_->run(raised, [&](GoldStream::Batch& batch) {
+        std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
+        for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
+        store(batch, tiles);
+      }, progress_, "repair");
+      watch_.lap("repair");
+      pending = with_neighbours(raised);
+    }
+  }
+
+  // The node at which the largest measure lies.
+  Vec3 worst_node(const MixedVolume& volume, std::int64_t brick) {
+    std::vector<std::uint8_t> one(bricks_.level.size(), 0);
+    one[at(brick)] = 1;
+    Vec3 where{};
+    stream_->run(one, [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, brick); }, {}, "worst");
+    return where;
+  }
+
+  const std::vector<BrickMeasure>& measures() const { return measures_; }
+  const std::vector<std::uint8_t>& involved() const { return bricks_.involved; }
+  const Slack& slack() const { return slack_; }
+  const SamplerProbe& probe() const { return probe_; }
+  const FilteredScan& filtered() const { return filtered_; }
+  GoldStream& stream() { return *stream_; }
+  std::map<std::string, double>& seconds() { return seconds_; }
+  std::int64_t repaired() const { return repaired_; }
+
+ private:
+  [[noreturn]] void refuse(float slack, double strict) const {
+    const bool projection = slack_.projection > slack_.gold;
+    throw ToleranceError(fmt::format(
+        "epsilon {:.4g} is out of reach at these rates: interpolating {} alone may err by {:.4g} of the {:.4g} left for it; raise {} or allow at least {:.4g}",
+        plan_.epsilon_abs, projection ? "the projections" : "gold", slack, strict, projection ? "--upsampling, or take --u-filter cubic," : "--gold",
+        plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
+  }
+
+  void set_level(std::int64_t brick, int level) {
+    const auto l = static_cast<std::uint8_t>(level);
+    bricks_.level[at(brick)] = {l, l, l};
+  }
+
+  void store(GoldStream::Batch& batch, const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
+    const auto samples = batch.extract(tiles);
+    auto next = samples.begin();
+    const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}};
+    for (const auto& [brick, level] : tiles) {
+      const auto end = next + shape.tile_size(level);
+      bricks_.gold[at(brick)].assign(next, end);
+      next = end;
+    }
+  }
+
+  // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels only rise.
+  std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
+    const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
+    std::vector<std::uint8_t> raise(bricks_.level.size(), 0);
+    for (std::size_t i = 0; i < pending.size(); ++i) {
+      if (!pending[i] || measures_[i].violated == 0) continue;
+      for (int part = 0; part < 27; ++part) {
+        if (!(measures_[i].violated >> part & 1)) continue;
+        const auto incident = incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9});
+        bool any_coarser = false;
+        for (const std::int64_t j : incident)
+          if (bricks_.level[at(j)][0] < bricks_.level[i][0]) {
+            raise[at(j)] = 1;
+            any_coarser = true;
+          }
+        if (any_coarser) continue;
+        if (bricks_.level[i][0] == top) refuse(measures_[i].total, plan_.epsilon_abs);
+        raise[i] = 1;
+      }
+    }
+    for (std::size_t i = 0; i < raise.size(); ++i)
+      if (raise[i]) set_level(static_cast<std::int64_t>(i), bricks_.level[i][0] + 1);
+    return raise;
+  }
+
+  std::vector<std::uint8_t> with_neighbours(const std::vector<std::uint8_t>& marked) const {
+    std::vector<std::uint8_t> out(marked.size(), 0);
+    for (std::size_t i = 0; i < marked.size(); ++i)
+      if (marked[i])
+        for (int part = 0; part < 27; ++part)
+          for (const std::int64_t j : incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9}))
+            if (bricks_.involved[at(j)]) out[at(j)] = 1;
+    return out;
+  }
+
+  opencl::State& state_;
+  const Plan& plan_;
+  const Progress& progress_;
+  OpenBricks bricks_;
+  std::vector<std::uint8_t> selected_;
+  std::map<std::string, double> seconds_;
+  Stopwatch watch_;
+  FilteredScan filtered_;
+  std::optional<Upsampler> upsampler_;
+  FieldSups sups_;
+  std::optional<GoldStream> stream_;
+  SamplerProbe probe_;
+  Slack slack_;
+  std::vector<BrickMeasure> measures_;
+  std::int64_t repaired_ = 0;
+};
+
+Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
+                    const MixedVolume& volume, const SamplerTerms& sampler) {
+  Certificate c;
+  c.epsilon = plan.epsilon;
+  c.epsilon_abs = plan.epsilon_abs;
+  c.reference_range = plan.reference_range;
+  const BrickMeasure* worst = nullptr;
+  for (const BrickMeasure& m : builder.measures()) {
+    if (m.total < 0) continue;
+    c.measured_max = std::max(c.measured_max, static_cast<double>(m.error));
+    if (!worst || m.total > worst->total) worst = &m;
+  }
+  if (worst) {
+    c.measured_total = static_cast<double>(worst->total);
+    c.worst_at = builder.worst_node(volume, worst->brick);
+  }
+  c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
+  c.budget.gold = {builder.slack().gold, "curvature: signed second differences of gold, with remainder"};
+  c.budget.projection = {builder.slack().projection, plan.u_filter == "cubic" ? "curvature: signed sums of |q_uuuu| maxima" : "curvature: signed sums of |q_uu| maxima"};
+  c.budget.arithmetic = {builder.stream().arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
+  c.budget.sampler = sampler;
+  c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
+  c.holds_buffer = c.total_buffer <= c.epsilon_abs;
+  if (sampler.image3d) {
+    c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
+    c.holds_image3d = *c.total_image3d <= c.epsilon_abs;
+  }
+  c.upsampling_u = plan.upsampling_u;
+  c.u_filter = plan.u_filter;
+  c.gold_rate = plan.gold_rate;
+  c.bounds = plan.bounds;
+  c.field = plan.field;
+  c.field.center = builder.filtered().geometry.center;
+  c.padding = builder.filtered().fft_length;
+  c.window = options.window;
+  c.roi = options.roi;
+  c.not_covered_count = plan.not_covered_count;
+  c.not_covered_fraction = plan.not_covered_fraction;
+  c.not_covered_rule = "a point is covered when all its projections fall on the detector; samples more than two base-cell diagonals outside are stored as 0";
+  c.input_name = scan.report.name;
+  c.input_sha256 = scan.report.sha256;
+  c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};
+  c.input_angles = scan.geometry.views();
+  c.device = device.info().name;
+  c.driver = device.info().driver;
+  c.version = VDVR_VERSION;
+  c.notes = plan.notes;
+  c.notes.push_back("covers interpolation, not physics: noise, too few views, the filter window and truncation shape F itself");
+  if (builder.repaired() > 0) c.notes.push_back(fmt::format("closing raised {} bricks by one level", builder.repaired()));
+  return c;
+}
+
+}  // namespace
+
+BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options, const Progress& progress) {
+  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 && options.granularity != 8)
+    throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
+  Builder builder(device, scan, plan, options, progress);
+  const std::int64_t atlas = longest_atlas(device.info());
+
+  // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and more if that was short.
+  const FieldSlopes base_slopes = field_slopes(as_mixed(plan.base));
+  SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), atlas);
+  const auto scale = [](SamplerTerms& t, double f) {
+    t.buffer.value *= f;
+    if (t.image3d) t.image3d->value *= f;
+  };
+  scale(reserve, 1.25);
+  for (int attempt = 0;; ++attempt) {
+    const double tolerance = builder.node_tolerance(reserve);
+    if (!(tolerance > 0)) {
+      throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}", plan.epsilon_abs, plan.epsilon_abs - tolerance));
+    }
+    builder.classify(tolerance);
+    BuildResult result;
+    result.volume = builder.close_and_measure(tolerance);
+    const SamplerTerms sampler = sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(), atlas);
+    result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
+    const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
+    if (holds || attempt == 2) {
+      result.seconds = builder.seconds();
+      return result;
+    }
+    reserve = sampler;
+    scale(reserve, 1.25);
+  }
+}
+
+}  // namespace vdvr

@@ -1,0 +1,337 @@
+// Streams gold. Launches kernels/gold_bounds.cl, classify.cl and verify.cl.
+#include "host/gold_stream.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "host/opencl/kernel.hpp"
+#include "host/parallel.hpp"
+#include "host/reconstruct_field.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Room for 16-lane reads that begin at the last node of the last column.
+constexpr std::int64_t gold_room = 64;
+
+// Mirrors TileRequest of kernels/classify.cl.
+struct TileRequest {
+  cl_int block, node_x, node_y, node_z;
+  cl_int spacing_x, spacing_y, spacing_z;
+  cl_int side_x, side_y, side_z;
+  cl_int last_x, last_y, last_z;
+  cl_int pad;
+  cl_ulong offset;
+};
+static_assert(sizeof(TileRequest) == 64 && offsetof(TileRequest, offset) == 56);
+
+}  // namespace
+
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& volume) : grid(sampler_grid(volume)) {
+  samples = opencl::DeviceArray<float>(state, sample_buffer_size(volume), "certified samples");
+  samples.write(volume.base, 0);
+  std::uint64_t offset = volume.base.size();
+  for (const auto& [triple, tiles] : volume.tiles) {
+    samples.write(tiles, offset);
+    offset += tiles.size();
+  }
+  bricks = opencl::DeviceArray<VdvrBrick>(state, std::span<const VdvrBrick>(brick_records(volume)), "brick records");
+}
+
+GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const GoldSettings& settings)
+    : state_(state), scan_(scan), upsampler_(upsampler), settings_(settings), coverage_(scan.geometry),
+      columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)) {
+  const std::int64_t g = settings.granularity;
+  // About 16 x 16 x 32 base cells at once: large enough that halos are cheap, small enough for caches and --max-memory.
+  block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
+  slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
+  while (slab_bricks_ > 1 && slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() / 2, state.info.max_allocation)) slab_bricks_ /= 2;
+  const auto block_bytes = [&] { return count(12 * (block_bricks_ * g * settings.rate + 3) * (block_bricks_ * g * settings.rate + 3) * (slab_bricks_ * g * settings.rate + 64)); };
+  while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
+  if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
+    throw ResourceError(fmt::format("gold at rate {} from {} views of {} upsampled columns needs {} MiB for its thinnest slab; raise --max-memory, "
+                                    "or choose a smaller --granularity, --upsampling or --gold",
+                                    settings.rate, scan.geometry.views(), columns_.count, slab_bytes(slab_bricks_ * g) >> 20));
+  }
+  const std::int64_t side = block_bricks_ * g * settings.rate + 3;
+  const ColumnBlocks largest{side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}};
+  arithmetic_ = arithmetic_bound(state, upsampler, scan, columns_, largest, settings.u_filter);
+  settings_.t_constant += 1.5 * arithmetic_;
+}
+
+GoldStream::~GoldStream() = default;
+
+std::uint64_t GoldStream::slab_bytes(std::int64_t cells_z) const { return upsampler_.slab_bytes(columns_, cells_z * settings_.rate + 3); }
+
+void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress, const std::string& stage) {
+  const std::int64_t g = settings_.granularity;
+  Index3 bricks{};
+  for (std::size_t a = 0; a < 3; ++a) bricks[a] = (settings_.grid.cells[a] + g - 1) / g;
+  const auto is_selected = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return selected[at((z * bricks[1] + y) * bricks[0] + x)] != 0; };
+
+  // Work by slab: as large blocks where at least an eighth of a block's bricks are wanted, else brick by brick.
+  struct Work {
+    std::int64_t z, height, block;
+    std::vector<std::array<std::int64_t, 2>> first;
+  };
+  std::vector<Work> all;
+  double total = 0;
+  for (std::int64_t z0 = 0; z0 < bricks[2]; z0 += slab_bricks_) {
+    const std::int64_t height = std::min(slab_bricks_, bricks[2] - z0);
+    Work large{z0, height, block_bricks_, {}};
+    std::vector<Work> small;
+    for (std::int64_t dz = 0; dz < height; ++dz) small.push_back({z0 + dz, 1, 1, {}});
+    for (std::int64_t y0 = 0; y0 < bricks[1]; y0 += block_bricks_)
+      for (std::int64_t x0 = 0; x0 < bricks[0]; x0 += block_bricks_) {
+        std::int64_t wanted = 0, inside = 0;
+        std::vector<std::array<std::int64_t, 3>> members;
+        for (std::int64_t z = z0; z < z0 + height; ++z)
+          for (std::int64_t y = y0; y < std::min(bricks[1], y0 + block_bricks_); ++y)
+            for (std::int64_t x = x0; x < std::min(bricks[0], x0 + block_bricks_); ++x, ++inside)
+              if (is_selected(x, y, z)) {
+                ++wanted;
+                members.push_back({x, y, z});
+              }
+        if (wanted == 0) continue;
+        if (8 * wanted >= inside) large.first.push_back({x0, y0});
+        else
+          for (const auto& m : members) small[at(m[2] - z0)].first.push_back({m[0], m[1]});
+      }
+    if (!large.first.empty()) all.push_back(std::move(large));
+    for (auto& w : small)
+      if (!w.first.empty()) all.push_back(std::move(w));
+  }
+  for (const Work& w : all) total += static_cast<double>(w.first.size()) * static_cast<double>(w.block * w.block * w.height);
+  double done = 0;
+  for (const Work& w : all) {
+    run_slab(w.z, w.height, w.block, w.first, selected, on_batch, [&](double blocks) {
+      done += blocks * static_cast<double>(w.block * w.block * w.height);
+      report(progress, stage, std::min(1.0, done / total));
+    });
+  }
+}
+
+void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t block_bricks,
+                          const std::vector<std::array<std::int64_t, 2>>& blocks, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                          const std::function<void(double)>& tick) {
+  const Grid& grid = settings_.grid;
+  const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  const std::int64_t cell_z = brick_z * g, cells_z = std::min(bricks_z * g, grid.cells[2] - cell_z), cells_xy = block_bricks * g;
+  const double hz = grid.spacing[2] / static_cast<double>(rate), z_first = grid.origin[2] + static_cast<double>(cell_z) * grid.spacing[2];
+  const std::int64_t nodes_z = cells_z * rate + 1;
+  const auto rows = detector_rows(scan_.geometry, z_first - hz, hz, nodes_z + 2);
+  const BoundTable table = bound_table(state_, upsampler_, scan_, columns_, settings_.u_filter, rows, settings_.rate, cells_z);
+  const UpsampledSlab slab = upsampler_(columns_, rows);
+
+  const std::int64_t nodes = cells_xy * rate + 1, gold_stride = column_stride(nodes_z + 2), stride = column_stride(nodes_z + 17);
+  const std::int64_t per_block = 4 * ((nodes + 2) * (nodes + 2) * gold_stride + 2 * nodes * nodes * stride);
+  const std::int64_t together = std::clamp<std::int64_t>(std::min<std::int64_t>(64 << 20, static_cast<std::int64_t>(state_.memory.left() / 3)) / per_block, 1,
+                                                         static_cast<std::int64_t>(blocks.size()));
+  Batch batch(state_, settings_);
+  batch.bricks_x_ = batch.bricks_y_ = block_bricks;
+  batch.bricks_z_ = bricks_z;
+  batch.nx_ = batch.ny_ = nodes;
+  batch.nz_ = nodes_z;
+  batch.gold_stride_ = gold_stride;
+  batch.stride_ = stride;
+  batch.gold_ = opencl::DeviceArray<float>(state_, count(together * (nodes + 2) * (nodes + 2) * gold_stride + gold_room), "gold block");
+  batch.slack_ = opencl::DeviceArray<float>(state_, count(together * nodes * nodes * stride), "node slack");
+  batch.margin_ = opencl::DeviceArray<float>(state_, count(together * nodes * nodes), "coverage margins");
+  opencl::DeviceArray<float> cells(state_, count(together * nodes * nodes * stride), "cell slack");
+  batch.p_ = opencl::DeviceArray<float>(state_, count(together * cells_xy * cells_xy * stride), "projection bounds of cells");
+  opencl::DeviceArray<cl_int2> last(state_, count(together), "block ends");
+
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_float, cl_float>
+      cell_slack(state_, "gold_bounds", "cell_slack");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_int> node_slack(
+      state_, "gold_bounds", "node_slack");
+
+  const double hx = grid.spacing[0] / static_cast<double>(rate), hy = grid.spacing[1] / static_cast<double>(rate);
+  // Nodes of gold cells that can meet the covered region: within one gold cell's diagonal of it.
+  const float lowest = static_cast<float>(-std::hypot(hx, hy) * (1 + 1e-5));
+  std::int64_t z_low = nodes_z, z_high = -1;
+  for (std::int64_t k = 0; k < nodes_z; ++k)
+    if (coverage_.margin_z(z_first + static_cast<double>(k) * hz) >= -hz * (1 + 1e-9)) {
+      z_low = std::min(z_low, k);
+      z_high = k;
+    }
+
+  for (std::size_t begin = 0; begin < blocks.size(); begin += at(together)) {
+    const std::size_t n = std::min(at(together), blocks.size() - begin);
+    ColumnBlocks gold_columns{nodes + 2, nodes + 2, hx, hy, {}}, node_columns{nodes, nodes, hx, hy, {}};
+    std::vector<cl_int2> ends(n);
+    batch.first_brick_.clear();
+    batch.bricks_.clear();
+    batch.place_.clear();
+    for (std::size_t b = 0; b < n; ++b) {
+      const auto [bx, by] = blocks[begin + b];
+      const double x = grid.origin[0] + static_cast<double>(bx * g) * grid.spacing[0], y = grid.origin[1] + static_cast<double>(by * g) * grid.spacing[1];
+      node_columns.first.push_back({x, y});
+      gold_columns.first.push_back({x - hx, y - hy});
+      ends[b] = {{to_int(std::min(cells_xy, grid.cells[0] - bx * g) * rate), to_int(std::min(cells_xy, grid.cells[1] - by * g) * rate)}};
+      batch.first_brick_.push_back({bx, by, brick_z});
+      const Index3 all{(grid.cells[0] + g - 1) / g, (grid.cells[1] + g - 1) / g, 0};
+      for (std::int64_t dz = 0; dz < bricks_z; ++dz)
+        for (std::int64_t dy = 0; dy < block_bricks; ++dy)
+          for (std::int64_t dx = 0; dx < block_bricks; ++dx) {
+            if (bx + dx >= all[0] || by + dy >= all[1]) continue;
+            const std::int64_t brick = ((brick_z + dz) * all[1] + by + dy) * all[0] + bx + dx;
+            if (!selected[at(brick)]) continue;
+            batch.bricks_.push_back(brick);
+            batch.place_[brick] = {static_cast<std::int64_t>(b), dx, dy, dz};
+          }
+    }
+    last.write(ends);
+    std::vector<float> margins(n * at(nodes * nodes));
+    parallel_for(static_cast<std::int64_t>(n) * nodes, {}, "", [&](std::int64_t row) {
+      const std::size_t b = at(row / nodes);
+      const std::int64_t j = row % nodes;
+      for (std::int64_t i = 0; i < nodes; ++i)
+        margins[at(row * nodes + i)] = static_cast<float>(coverage_.margin(node_columns.first[b][0] + static_cast<double>(i) * hx,
+                                                                           node_columns.first[b][1] + static_cast<double>(j) * hy));
+    });
+    batch.margin_.write(margins);
+
+    back_project(state_, scan_.geometry, slab, gold_columns, settings_.u_filter, batch.gold_);
+    updates_ += static_cast<double>(n) * static_cast<double>((nodes + 2) * (nodes + 2) * (nodes_z + 2) * slab.views);
+    project_bound(state_, scan_, table, node_columns, cells_xy, cells_xy, settings_.rate, stride, batch.p_);
+    const auto window = settings_.window.value_or(std::pair{0.0, 0.0});
+    const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
+    cell_slack({{count((nodes_z + 14) / 16), count(nodes - 1), count(nodes - 1) * n}, local}, cells.buffer(), batch.gold_.buffer(), batch.p_.buffer(), to_int(nodes),
+               to_int(nodes), to_int(nodes_z), to_int(gold_stride), to_int(stride), settings_.rate, to_int(cells_xy), to_int(cells_xy), to_int(static_cast<std::int64_t>(n)),
+               static_cast<cl_float>(settings_.t_constant), settings_.window ? 1 : 0, static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
+    node_slack({{count((nodes_z + 15) / 16), count(nodes), count(nodes) * n}, local}, batch.slack_.buffer(), cells.buffer(), batch.margin_.buffer(), last.buffer(),
+               to_int(nodes), to_int(nodes), to_int(nodes_z), to_int(stride), to_int(static_cast<std::int64_t>(n)), lowest, to_int(z_low), to_int(z_high));
+    on_batch(batch);
+    tick(static_cast<double>(n));
+  }
+}
+
+std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const { return place_.at(brick); }
+
+std::vector<BrickErrors> GoldStream::Batch::classify() {
+  const std::int64_t rate = settings_.rate, n = static_cast<std::int64_t>(blocks());
+  const int levels = std::countr_zero(static_cast<unsigned>(rate)) + 1;
+  const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> interpolate(state_, "classify", "interpolate_columns", defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> level_error(
+      state_, "classify", "level_error", defines);
+  const std::uint64_t per_level = count(n * bricks_x_ * bricks_y_ * bricks_z_);
+  std::vector<std::vector<cl_int>> errors;
+  const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
+  for (int level = 0; level < levels; ++level) {
+    const std::int64_t spacing = rate >> level, cx = (nx_ - 1) / spacing + 1, cy = (ny_ - 1) / spacing + 1;
+    opencl::DeviceArray<float> along(state_, count(n * cx * cy * stride_), "interpolated columns");
+    opencl::DeviceArray<cl_int> error(state_, per_level, "brick errors");
+    error.fill(-1);
+    interpolate({{count((nz_ + 15) / 16), count(cx), count(cy * n)}, local}, along.buffer(), gold_.buffer(), to_int(nx_), to_int(ny_), to_int(nz_), to_int(gold_stride_),
+                to_int(stride_), to_int(spacing), to_int(n));
+    level_error({{count((nz_ + 15) / 16), count(nx_), count(ny_ * n)}, local}, error.buffer(), along.buffer(), gold_.buffer(), slack_.buffer(), to_int(nx_), to_int(ny_),
+                to_int(nz_), to_int(gold_stride_), to_int(stride_), to_int(spacing), to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+    errors.push_back(error.to_host());
+  }
+  std::vector<BrickErrors> out;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    BrickErrors e;
+    for (const auto& level : errors) {
+      const cl_int bits = level[at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x)];
+      e.by_level.push_back(bits < 0 ? -1.0f : std::bit_cast<float>(bits));
+    }
+    out.push_back(std::move(e));
+  }
+  return out;
+}
+
+std::vector<std::pair<float, float>> GoldStream::Batch::largest_p() {
+  const auto p = p_.to_host();
+  const std::int64_t g = settings_.granularity, rate = settings_.rate, cells_x = bricks_x_ * g, cells_y = bricks_y_ * g;
+  std::vector<std::pair<float, float>> out;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    std::pair<float, float> range{0.0f, INFINITY};
+    for (std::int64_t j = y * g; j < (y + 1) * g; ++j)
+      for (std::int64_t i = x * g; i < (x + 1) * g; ++i)
+        for (std::int64_t k = z * g; k < (z + 1) * g && k * rate < nz_ - 1; ++k) {
+          const float v = p[at(((b * cells_y + j) * cells_x + i) * stride_ + k * rate)];
+          range = {std::max(range.first, v), std::min(range.second, v)};
+        }
+    out.push_back(range);
+  }
+  return out;
+}
+
+std::vector<float> GoldStream::Batch::extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
+  if (tiles.empty()) return {};
+  const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  std::vector<TileRequest> requests;
+  std::uint64_t total = 0;
+  std::int64_t largest = 0;
+  for (const auto& [brick, level] : tiles) {
+    const auto [b, x, y, z] = place(brick);
+    const auto& first = first_brick_[at(b)];
+    TileRequest r{};
+    r.block = to_int(b);
+    r.node_x = to_int(x * g * rate);
+    r.node_y = to_int(y * g * rate);
+    r.node_z = to_int(z * g * rate);
+    r.spacing_x = to_int(rate >> level[2]);
+    r.spacing_y = to_int(rate >> level[1]);
+    r.spacing_z = to_int(rate >> level[0]);
+    r.side_x = to_int((g << level[2]) + 1);
+    r.side_y = to_int((g << level[1]) + 1);
+    r.side_z = to_int((g << level[0]) + 1);
+    r.last_x = to_int(std::min(nx_ - 1, (settings_.grid.cells[0] - first[0] * g) * rate));
+    r.last_y = to_int(std::min(ny_ - 1, (settings_.grid.cells[1] - first[1] * g) * rate));
+    r.last_z = to_int(nz_ - 1);
+    r.offset = total;
+    const std::int64_t size = std::int64_t{r.side_x} * r.side_y * r.side_z;
+    total += count(size);
+    largest = std::max(largest, size);
+    requests.push_back(r);
+  }
+  const opencl::DeviceArray<TileRequest> device_requests(state_, std::span<const TileRequest>(requests), "tile requests");
+  const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
+  const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(state_, "classify", "extract_tiles", defines);
+  kernel({{count(largest), requests.size(), 1}, {64, 1, 1}}, out.buffer(), gold_.buffer(), margin_.buffer(), device_requests.buffer(),
+         to_int(static_cast<std::int64_t>(requests.size())), to_int(nx_), to_int(ny_), to_int(gold_stride_),
+         static_cast<cl_float>(-kept_margin(settings_.grid, 1)));
+  return out.to_host();
+}
+
+std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected) {
+  const std::uint64_t n = blocks(), results = n * count(bricks_x_ * bricks_y_ * bricks_z_);
+  opencl::DeviceArray<cl_int> total(state_, results, "brick totals"), error(state_, results, "brick errors"), violated(state_, results, "violations");
+  total.fill(-1);
+  error.fill(0);
+  violated.fill(0);
+  std::vector<cl_int4> firsts;
+  for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
+  const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+      kernel(state_, "verify", "verify_nodes");
+  const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
+  kernel({{count(bricks_x_) * side, count(bricks_y_) * side, count(bricks_z_) * n}, {side, 1, 1}}, total.buffer(), error.buffer(), violated.buffer(),
+         field.samples.buffer(), field.bricks.buffer(), field.grid, gold_.buffer(), slack_.buffer(), first.buffer(), selected.buffer(), to_int(nx_), to_int(ny_),
+         to_int(gold_stride_), to_int(stride_), settings_.rate, to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)), tolerance);
+  const auto totals = total.to_host(), errors = error.to_host(), bits = violated.to_host();
+  std::vector<BrickMeasure> out;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+    out.push_back({brick, totals[i] < 0 ? -1.0f : std::bit_cast<float>(totals[i]), std::bit_cast<float>(errors[i]), static_cast<std::uint32_t>(bits[i])});
+  }
+  return out;
+}
+
+}  // namespace vdvr

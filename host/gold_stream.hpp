@@ -1,0 +1,141 @@
+// Gold, block by block: F on the grid refined by the gold rate, with the node slack T + P beside it, never whole in memory
+// (docs/error-bounds.md). Called by plan.cpp, build.cpp and verify.cpp.
+//
+// A slab is a run of base cells in z whose filtered rows are on the device; blocks are columns of base cells inside it. A full
+// pass uses large blocks, a repair or a sampled verification blocks of one brick; the code is the same.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/back_project.hpp"
+#include "host/brick_layout.hpp"
+#include "host/coverage.hpp"
+#include "host/projection_bounds.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/progress.hpp"
+
+namespace vdvr {
+
+struct GoldSettings {
+  Grid grid;
+  int granularity = 4;
+  int rate = 8;
+  int upsampling = 8;
+  std::string u_filter = "linear";
+  double t_constant = 0;  ///< gold_remainder + 1.5 times the arithmetic bound
+  std::optional<std::pair<double, double>> window;
+};
+
+/// Result of the node test per brick of a block, [level] -> largest |interpolant - gold| + slack; negative: nothing tested.
+struct BrickErrors {
+  std::vector<float> by_level;
+};
+
+/// What one brick measured against gold.
+struct BrickMeasure {
+  std::int64_t brick = 0;
+  float total = -1;      ///< largest |V - gold| + T + P; negative: no tested node
+  float error = 0;       ///< largest |V - gold|
+  std::uint32_t violated = 0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
+};
+
+/// A stored field on the device, for the verification kernel.
+struct DeviceField {
+  DeviceField(opencl::State& state, const MixedVolume& volume);
+  opencl::DeviceArray<float> samples;
+  opencl::DeviceArray<VdvrBrick> bricks;
+  VdvrGrid grid;
+};
+
+class GoldStream {
+ public:
+  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const GoldSettings& settings);
+  ~GoldStream();
+
+  /// The blocks of one batch on the device, as handed to the callback.
+  class Batch;
+  using OnBatch = std::function<void(Batch&)>;
+
+  /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a block without a
+  /// selected brick is skipped, and a few selected bricks are streamed as blocks of one brick.
+  void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress, const std::string& stage);
+
+  /// fp32 error bound of any gold sample.
+  [[nodiscard]] double arithmetic() const { return arithmetic_; }
+  [[nodiscard]] const GoldSettings& settings() const { return settings_; }
+  /// Sample updates of back-projection so far.
+  [[nodiscard]] double updates() const { return updates_; }
+  [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
+
+ private:
+  struct Slab;
+  void run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t block_bricks,
+                const std::vector<std::array<std::int64_t, 2>>& blocks, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                const std::function<void(double)>& tick);
+
+  opencl::State& state_;
+  const FilteredScan& scan_;
+  Upsampler& upsampler_;
+  GoldSettings settings_;
+  Coverage coverage_;
+  UpsampledColumns columns_;
+  std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
+  double arithmetic_ = 0, updates_ = 0;
+};
+
+class GoldStream::Batch {
+ public:
+  /// Bricks of the batch that lie in the grid and are selected.
+  [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
+
+  /// The node test at levels 0 .. log2(rate) - 1 (isotropic), per brick of bricks(); level log2(rate), gold itself, last:
+  /// its entry is the slack alone.
+  std::vector<BrickErrors> classify();
+
+  /// Per brick of bricks(): the largest and the smallest P of its base cells.
+  std::vector<std::pair<float, float>> largest_p();
+
+  /// Calls visit(node index x, y, z in the brick, gold, slack) for every node of one closed brick; reads the block back.
+  template <class Visit>
+  void for_each_node(std::int64_t brick, Visit&& visit) const {
+    const auto [b, x, y, z] = place(brick);
+    const std::vector<float> gold = gold_.to_host(), slack = slack_.to_host();
+    const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
+    for (std::int64_t k = 0; k <= side && z * side + k < nz_; ++k)
+      for (std::int64_t j = 0; j <= side; ++j)
+        for (std::int64_t i = 0; i <= side; ++i) {
+          const std::int64_t nx = x * side + i, ny = y * side + j, nz = z * side + k;
+          visit(Index3{i, j, k}, gold[static_cast<std::size_t>(((b * (ny_ + 2) + ny + 1) * (nx_ + 2) + nx + 1) * gold_stride_ + nz + 1)],
+                slack[static_cast<std::size_t>(((b * ny_ + ny) * nx_ + nx) * stride_ + nz)]);
+        }
+  }
+
+  /// Gold samples of the requested tiles, in the order asked, concatenated: float [z][y][x] each.
+  std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
+
+  /// Measures a stored field on every selected brick.
+  std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
+
+ private:
+  friend class GoldStream;
+  Batch(opencl::State& state, const GoldSettings& settings) : state_(state), settings_(settings) {}
+  [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
+  [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }
+
+  opencl::State& state_;
+  const GoldSettings& settings_;
+  std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
+  std::int64_t nx_ = 0, ny_ = 0, nz_ = 0, gold_stride_ = 0, stride_ = 0;
+  std::vector<std::array<std::int64_t, 3>> first_brick_;
+  std::vector<std::int64_t> bricks_;
+  std::map<std::int64_t, std::array<std::int64_t, 4>> place_;
+  opencl::DeviceArray<float> gold_, slack_, margin_, p_;
+};
+
+}  // namespace vdvr

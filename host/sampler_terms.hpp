@@ -1,0 +1,29 @@
+// What the two samplers can add to the error of a stored field (docs/error-bounds.md, section on samplers).
+// Called by build.cpp and verify.cpp.
+#pragma once
+
+#include <optional>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/raycast.hpp"
+
+namespace vdvr {
+
+/// Largest neighbour differences of the stored samples per axis x, y, z: inside any brick at its own spacing, and per base cell.
+struct FieldSlopes {
+  std::array<double, 3> per_sample{0, 0, 0};
+  std::array<double, 3> per_cell{0, 0, 0};
+  double magnitude = 0;  ///< largest |sample|
+};
+/// Cost: one pass over all samples that a brick can interpolate, over all cores.
+FieldSlopes field_slopes(const MixedVolume& volume);
+
+/// buffer: fp32 rounding of the coordinate and of seven interpolations. image3d: the texture unit's weights and products, as
+/// probed; absent where the device has no such sampler.
+SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe, std::int64_t atlas_length);
+
+/// The longest side of the image atlas that a volume may be packed into.
+std::int64_t longest_atlas(const DeviceInfo& device);
+
+}  // namespace vdvr
