@@ -224,9 +224,7 @@ void choose_center(const io::RawScan& raw, const ScanOptions& options, Projectio
   }
 }
 
-}  // namespace
-
-ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
   bool folder = false;
   const io::RawScan raw = open_scan(path, options, folder);
   ProjectionSet scan;
@@ -246,6 +244,16 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
                                 sha256_of_file(*options.angles_file));
   choose_center(raw, options, scan);
   return scan;
+}
+
+}  // namespace
+
+ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+  try {
+    return read_whole(path, options, progress);
+  } catch (const std::bad_alloc&) {
+    throw ResourceError(path.string() + ": not enough memory to read the scan");
+  }
 }
 
 void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {

@@ -124,9 +124,19 @@ std::vector<std::int64_t> all_of(const Stack& stack) {
   return numbers;
 }
 
+// How many numbers a list holds; looked at before it is read, since a damaged header may claim any.
+std::int64_t count_of(const Hdf5Dataset& data) {
+  return static_cast<std::int64_t>(checked_bytes(data.shape(), 1, data.name()));
+}
+
 // Angles in degrees by the dataset's units; degrees where it has none, as both formats prescribe.
-std::vector<double> read_angles(const Hdf5File& file, const std::string& object) {
+std::vector<double> read_angles(const Hdf5File& file, const std::string& object, const Stack& frames) {
   const Hdf5Dataset data = file.dataset(object);
+  if (count_of(data) != frames.count)
+    throw FileError(
+        fmt::format("{}: {} angles for {} frames of {}; one per frame is needed (data in sinogram order must "
+                    "say so with an attribute axes = \"y:theta:x\")",
+                    data.name(), count_of(data), frames.count, frames.data->name()));
   std::vector<double> angles = data.read_all();
   const auto units = file.text_attribute(object, "units");
   const std::string unit = units && !units->empty() ? units->front() : "degrees";
@@ -136,15 +146,6 @@ std::vector<double> read_angles(const Hdf5File& file, const std::string& object)
     throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name(), unit));
   }
   return angles;
-}
-
-void require_angles(std::size_t angles, std::int64_t frames, const std::string& name,
-                    const std::string& data) {
-  if (static_cast<std::int64_t>(angles) != frames)
-    throw FileError(
-        fmt::format("{}: {} angles for {} frames of {}; one per frame is needed (data in sinogram order must "
-                    "say so with an attribute axes = \"y:theta:x\")",
-                    name, angles, frames, data));
 }
 
 void require_same_detector(const Stack& a, const Stack& b) {
@@ -165,8 +166,7 @@ RawScan open_data_exchange(const Hdf5File& file) {
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
   scan.projections = frames_of(data, all_of(data), "projection");
-  scan.theta_deg = read_angles(file, "/exchange/theta");
-  require_angles(scan.theta_deg.size(), data.count, file.path() + ": /exchange/theta", data.data->name());
+  scan.theta_deg = read_angles(file, "/exchange/theta", data);
   scan.center = file.number_attribute(object, "center");
   scan.pitch_u = file.number_attribute(object, "pitch_u").value_or(1);
   scan.pitch_v = file.number_attribute(object, "pitch_v").value_or(1);
@@ -237,12 +237,12 @@ void read_pixel_size(const Hdf5File& file, const std::string& detector, RawScan&
     const auto units = file.text_attribute(object, "units");
     return units && !units->empty() ? units->front() : std::string("m");
   };
-  const auto size_u = file.dataset(x).read_all(), size_v = file.dataset(y).read_all();
-  if (size_u.size() != 1 || size_v.size() != 1 || unit_of(x) != unit_of(y))
+  const Hdf5Dataset size_u = file.dataset(x), size_v = file.dataset(y);
+  if (count_of(size_u) != 1 || count_of(size_v) != 1 || unit_of(x) != unit_of(y))
     throw FileError(
         fmt::format("{}: x_pixel_size and y_pixel_size must be one number each, in one unit", file.path()));
-  scan.pitch_u = size_u[0];
-  scan.pitch_v = size_v[0];
+  scan.pitch_u = size_u.read_all()[0];
+  scan.pitch_v = size_v.read_all()[0];
   scan.unit = unit_of(x);
 }
 
@@ -254,15 +254,13 @@ RawScan open_nxtomo(const Hdf5File& file, const TomoEntry& where) {
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
   const Hdf5Dataset key_data = file.dataset(where.detector + "/image_key");
+  if (count_of(key_data) != data.count)
+    throw FileError(fmt::format("{}: {} keys for {} frames of {}", key_data.name(), count_of(key_data),
+                                data.count, data.data->name()));
   const std::vector<double> keys = key_data.read_all();
-  if (static_cast<std::int64_t>(keys.size()) != data.count)
-    throw FileError(fmt::format("{}: {} keys for {} frames of {}", key_data.name(), keys.size(), data.count,
-                                data.data->name()));
   std::string sample = child_of(file, where.entry, "NXsample", "sample");
   if (sample.empty()) sample = where.entry + "/sample";
-  const std::vector<double> angles = read_angles(file, sample + "/rotation_angle");
-  require_angles(angles.size(), data.count, file.path() + ": " + sample + "/rotation_angle",
-                 data.data->name());
+  const std::vector<double> angles = read_angles(file, sample + "/rotation_angle", data);
   std::array<std::vector<std::int64_t>, 4> numbers;
   for (std::size_t k = 0; k < keys.size(); ++k) {
     if (!(keys[k] == 0 || keys[k] == 1 || keys[k] == 2 || keys[k] == 3))

@@ -61,7 +61,12 @@ class Header {
     }
     return !text.empty();
   }
-  std::uint64_t position() { return static_cast<std::uint64_t>(std::max<std::streamoff>(file_.tellg(), 0)); }
+  /// Of the next byte; the end of the file where the header took all of it.
+  std::uint64_t position() {
+    std::error_code error;
+    const std::streamoff at = file_.tellg();
+    return at >= 0 ? static_cast<std::uint64_t>(at) : fs::file_size(path_, error);
+  }
 
   [[noreturn]] void fail(const std::string& what) const { throw FileError(path_.string() + ": " + what); }
   void set(const std::string& key, const std::string& value) { fields_[key] = value; }
