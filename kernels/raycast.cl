@@ -23,6 +23,13 @@
 #endif
 #define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X, VDVR_GROUP_Y, 1)))
 
+// Calls in the sampling loop cost as much as a sample; compilers without the attribute inline anyway.
+#if defined(__clang__) || defined(__GNUC__)
+#define RAY_INLINE inline __attribute__((always_inline))
+#else
+#define RAY_INLINE inline
+#endif
+
 #include "shared/mixed_sampler.h"
 #include "shared/mixed_image.h"
 #include "shared/raycast_params.h"
@@ -33,6 +40,10 @@
 #define FIELD __global const float* restrict field
 #endif
 #define BRICKS __global const VdvrBrick* restrict bricks
+
+// Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
+#define LEAST(a, b) ((a) < (b) ? (a) : (b))
+#define MOST(a, b) ((a) > (b) ? (a) : (b))
 
 // How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a grid of 8192
 // cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration often.
@@ -57,15 +68,21 @@ typedef struct {
   float3 low, high;
 } OpenBrick;
 
-VDVR_INLINE float3 grid_cells(VdvrGrid grid) {
+RAY_INLINE float3 grid_cells(VdvrGrid grid) {
   return (float3)((float)grid.cells_x, (float)grid.cells_y, (float)grid.cells_z);
 }
 
-VDVR_INLINE ulong brick_index(VdvrGrid grid, int x, int y, int z) {
+RAY_INLINE float3 clamp_to_grid(float3 c, VdvrGrid grid) {
+  const float3 cells = grid_cells(grid);
+  c = LEAST(c, cells);
+  return MOST(c, (float3)(0.0f));
+}
+
+RAY_INLINE ulong brick_index(VdvrGrid grid, int x, int y, int z) {
   return ((ulong)z * (ulong)grid.bricks_y + (ulong)y) * (ulong)grid.bricks_x + (ulong)x;
 }
 
-VDVR_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c) {
+RAY_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c) {
 #ifdef VDVR_SAMPLER_IMAGE3D
   return vdvr_image_sample_in_brick(field, &b->record, grid, b->x, b->y, b->z, c.x, c.y, c.z);
 #else
@@ -76,12 +93,12 @@ VDVR_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c
 #endif
 }
 
-VDVR_INLINE int3 brick_at(VdvrGrid grid, float3 c) {
+RAY_INLINE int3 brick_at(VdvrGrid grid, float3 c) {
   return (int3)(vdvr_brick_of(c.x, grid.granularity, grid.bricks_x), vdvr_brick_of(c.y, grid.granularity, grid.bricks_y),
                 vdvr_brick_of(c.z, grid.granularity, grid.bricks_z));
 }
 
-VDVR_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
+RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
   OpenBrick o;
   o.x = b.x;
   o.y = b.y;
@@ -96,12 +113,12 @@ VDVR_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
   return o;
 }
 
-VDVR_INLINE int is_inside(const OpenBrick* b, float3 c) {
+RAY_INLINE int is_inside(const OpenBrick* b, float3 c) {
   return c.x >= b->low.x && c.x < b->high.x && c.y >= b->low.y && c.y < b->high.y && c.z >= b->low.z && c.z < b->high.z;
 }
 
 // The field anywhere: vdvr_sample, or its image form.
-VDVR_INLINE float sample_anywhere(FIELD, BRICKS, VdvrGrid grid, float3 c) {
+RAY_INLINE float sample_anywhere(FIELD, BRICKS, VdvrGrid grid, float3 c) {
 #ifdef VDVR_SAMPLER_IMAGE3D
   const OpenBrick b = open_brick(bricks, grid, brick_at(grid, c));
   return sample_open(field, &b, grid, c);
@@ -110,14 +127,14 @@ VDVR_INLINE float sample_anywhere(FIELD, BRICKS, VdvrGrid grid, float3 c) {
 #endif
 }
 
-VDVR_INLINE float sample_near(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c) {
+RAY_INLINE float sample_near(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c) {
   return is_inside(b, c) ? sample_open(field, b, grid, c) : sample_anywhere(field, bricks, grid, c);
 }
 
 // Density per length along the world axes; one-sided at the box's faces, where the reach is cut.
-VDVR_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c, float3 cells_per_length) {
-  const float3 lo = fmax(c - GRADIENT_REACH, (float3)(0.0f));
-  const float3 hi = fmin(c + GRADIENT_REACH, grid_cells(grid));
+RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c, float3 cells_per_length) {
+  const float3 lo = MOST(c - GRADIENT_REACH, (float3)(0.0f));
+  const float3 hi = LEAST(c + GRADIENT_REACH, grid_cells(grid));
   const float3 before = (float3)(sample_near(field, bricks, grid, b, (float3)(lo.x, c.y, c.z)),
                                  sample_near(field, bricks, grid, b, (float3)(c.x, lo.y, c.z)),
                                  sample_near(field, bricks, grid, b, (float3)(c.x, c.y, lo.z)));
@@ -128,17 +145,17 @@ VDVR_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b,
 }
 
 // Phong with a light at the eye, two-sided. Where the gradient is weak its direction is noise: shading fades out there.
-VDVR_INLINE float3 shade(float3 rgb, float3 gradient, float3 view, float gradient_full) {
+RAY_INLINE float3 shade(float3 rgb, float3 gradient, float3 view, float gradient_full) {
   const float magnitude = sqrt(dot(gradient, gradient));
-  const float strength = gradient_full > 0.0f ? fmin(magnitude / gradient_full, 1.0f) : (magnitude > 0.0f ? 1.0f : 0.0f);
-  const float facing = magnitude > 0.0f ? fmin(fabs(dot(gradient, view)) / magnitude, 1.0f) : 1.0f;
+  const float strength = gradient_full > 0.0f ? LEAST(magnitude / gradient_full, 1.0f) : (magnitude > 0.0f ? 1.0f : 0.0f);
+  const float facing = magnitude > 0.0f ? LEAST(fabs(dot(gradient, view)) / magnitude, 1.0f) : 1.0f;
   const float f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
   const float lit = 0.25f + 0.75f * facing;
   return rgb * (1.0f + strength * (lit - 1.0f)) + 0.2f * strength * f8 * f8 * f8;
 }
 
 // The camera's ray through the centre of pixel (px, py), clipped. Returns 0 where it misses the box.
-VDVR_INLINE int cast_ray(const VdvrRaycast* p, VdvrGrid grid, int px, int py, Ray* ray) {
+RAY_INLINE int cast_ray(const VdvrRaycast* p, VdvrGrid grid, int px, int py, Ray* ray) {
   const float across = (2.0f * ((float)px + 0.5f)) / (float)p->width - 1.0f;
   const float above = 1.0f - (2.0f * ((float)py + 0.5f)) / (float)p->height;
   const float3 world = (float3)(p->forward_x, p->forward_y, p->forward_z) +
@@ -152,39 +169,40 @@ VDVR_INLINE int cast_ray(const VdvrRaycast* p, VdvrGrid grid, int px, int py, Ra
   d = select(d, copysign(tiny, d), fabs(d) < tiny);
   ray->inverse = 1.0f / d;
   const float3 a = -eye * ray->inverse, b = (grid_cells(grid) - eye) * ray->inverse;
-  const float3 near = fmin(a, b), far = fmax(a, b);
-  ray->first = fmax(fmax(fmax(near.x, near.y), near.z), 0.0f);
-  ray->length = fmin(fmin(far.x, far.y), far.z) - ray->first;
-  ray->entry = clamp(eye + ray->first * ray->direction, (float3)(0.0f), grid_cells(grid));
+  const float3 near = LEAST(a, b), far = MOST(a, b);
+  ray->first = MOST(MOST(MOST(near.x, near.y), near.z), 0.0f);
+  ray->length = LEAST(LEAST(far.x, far.y), far.z) - ray->first;
+  ray->entry = clamp_to_grid(eye + ray->first * ray->direction, grid);
   return ray->length > 0.0f;
 }
 
-VDVR_INLINE float3 position_at(const Ray* ray, VdvrGrid grid, float t) {
-  return clamp(ray->entry + t * ray->direction, (float3)(0.0f), grid_cells(grid));
+RAY_INLINE float3 position_at(const Ray* ray, VdvrGrid grid, float t) {
+  return clamp_to_grid(ray->entry + t * ray->direction, grid);
 }
 
 // Where the ray leaves the cube of bricks [b - radius, b + radius], a margin before its faces.
-VDVR_INLINE float leave_bricks(const Ray* ray, VdvrGrid grid, int3 b, int radius) {
+RAY_INLINE float leave_bricks(const Ray* ray, VdvrGrid grid, int3 b, int radius) {
   const float3 low = convert_float3((b - radius) * grid.granularity) + LEAP_MARGIN;
   const float3 high = convert_float3((b + radius + 1) * grid.granularity) - LEAP_MARGIN;
-  const float3 t = fmax((low - ray->entry) * ray->inverse, (high - ray->entry) * ray->inverse);
-  return fmin(fmin(t.x, t.y), t.z);
+  const float3 t = MOST((low - ray->entry) * ray->inverse, (high - ray->entry) * ray->inverse);
+  return LEAST(LEAST(t.x, t.y), t.z);
 }
 
 // The first sample index whose position at offset (index + shift) * step is not before t, and at least k + 1.
-VDVR_INLINE int leap_to(float t, float inverse_step, float shift, int k, int end) {
+RAY_INLINE int leap_to(float t, float inverse_step, float shift, int k, int end) {
   const float next = ceil(t * inverse_step - shift);
   return next >= (float)end ? end : max(k + 1, (int)next);
 }
 
-VDVR_INLINE float4 look_up(__global const float4* restrict table, const VdvrRaycast* p, float value) {
-  const float x = clamp((value - p->table_lo) * p->table_scale, 0.0f, (float)(p->table_size - 1));
+RAY_INLINE float4 look_up(__global const float4* restrict table, const VdvrRaycast* p, float value) {
+  const float at = (value - p->table_lo) * p->table_scale, last = (float)(p->table_size - 1);
+  const float x = at > 0.0f ? LEAST(at, last) : 0.0f;
   const int i = min((int)x, p->table_size - 2);
   const float f = x - (float)i;
   return (1.0f - f) * table[i] + f * table[i + 1];
 }
 
-VDVR_INLINE float3 background(const VdvrRaycast* p, int py) {
+RAY_INLINE float3 background(const VdvrRaycast* p, int py) {
   const float f = ((float)py + 0.5f) / (float)p->height;
   return (1.0f - f) * (float3)(p->background_top[0], p->background_top[1], p->background_top[2]) +
          f * (float3)(p->background_bottom[0], p->background_bottom[1], p->background_bottom[2]);
@@ -251,7 +269,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
     const int end = (int)ceil(ray.length * p.inverse_step) + 1;
     int k = 0;
     while (k < end && !hit) {
-      float t = fmin((float)k * p.step, ray.length);
+      float t = LEAST((float)k * p.step, ray.length);
       float3 c = position_at(&ray, grid, t);
       const int3 b = brick_at(grid, c);
       const int away = p.skip && !was_inside ? distance[brick_index(grid, b.x, b.y, b.z)] : 0;
@@ -271,7 +289,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
         }
         was_inside = inside;
         ++k;
-        t = fmin((float)k * p.step, ray.length);
+        t = LEAST((float)k * p.step, ray.length);
         c = position_at(&ray, grid, t);
       } while (k < end && is_inside(&brick, c));
     }
@@ -322,7 +340,7 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       const OpenBrick brick = open_brick(bricks, grid, b);
       do {
-        largest = fmax(largest, sample_open(field, &brick, grid, c));
+        largest = MOST(largest, sample_open(field, &brick, grid, c));
         ++samples;
         ++k;
         c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
