@@ -19,7 +19,7 @@ struct RaycastTuning {
 
 struct FloatPicture {
   /// [y][x]: r, g, b display values; then dvr: opacity; iso: distance from the eye in world units, -1 where
-  /// nothing is hit; mip: the maximum; slice: the field.
+  /// nothing is hit; mip: the maximum, -infinity where the box is missed; slice: the field.
   std::vector<cl_float4> pixels;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;
