@@ -297,7 +297,8 @@ opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTun
   return {{"VDVR_GRANULARITY", std::to_string(v.sampler_grid.granularity)},
           {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
-          {"VDVR_GROUP_Y", std::to_string(tuning.group_y)}};
+          {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
+          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"}};
 }
 
 void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,9 +13,10 @@
 
 namespace vdvr {
 
-/// Pixels of one work-group; never changes a picture.
+/// Never changes a picture.
 struct RaycastTuning {
-  int group_x = 8, group_y = 8;
+  int group_x = 8, group_y = 8;       ///< pixels of one work-group
+  std::optional<bool> wide_gradient;  ///< gradients in vectors of eight; default: on CPUs
 };
 
 struct FloatPicture {

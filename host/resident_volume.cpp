@@ -108,6 +108,25 @@ void set_texels(const MixedVolume& v, const AtlasLayout& layout, std::vector<Vdv
   }
 }
 
+// Marks bricks that read the base, as those across their faces do. Kernels address the base by 32-bit offsets
+// there.
+void mark_base_around(const MixedVolume& v, std::vector<VdvrBrick>& records) {
+  if (v.grid.sample_count() > std::numeric_limits<std::int32_t>::max()) return;
+  const Index3 b = v.bricks();
+  const auto reads_base = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+    const bool inside = x >= 0 && x < b[0] && y >= 0 && y < b[1] && z >= 0 && z < b[2];
+    return !inside || v.level[static_cast<std::size_t>((z * b[1] + y) * b[0] + x)] == LevelTriple{0, 0, 0};
+  };
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const auto n = static_cast<std::int64_t>(i);
+    const std::int64_t x = n % b[0], y = n / b[0] % b[1], z = n / (b[0] * b[1]);
+    const bool all = reads_base(x, y, z) && reads_base(x - 1, y, z) && reads_base(x + 1, y, z) &&
+                     reads_base(x, y - 1, z) && reads_base(x, y + 1, z) && reads_base(x, y, z - 1) &&
+                     reads_base(x, y, z + 1);
+    records[i].base_around = all ? 1 : 0;
+  }
+}
+
 void check_sizes(const MixedVolume& v) {
   for (std::size_t a = 0; a < 3; ++a) {
     // Cell coordinates are fp32, and the kernels' leaps rely on rounding below 2^-8 cell.
@@ -208,6 +227,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
   left.bytes = std::min(left.bytes, state->memory.left());
   layout = pack_atlas(v, left);
   if (layout.fits) set_texels(v, layout, records);
+  mark_base_around(v, records);
   bricks = opencl::DeviceArray<VdvrBrick>(*state, std::span<const VdvrBrick>(records), "brick records");
 
   host_ranges = brick_ranges(v, records, offsets_);

@@ -21,6 +21,11 @@
 #ifndef VDVR_GROUP_Y
 #define VDVR_GROUP_Y 8
 #endif
+// Tuning: the six samples of a gradient as one vector of eight lanes. Pays where a work-item is a scalar thread (CPUs); same
+// operations in the same order, so the same bits. Needs the buffer sampler.
+#ifndef VDVR_WIDE_GRADIENT
+#define VDVR_WIDE_GRADIENT 0
+#endif
 #define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X, VDVR_GROUP_Y, 1)))
 
 // Calls in the sampling loop cost as much as a sample; compilers without the attribute inline anyway.
@@ -131,10 +136,62 @@ RAY_INLINE float sample_near(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, f
   return is_inside(b, c) ? sample_open(field, b, grid, c) : sample_anywhere(field, bricks, grid, c);
 }
 
+#if VDVR_WIDE_GRADIENT && defined(VDVR_SAMPLER_BUFFER)
+#define GRADIENT_IS_WIDE 1
+
+// Local coordinates of six points along one axis, as vdvr_local; the points lie in the region.
+RAY_INLINE int8 local8(float8 c, float first, float scale, int last, float8* fraction) {
+  const float8 r = (c - first) * scale;
+  int8 i = convert_int8(r);
+  const int8 top = (int8)(last - 1);
+  i = i > top ? top : i;
+  *fraction = r - convert_float8(i);
+  return i;
+}
+
+RAY_INLINE float8 load6(__global const float* s, int8 i) {
+  return (float8)(s[i.s0], s[i.s1], s[i.s2], s[i.s3], s[i.s4], s[i.s5], 0.0f, 0.0f);
+}
+
+RAY_INLINE float8 lerp8(float8 a, float8 b, float8 t) { return (1.0f - t) * a + t * b; }
+
+// vdvr_trilinear at six points (lanes 0 to 5) of one region: an open brick, or, where the bricks around read the base too,
+// the whole base, whose cells give the same bits in global coordinates as in the brick's.
+RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, const OpenBrick* b, float8 x, float8 y,
+                          float8 z) {
+  const int base = (int)b->record.base_around;
+  const int fx = base ? 0 : b->x * grid.granularity, fy = base ? 0 : b->y * grid.granularity;
+  const int fz = base ? 0 : b->z * grid.granularity;
+  const int wide = base ? INT_MAX : grid.granularity;
+  const uint lx = b->record.level_x, ly = b->record.level_y, lz = b->record.level_z;
+  float8 tx, ty, tz;
+  const int8 ix = local8(x, (float)fx, (float)(1 << lx), min(grid.cells_x - fx, wide) << lx, &tx);
+  const int8 iy = local8(y, (float)fy, (float)(1 << ly), min(grid.cells_y - fy, wide) << ly, &ty);
+  const int8 iz = local8(z, (float)fz, (float)(1 << lz), min(grid.cells_z - fz, wide) << lz, &tz);
+  const int sy = (int)b->record.stride_y, sz = (int)b->record.stride_z;
+  const int8 i = iz * sz + iy * sy + ix;
+  __global const float* s = field + (base ? 0 : b->record.offset);
+  __global const float* t = s + sz;
+  const float8 p = lerp8(lerp8(load6(s, i), load6(s + 1, i), tx), lerp8(load6(s + sy, i), load6(s + sy + 1, i), tx), ty);
+  const float8 q = lerp8(lerp8(load6(t, i), load6(t + 1, i), tx), lerp8(load6(t + sy, i), load6(t + sy + 1, i), tx), ty);
+  return lerp8(p, q, tz);
+}
+#else
+#define GRADIENT_IS_WIDE 0
+#endif
+
 // Density per length along the world axes; one-sided at the box's faces, where the reach is cut.
 RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c, float3 cells_per_length) {
   const float3 lo = MOST(c - GRADIENT_REACH, (float3)(0.0f));
   const float3 hi = LEAST(c + GRADIENT_REACH, grid_cells(grid));
+#if GRADIENT_IS_WIDE
+  if (b->record.base_around || (all(lo >= b->low) && all(hi < b->high))) {
+    const float8 v = sample6(field, grid, b, (float8)(lo.x, hi.x, c.x, c.x, c.x, c.x, c.x, c.x),
+                             (float8)(c.y, c.y, lo.y, hi.y, c.y, c.y, c.y, c.y),
+                             (float8)(c.z, c.z, c.z, c.z, lo.z, hi.z, c.z, c.z));
+    return ((float3)(v.s1, v.s3, v.s5) - (float3)(v.s0, v.s2, v.s4)) / (hi - lo) * cells_per_length;
+  }
+#endif
   const float3 before = (float3)(sample_near(field, bricks, grid, b, (float3)(lo.x, c.y, c.z)),
                                  sample_near(field, bricks, grid, b, (float3)(c.x, lo.y, c.z)),
                                  sample_near(field, bricks, grid, b, (float3)(c.x, c.y, lo.z)));

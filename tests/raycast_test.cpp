@@ -187,9 +187,25 @@ BOOST_AUTO_TEST_CASE(work_group_shape_changes_no_bit) {
   for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso}) {
     RenderOptions o = options_for(v.grid(), mode, 37);
     o.iso = 0.5;
-    const auto square = raycast_float(device(), v, o, {8, 8});
-    BOOST_TEST(same_bits(square.pixels, raycast_float(device(), v, o, {16, 2}).pixels));
+    const auto square = raycast_float(device(), v, o, {8, 8, {}});
+    BOOST_TEST(same_bits(square.pixels, raycast_float(device(), v, o, {16, 2, {}}).pixels));
   }
+}
+
+BOOST_AUTO_TEST_CASE(wide_gradients_change_no_bit) {
+  const auto levels_at_one_end = [](const Index3& b) {
+    return b[0] < 2 ? scattered_levels(b) : LevelTriple{0, 0, 0};
+  };
+  const ResidentVolume mixed(device(), fields::mixed(centred_grid({30, 27, 33}), 4, levels_at_one_end, blob));
+  const ResidentVolume scattered(device(), mixed_blob());
+  for (const ResidentVolume* v : {&mixed, &scattered})
+    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso}) {
+      RenderOptions o = options_for(v->grid(), mode);
+      o.sampler = SamplerKind::buffer;
+      o.iso = 0.5;
+      const auto wide = raycast_float(device(), *v, o, {8, 8, true});
+      BOOST_TEST(same_bits(wide.pixels, raycast_float(device(), *v, o, {8, 8, false}).pixels));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(samplers_agree_within_the_probe) {

@@ -33,7 +33,7 @@ typedef struct {
   vdvr_u32 stride_y; // in floats; stride_x is 1
   vdvr_u32 stride_z;
   vdvr_u32 level_x, level_y, level_z;
-  vdvr_u32 pad0;
+  vdvr_u32 base_around; // 1: this brick and those across its faces read the base (for raycast.cl; else 0)
   float texel_x, texel_y, texel_z; // of its first sample in the image3d atlas, at the texel's centre
   float pad1;
 } VdvrBrick;
