@@ -1,8 +1,8 @@
 // The definition of the mixed-resolution field, compiled by the OpenCL compiler and by the host compiler alike: what the
 // verifier certifies, the ray-caster renders and sample_at returns is this text (contract: docs/file-format.md).
 //
-// The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, floor and comparisons
-// only, contraction off on both sides, so that both give the same bits.
+// The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, conversion to int and
+// comparisons only, contraction off on both sides, so that both give the same bits.
 //
 // Coordinates are in cells: c = (p - origin) / spacing, 0 <= c <= cells. A point belongs to the brick floor(c / g)
 // (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^level is exact in fp32.
@@ -13,16 +13,13 @@
 #pragma OPENCL FP_CONTRACT OFF
 #define VDVR_GLOBAL __global
 #define VDVR_INLINE inline
-#define VDVR_FLOOR(x) floor(x)
 typedef ulong vdvr_u64;
 typedef uint vdvr_u32;
 typedef int vdvr_i32;
 #elif defined(VDVR_DIALECT_HOST)
-#include <cmath>
 #include <cstdint>
 #define VDVR_GLOBAL
 #define VDVR_INLINE inline
-#define VDVR_FLOOR(x) std::floor(x)
 typedef std::uint64_t vdvr_u64;
 typedef std::uint32_t vdvr_u32;
 typedef std::int32_t vdvr_i32;
@@ -36,7 +33,7 @@ typedef struct {
   vdvr_u32 stride_y; // in floats; stride_x is 1
   vdvr_u32 stride_z;
   vdvr_u32 level_x, level_y, level_z;
-  vdvr_u32 pad0;
+  vdvr_u32 base_around; // 1: this brick and those across its faces read the base (for raycast.cl; else 0)
   float texel_x, texel_y, texel_z; // of its first sample in the image3d atlas, at the texel's centre
   float pad1;
 } VdvrBrick;
@@ -60,7 +57,9 @@ VDVR_INLINE float vdvr_lerp(float a, float b, float t) { return (1.0f - t) * a +
 
 // The brick along one axis that a cell coordinate belongs to.
 VDVR_INLINE vdvr_i32 vdvr_brick_of(float c, vdvr_i32 granularity, vdvr_i32 bricks) {
-  vdvr_i32 b = (vdvr_i32)VDVR_FLOOR(c) / granularity;
+  // Truncation stands for floor: they differ below 0 only, where the clamp gives 0 either way. A floor is a dozen
+  // instructions on some devices.
+  vdvr_i32 b = (vdvr_i32)c / granularity;
   return b < 0 ? 0 : (b > bricks - 1 ? bricks - 1 : b);
 }
 
@@ -71,7 +70,7 @@ VDVR_INLINE VdvrLocal vdvr_local(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 g
   const vdvr_i32 last = width << level;
   const float r = (c - (float)first) * (float)(1 << level);
   VdvrLocal l;
-  l.index = (vdvr_i32)VDVR_FLOOR(r);
+  l.index = (vdvr_i32)r;  // as in vdvr_brick_of
   l.index = l.index < 0 ? 0 : (l.index > last - 1 ? last - 1 : l.index);
   l.fraction = r - (float)l.index;
   return l;

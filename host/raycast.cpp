@@ -1,0 +1,391 @@
+// Launches the ray-caster: checks options, bakes the transfer function, finds which bricks can be leapt over,
+// converts the picture. Called by the render, run and bench commands. Launches: raycast_dvr, raycast_iso,
+// raycast_mip, slice of kernels/raycast.cl.
+#include "host/raycast.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec3.hpp>
+#include <limits>
+
+#include "host/opencl/kernel.hpp"
+#include "host/resident_volume.hpp"
+#include "shared/raycast_params.h"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrRaycast) == 160 && sizeof(VdvrSlice) == 48);
+
+namespace {
+
+using opencl::DeviceArray;
+using Impl = ResidentVolume::Impl;
+
+// Entries of the baked transfer function: 16 KiB stay in a CPU's first cache; 1024 steps are finer than 8-bit
+// pictures show.
+constexpr int kTableSize = 1024;
+
+glm::dvec3 to_glm(const Vec3& v) { return {v[0], v[1], v[2]}; }
+
+bool is_finite(const Vec3& v) {
+  return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
+}
+
+void check_camera(const Camera& c) {
+  if (!is_finite(c.position) || !is_finite(c.focal_point) || !is_finite(c.view_up))
+    throw InputError("the camera's position, focal point and view-up must be finite");
+  if (!(c.view_angle_deg > 0 && c.view_angle_deg < 180))
+    throw InputError(
+        fmt::format("--camera-view-angle {} must lie between 0 and 180 degrees", c.view_angle_deg));
+  const glm::dvec3 view = to_glm(c.focal_point) - to_glm(c.position), up = to_glm(c.view_up);
+  if (!(glm::length(view) > 0))
+    throw InputError("--camera-position and --camera-focal-point are the same point");
+  if (!(glm::length(glm::cross(view, up)) > 1e-9 * glm::length(view) * glm::length(up)) ||
+      !(glm::length(up) > 0))
+    throw InputError("--camera-view-up is parallel to the direction of view; choose another");
+}
+
+void check_transfer(const TransferFunction& f) {
+  if (f.points.empty()) throw InputError(fmt::format("transfer function '{}' has no points", f.name));
+  for (std::size_t i = 0; i < f.points.size(); ++i) {
+    const auto& p = f.points[i];
+    if (!std::isfinite(p.value) || !(p.opacity >= 0 && p.opacity <= 1) || !is_finite(p.rgb) ||
+        (i > 0 && p.value < f.points[i - 1].value))
+      throw InputError(
+          fmt::format("transfer function '{}', point {}: value {} and opacity {} must be finite, in order, "
+                      "and opacity within [0, 1]",
+                      f.name, i, p.value, p.opacity));
+  }
+}
+
+void check_options(const RenderOptions& o) {
+  // Pixels are counted in int on the device; 16384 x 16384 already needs 4 GiB there.
+  if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
+    throw InputError(fmt::format("--size {}x{}: each side must be 1 to 16384 pixels", o.width, o.height));
+  if (o.mode == RenderMode::error)
+    throw InputError(
+        "an error slice needs the projections: use `run`, or `render --mode error --projections`");
+  if (o.mode == RenderMode::slice) {
+    if (o.slice_axis < 0 || o.slice_axis > 2)
+      throw InputError(fmt::format("slice axis {} is not 0 (x), 1 (y) or 2 (z)", o.slice_axis));
+    if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
+                           o.slice_range->first <= o.slice_range->second))
+      throw InputError(fmt::format("the grey window {},{} must be finite and in order", o.slice_range->first,
+                                   o.slice_range->second));
+    return;
+  }
+  check_camera(o.camera);
+  if (!(o.step >= 0x1p-10 && o.step <= 1024))
+    throw InputError(fmt::format("--step {} must lie between 1/1024 and 1024 base cells", o.step));
+  if (!(o.termination > 0 && o.termination <= 1))
+    throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
+  if (o.mode == RenderMode::iso && !std::isfinite(o.iso))
+    throw InputError(fmt::format("--iso {} must be finite", o.iso));
+  if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
+}
+
+// --- the transfer function as a table
+// ---------------------------------------------------------------------------------
+
+struct Table {
+  std::vector<cl_float4> entries;  ///< rgb, opacity of one step
+  float lo = 0, scale = 0;         ///< entry = (value - lo) * scale
+
+  // The entry that the kernel's look_up starts from, by the same fp32 operations.
+  [[nodiscard]] int first_entry(float value) const {
+    const float x = std::clamp((value - lo) * scale, 0.0f, static_cast<float>(kTableSize - 1));
+    return std::min(static_cast<int>(x), kTableSize - 2);
+  }
+};
+
+TransferPoint evaluate(const std::vector<TransferPoint>& points, double value) {
+  if (!(value > points.front().value)) return points.front();
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto &a = points[i - 1], &b = points[i];
+    if (value > b.value || !(b.value > a.value)) continue;
+    const double f = (value - a.value) / (b.value - a.value);
+    TransferPoint p{value, {}, (1 - f) * a.opacity + f * b.opacity};
+    for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
+    return p;
+  }
+  return points.back();
+}
+
+Table bake(const TransferFunction& transfer, double step) {
+  Table t;
+  // A picture of an iso-surface needs a colour only.
+  const std::vector<TransferPoint> plain{{0, {0.93, 0.86, 0.74}, 1}};
+  const auto& points = transfer.points.empty() ? plain : transfer.points;
+  const double lo = points.front().value, hi = points.back().value;
+  t.lo = static_cast<float>(lo);
+  t.scale = hi > lo ? static_cast<float>((kTableSize - 1) / (hi - lo)) : 0.0f;
+  // A range that fp32 cannot tell from a point has one colour.
+  if (!std::isfinite(t.scale)) t.scale = 0;
+  for (int i = 0; i < kTableSize; ++i) {
+    const TransferPoint p = evaluate(points, lo + (hi - lo) * i / (kTableSize - 1));
+    cl_float4 e{};
+    for (std::size_t c = 0; c < 3; ++c) e.s[c] = static_cast<float>(p.rgb[c]);
+    // `opacity` is over one base cell: what passes n steps of length s passes as much as n s base cells.
+    e.s[3] = static_cast<float>(1 - std::pow(1 - p.opacity, step));
+    t.entries.push_back(e);
+  }
+  return t;
+}
+
+// --- which bricks can matter
+// ------------------------------------------------------------------------------------------
+
+std::vector<std::uint8_t> opaque_bricks(const Impl& v, const Table& table, float slack) {
+  std::vector<int> opaque_before(kTableSize + 1, 0);  // entries below i with any opacity
+  for (std::size_t i = 0; i < kTableSize; ++i)
+    opaque_before[i + 1] = opaque_before[i] + (table.entries[i].s[3] > 0 ? 1 : 0);
+  std::vector<std::uint8_t> occupied(v.host_ranges.size());
+  for (std::size_t i = 0; i < occupied.size(); ++i) {
+    const auto first = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[0] - slack));
+    const auto last = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[1] + slack)) + 1;
+    occupied[i] = opaque_before[last + 1] > opaque_before[first] ? 1 : 0;
+  }
+  return occupied;
+}
+
+std::vector<std::uint8_t> bricks_reaching(const Impl& v, float iso, float slack) {
+  std::vector<std::uint8_t> occupied(v.host_ranges.size());
+  std::transform(v.host_ranges.begin(), v.host_ranges.end(), occupied.begin(),
+                 [&](const cl_float2& r) { return static_cast<std::uint8_t>(r.s[1] + slack < iso ? 0 : 1); });
+  return occupied;
+}
+
+// Brings frame.distance up to date; a turntable computes it once.
+void update_distance(Impl& v, const RenderOptions& o, const Table& table, float slack) {
+  std::vector<float> key{slack};
+  if (o.mode == RenderMode::dvr) {
+    key.insert(key.end(), {0, table.lo, table.scale});
+    for (const auto& e : table.entries) key.push_back(e.s[3] > 0 ? 1.0f : 0.0f);
+  } else {
+    key.insert(key.end(), {1, static_cast<float>(o.iso)});
+  }
+  if (key == v.frame.distance_key) return;
+  const auto occupied = o.mode == RenderMode::dvr ? opaque_bricks(v, table, slack)
+                                                  : bricks_reaching(v, static_cast<float>(o.iso), slack);
+  const Index3 n{v.sampler_grid.bricks_x, v.sampler_grid.bricks_y, v.sampler_grid.bricks_z};
+  const auto distance = distance_to_occupied(occupied, n);
+  if (v.frame.distance.size() != distance.size())
+    v.frame.distance = DeviceArray<cl_uchar>(*v.state, distance.size(), "distances to occupied bricks");
+  v.frame.distance.write(distance);
+  v.frame.distance_key = std::move(key);
+}
+
+// --- parameters
+// -------------------------------------------------------------------------------------------------------
+
+double length_unit(const Grid& g) { return *std::min_element(g.spacing.begin(), g.spacing.end()); }
+
+void set3(float& x, float& y, float& z, const glm::dvec3& v) {
+  x = static_cast<float>(v.x);
+  y = static_cast<float>(v.y);
+  z = static_cast<float>(v.z);
+}
+
+VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& table, float slack) {
+  const glm::dvec3 origin = to_glm(v.grid.origin), spacing = to_glm(v.grid.spacing),
+                   eye = to_glm(o.camera.position);
+  const glm::dvec3 forward = glm::normalize(to_glm(o.camera.focal_point) - eye);
+  const glm::dvec3 right = glm::normalize(glm::cross(forward, to_glm(o.camera.view_up)));
+  const glm::dvec3 up = glm::cross(right, forward);
+  const double tangent = std::tan(glm::radians(o.camera.view_angle_deg) / 2);
+  const double aspect = static_cast<double>(o.width) / static_cast<double>(o.height),
+               unit = length_unit(v.grid);
+  VdvrRaycast p{};
+  set3(p.eye_x, p.eye_y, p.eye_z, (eye - origin) / spacing);
+  set3(p.forward_x, p.forward_y, p.forward_z, forward);
+  set3(p.right_x, p.right_y, p.right_z, right * tangent * aspect);
+  set3(p.up_x, p.up_y, p.up_z, up * tangent);
+  set3(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z, glm::dvec3(unit) / spacing);
+  p.step = static_cast<float>(o.step);
+  p.inverse_step = 1 / p.step;
+  p.length_unit = static_cast<float>(unit);
+  p.table_lo = table.lo;
+  p.table_scale = table.scale;
+  p.table_size = kTableSize;
+  p.iso = static_cast<float>(o.iso);
+  p.termination = static_cast<float>(o.termination);
+  // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
+  p.gradient_full = (v.value_range.second - v.value_range.first) / 32;
+  p.slack = slack;
+  for (std::size_t c = 0; c < 3; ++c) {
+    p.background_top[c] = static_cast<float>(o.background_top[c]);
+    p.background_bottom[c] = static_cast<float>(o.background_bottom[c]);
+  }
+  p.width = static_cast<int>(o.width);
+  p.height = static_cast<int>(o.height);
+  p.shading = o.shading ? 1 : 0;
+  p.skip = o.skip_empty ? 1 : 0;
+  return p;
+}
+
+VdvrSlice make_slice(const Impl& v, const RenderOptions& o) {
+  const Grid& g = v.grid;
+  const auto axis = static_cast<std::size_t>(o.slice_axis);
+  const std::size_t across = axis == 0 ? 1 : 0, down = axis == 2 ? 1 : 2;
+  const auto side = [&](std::size_t a) { return static_cast<double>(g.cells[a]) * g.spacing[a]; };
+  const double lo = g.origin[axis], hi = lo + side(axis), at = o.slice_position.value_or((lo + hi) / 2);
+  if (!(at >= lo && at <= hi))
+    throw InputError(
+        fmt::format("--slice-position {} lies outside the grid, {} to {} along {}", at, lo, hi, "xyz"[axis]));
+  // One square pixel size for both axes; the slice is centred in the picture.
+  const double pixel =
+      std::max(side(across) / static_cast<double>(o.width), side(down) / static_cast<double>(o.height));
+  const auto first = [&](std::size_t a, std::int64_t pixels) {
+    return static_cast<float>((side(a) / 2 + (0.5 - static_cast<double>(pixels) / 2) * pixel) / g.spacing[a]);
+  };
+  VdvrSlice s{};
+  s.first[axis] =
+      static_cast<float>(std::clamp((at - lo) / g.spacing[axis], 0.0, static_cast<double>(g.cells[axis])));
+  s.first[across] = first(across, o.width);
+  s.first[down] = first(down, o.height);
+  s.step_across = static_cast<float>(pixel / g.spacing[across]);
+  s.step_down = static_cast<float>(pixel / g.spacing[down]);
+  s.across = static_cast<int>(across);
+  s.down = static_cast<int>(down);
+  const auto range =
+      o.slice_range.value_or(std::pair<double, double>(v.value_range.first, v.value_range.second));
+  s.window_lo = static_cast<float>(range.first);
+  // A volume of one value is shown black: 0 times a scale.
+  s.window_scale = range.second > range.first ? static_cast<float>(1 / (range.second - range.first)) : 0.0f;
+  s.width = static_cast<int>(o.width);
+  s.height = static_cast<int>(o.height);
+  return s;
+}
+
+// --- the sampler
+// ------------------------------------------------------------------------------------------------------
+
+std::pair<SamplerKind, std::string> choose_sampler(Device& device, const ResidentVolume& v,
+                                                   SamplerKind asked) {
+  if (asked == SamplerKind::buffer) return {SamplerKind::buffer, "asked for"};
+  if (asked == SamplerKind::image3d) {
+    if (!v.has_image3d())
+      throw ResourceError("the image3d sampler cannot be used: " + v.image3d_reason() +
+                          "; use --sampler buffer");
+    return {SamplerKind::image3d, "asked for"};
+  }
+  if (!v.has_image3d()) return {SamplerKind::buffer, v.image3d_reason()};
+  const SamplerProbe p = probe_sampler(device);
+  const bool image = p.chosen == "image3d";
+  return {
+      image ? SamplerKind::image3d : SamplerKind::buffer,
+      fmt::format("measured {:.3g} samples/s by buffer, {:.3g} by image3d", p.buffer_rate, p.image3d_rate)};
+}
+
+// How far a sample may leave the range of its brick's samples: three nested lerps in fp32 stay within 14 u of
+// the largest (docs/error-bounds.md); the texture unit adds what the probe measured on constants, taken
+// twice.
+float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
+  const double magnitude = std::max(std::abs(v.value_range.first), std::abs(v.value_range.second));
+  double relative = 0x1p-20;
+  if (sampler == SamplerKind::image3d) relative += 2 * probe_sampler(device).constant_error;
+  return static_cast<float>(relative * magnitude);
+}
+
+opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+  return {{"VDVR_GRANULARITY", std::to_string(v.sampler_grid.granularity)},
+          {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
+          {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
+          {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
+          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"}};
+}
+
+void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
+  auto& f = v.frame;
+  const auto pixels = static_cast<std::uint64_t>(o.width * o.height),
+             rows = static_cast<std::uint64_t>(o.height);
+  if (f.picture.size() != pixels) {
+    f.picture = {};  // first give back what is held
+    f.picture = DeviceArray<cl_float4>(*v.state, pixels, "picture");
+  }
+  if (f.row_samples.size() != rows) f.row_samples = DeviceArray<cl_uint>(*v.state, rows, "samples per row");
+  f.row_samples.fill(0);
+  if (table.entries.empty()) return;
+  if (f.table.size() == 0) f.table = DeviceArray<cl_float4>(*v.state, kTableSize, "transfer function");
+  f.table.write(table.entries);
+}
+
+template <class FieldBuffer>
+void launch(Impl& v, const FieldBuffer& field, const RenderOptions& o, const opencl::Defines& defines,
+            const RaycastTuning& tuning, const Table& table, float slack) {
+  const opencl::Range range{
+      {static_cast<std::uint64_t>(o.width), static_cast<std::uint64_t>(o.height), 1},
+      {static_cast<std::uint64_t>(tuning.group_x), static_cast<std::uint64_t>(tuning.group_y), 1}};
+  const auto& picture = v.frame.picture.buffer();
+  if (o.mode == RenderMode::slice) {
+    opencl::Kernel<FieldBuffer, cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer> kernel(*v.state, "raycast",
+                                                                                    "slice", defines);
+    kernel(range, field, v.bricks.buffer(), v.sampler_grid, make_slice(v, o), picture);
+    return;
+  }
+  const char* name = o.mode == RenderMode::dvr   ? "raycast_dvr"
+                     : o.mode == RenderMode::iso ? "raycast_iso"
+                                                 : "raycast_mip";
+  // dvr and iso leap by distances, mip by the bricks' maxima.
+  const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges.buffer() : v.frame.distance.buffer();
+  opencl::Kernel<FieldBuffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
+                 cl::Buffer>
+      kernel(*v.state, "raycast", name, defines);
+  kernel(range, field, v.bricks.buffer(), v.sampler_grid, guide, v.frame.table.buffer(),
+         make_params(v, o, table, slack), picture, v.frame.row_samples.buffer());
+}
+
+std::uint8_t to_byte(float x) {
+  // NaN becomes 0.
+  return static_cast<std::uint8_t>(x > 0.0f ? std::min(x, 1.0f) * 255.0f + 0.5f : 0.0f);
+}
+
+}  // namespace
+
+FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& o,
+                           const RaycastTuning& tuning) {
+  check_options(o);
+  Impl& v = volume.impl();
+  FloatPicture result;
+  std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
+  const float slack = range_slack(device, v, result.sampler);
+  const bool sliced = o.mode == RenderMode::slice;
+  const Table table = sliced ? Table{} : bake(o.transfer, o.step);
+  prepare_frame(v, o, table);
+  if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
+
+  const auto defines = defines_for(v, result.sampler, tuning);
+  const bool image = result.sampler == SamplerKind::image3d;
+  if (image) v.atlas();
+  opencl::finish(*v.state, "preparing a frame");
+  const auto start = std::chrono::steady_clock::now();
+  if (image) launch(v, v.atlas(), o, defines, tuning, table, slack);
+  else launch(v, v.samples.buffer(), o, defines, tuning, table, slack);
+  result.pixels = v.frame.picture.to_host();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const cl_uint n : v.frame.row_samples.to_host()) result.samples += n;
+  return result;
+}
+
+RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options) {
+  FloatPicture picture = raycast_float(device, volume, options);
+  RenderResult r;
+  r.sampler = picture.sampler;
+  r.sampler_reason = std::move(picture.sampler_reason);
+  r.samples = picture.samples;
+  r.seconds = picture.seconds;
+  r.image.width = options.width;
+  r.image.height = options.height;
+  r.image.rgb.reserve(3 * picture.pixels.size());
+  for (const cl_float4& p : picture.pixels)
+    for (std::size_t c = 0; c < 3; ++c) r.image.rgb.push_back(to_byte(p.s[c]));
+  return r;
+}
+
+}  // namespace vdvr

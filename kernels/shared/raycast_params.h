@@ -1,0 +1,38 @@
+// What one frame's kernels need besides the field. Filled by host/raycast.cpp, read by raycast.cl; compiled by both sides.
+// "cells" are base-cell coordinates per axis; "lengths" are multiples of the smallest base spacing.
+#ifndef VDVR_RAYCAST_PARAMS_H
+#define VDVR_RAYCAST_PARAMS_H
+
+// Scalars only: no alignment that two compilers could read differently. 160 bytes.
+typedef struct {
+  float eye_x, eye_y, eye_z;              // cells
+  float forward_x, forward_y, forward_z;  // unit vector, world axes
+  float right_x, right_y, right_z;        // world axes, times the tangent of the half view angle and the aspect ratio
+  float up_x, up_y, up_z;                 // world axes, times the tangent of the half view angle
+  float cells_per_length_x, cells_per_length_y, cells_per_length_z;
+  float step, inverse_step;  // lengths
+  float length_unit;         // world units per length
+  float table_lo, table_scale;
+  int table_size;
+  float iso;
+  float termination;
+  float gradient_full;  // gradient, density per length, from which on a sample is fully shaded
+  float slack;          // rounding allowance of the sampler on a brick's range
+  float background_top[3], background_bottom[3];
+  int width, height;
+  int shading;
+  int skip;
+  int pad[5];
+} VdvrRaycast;
+
+// A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis `down`.
+typedef struct {
+  float first[3];  // cells, of pixel (0, 0)
+  float step_across, step_down;
+  int across, down;  // axes: 0 x, 1 y, 2 z
+  float window_lo, window_scale;
+  int width, height;
+  int pad;
+} VdvrSlice;
+
+#endif

@@ -1,0 +1,36 @@
+#define BOOST_TEST_MODULE probe_sampler
+#include <boost/test/unit_test.hpp>
+
+#include "vdvr/raycast.hpp"
+
+using namespace vdvr;
+
+BOOST_AUTO_TEST_CASE(charged_delta_is_never_below_what_was_measured) {
+  for (const auto& info : Device::list()) {
+    Device device(std::to_string(info.index));
+    const SamplerProbe p = probe_sampler(device);
+    BOOST_TEST_CONTEXT(info.name) {
+      BOOST_TEST(p.buffer_rate > 0);
+      BOOST_TEST(p.image3d == info.linear_float_image);
+      BOOST_TEST(!p.note.empty());
+      if (!p.image3d) {
+        BOOST_TEST(p.chosen == "buffer");
+        continue;
+      }
+      BOOST_TEST(p.delta >= p.weight_error);
+      // fp32, rounding, truncation, or what was measured: never anything in between.
+      BOOST_TEST((p.delta == 0x1p-22 || p.delta >= 0x1p-9));
+      BOOST_TEST(p.constant_error >= 0);
+      BOOST_TEST(p.image3d_rate > 0);
+      BOOST_TEST(p.chosen == (p.image3d_rate > p.buffer_rate ? "image3d" : "buffer"));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(probe_is_measured_once_per_device) {
+  Device device;
+  const SamplerProbe first = probe_sampler(device), second = probe_sampler(device);
+  BOOST_TEST(first.buffer_rate == second.buffer_rate);
+  Device again(std::to_string(device.info().index));
+  BOOST_TEST(probe_sampler(again).buffer_rate == first.buffer_rate);
+}
