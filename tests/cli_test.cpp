@@ -59,6 +59,7 @@ pid_t start(const std::vector<std::string>& words) {
   std::transform(all.begin(), all.end(), std::back_inserter(argv), [](std::string& s) { return s.data(); });
   argv.push_back(nullptr);
   const std::string out = at("stdout"), err = at("stderr");
+  write(err, "");  // an earlier call's text must not be taken for this one's
   const pid_t child = ::fork();
   if (child == 0) {
     ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDOUT_FILENO);
@@ -340,18 +341,24 @@ BOOST_AUTO_TEST_CASE(probe_answers_every_point_in_order) {
 }
 
 BOOST_AUTO_TEST_CASE(interruption_leaves_nothing_behind) {
-  const std::string scan = small_scan();
-  for (const int signal : {SIGINT, SIGTERM}) {
-    const std::string output = at("interrupted.vdvr");
-    // Fine enough a grid to run for minutes; the signal comes while it works.
-    const pid_t child =
-        start({"build", scan, "--epsilon", "2%", "-o", output, "--size", "160x160x40", "--spacing", "0.15"});
-    std::this_thread::sleep_for(std::chrono::seconds(3));
-    ::kill(child, signal);
-    const Result r = finish(child);
-    BOOST_TEST_CONTEXT(r.err) {
-      BOOST_TEST(r.code == 128 + signal);
-      BOOST_TEST(!fs::exists(output));
+  const std::string scan = small_scan(), file = at("interrupted"), dir = at("interrupted.dir");
+  const std::vector<std::vector<std::string>> calls{
+      {"simulate", "--phantom", "sphere", "--detector", "257x257", "--angles", "720", "-o", file + ".h5"},
+      {"reconstruct", scan, "--size", "256x256x64", "-o", file + ".mha"},
+      {"build", scan, "--epsilon", "3%", "-o", file + ".vdvr"},
+      {"run", scan, "--epsilon", "3%", "-o", dir}};
+  for (const auto& words : calls) {
+    for (const int signal : {SIGINT, SIGTERM}) {
+      const pid_t child = start(words);
+      // The first line of progress is the sign that work has begun.
+      for (int wait = 0; wait < 20000 && contents(at("stderr")).empty(); ++wait)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ::kill(child, signal);
+      const Result r = finish(child);
+      BOOST_TEST_CONTEXT("vdvr " << words[0] << " said: " << r.err) {
+        BOOST_TEST(r.code == 128 + signal);
+        BOOST_TEST(!fs::exists(words.back()));
+      }
     }
   }
   for (const auto& entry : fs::directory_iterator(folder().path))

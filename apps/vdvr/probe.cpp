@@ -188,11 +188,12 @@ int probe_command(Arguments& args) {
   check_output(output, common.force, {path, points_path});
   const InputKind kind = kind_of(path, args);
   if (kind != InputKind::scan) {
-    refuse(args, {"exact", "like", "angles-file"}, "is for projections");
+    refuse(args, {"exact", "like", "angles-file"}, path.string() + " is not a projection set");
     refuse(args, {"center", "filter", "filter-cutoff"},
-           "defines the field of projections; a volume has its own");
+           "defines the field of projections; " + path.string() + " has its own");
   }
-  if (kind != InputKind::certified) refuse(args, {"projections"}, "is for a certified volume");
+  if (kind != InputKind::certified)
+    refuse(args, {"projections"}, path.string() + " is not a certified volume");
   const std::vector<Vec3> points = read_points(points_path);
 
   ProgressLine progress(args.command(), common.quiet);
