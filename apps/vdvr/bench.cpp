@@ -197,7 +197,7 @@ int bench_render(Arguments& args) {
     o.width = (*size)[0];
     o.height = (*size)[1];
   }
-  o.transfer = transfer_preset("default", bright.lo, bright.hi);
+  o.transfer = two_material_transfer(bright);
   o.sampler = safe_sampler(sampler == "auto"     ? SamplerKind::automatic
                            : sampler == "buffer" ? SamplerKind::buffer
                                                  : SamplerKind::image3d,

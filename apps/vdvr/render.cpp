@@ -24,7 +24,8 @@ void add_options(Arguments& args) {
   add_limited(args, "method", kMethods, kSupportedMethods, "the mixed volume, or its base samples alone");
   args.value("mode", "dvr|iso|mip|slice|error", "default dvr; error: |V - F| on a slice, needs --projections")
       .value("size", "512x512", "pixels")
-      .value("tf", "FILE.json|NAME", "transfer function (default, grey, bone, soft, mip)")
+      .value("tf", "FILE.json|NAME",
+             "transfer function (default, grey, bone, soft, mip); without it one that suits the volume")
       .value("iso", "V", "density of the iso-surface (default: between background and object)")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
@@ -75,7 +76,8 @@ Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit) {
 }
 
 TransferFunction transfer_for(const Arguments& args, const Brightness& b) {
-  const std::string name = args.text_or("tf", "default");
+  if (!args.has("tf")) return two_material_transfer(b);
+  const std::string name = args.text("tf");
   const std::filesystem::path file(name);
   if (file.extension() == ".json") return read_transfer_function(file);
   return transfer_preset(name, b.lo, b.hi);
@@ -200,7 +202,7 @@ int render_command(Arguments& args) {
   const Brightness bright = brightness_of(scene.volume);
   o.iso = args.number_or("iso", bright.threshold);
   o.transfer = transfer_for(args, bright);
-  o.slice_range = std::pair{bright.lo, bright.hi};
+  o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.sampler = safe_sampler(o.sampler, scene.certificate);
   o.camera = camera_for(args, scene.volume.grid, orbit_options(args));
 

@@ -42,7 +42,7 @@ std::vector<std::string> file_names() {
           "slice-y.png", "slice-z.png", "error.png", "certificate.json"};
 }
 
-/// The error slice and its picture lie across z through the largest sample: there the interpolation errs
+/// The error slice and its picture lie across z through the dense part: there the interpolation errs
 /// most.
 void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, const Progress& progress) {
   const MixedVolume& volume = out.built.volume;
@@ -51,10 +51,10 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   RenderOptions o;
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
-  o.transfer = transfer_preset("default", bright.lo, bright.hi);
+  o.transfer = two_material_transfer(bright);
   o.iso = bright.threshold;
-  o.slice_range = std::pair{bright.lo, bright.hi};
-  o.camera = orbit_camera(volume.grid, 30, 20, 1.4);
+  o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
+  o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
     report(progress, "render", 0);
     const RenderResult r = raycast(device, resident, o);
@@ -75,9 +75,9 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.mode = RenderMode::slice;
   for (int axis = thin ? 2 : 0; axis < 3; ++axis) {
     o.slice_axis = axis;
-    o.slice_position = bright.brightest[static_cast<std::size_t>(axis)];
+    o.slice_position = bright.dense_center[static_cast<std::size_t>(axis)];
     draw(fmt::format("slice-{}.png", "xyz"[axis]),
-         fmt::format("slice at {} = {:.4g}, through the largest sample", "xyz"[axis], *o.slice_position));
+         fmt::format("slice at {} = {:.4g}, through the dense part", "xyz"[axis], *o.slice_position));
   }
   if (thin) {
     o.mode = RenderMode::mip;
@@ -85,9 +85,10 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     draw("dvr.png", "maximum along rays nearly parallel to the axis");
   }
   out.error = error_slice(device, out.planned.scan, volume, out.built.certificate,
-                          {2, bright.brightest[2], kPictureSide, kPictureSide}, progress);
+                          {2, out.built.certificate.worst_at[2], kPictureSide, kPictureSide}, progress);
   write_png(folder.file("error.png"), out.error.image);
-  out.files.emplace_back("error.png", fmt::format("|V - F| on the slice at z = {:.4g}", bright.brightest[2]));
+  out.files.emplace_back(
+      "error.png", fmt::format("|V - F| on the slice at z = {:.4g}", out.built.certificate.worst_at[2]));
 }
 
 Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::uint64_t file_bytes) {
