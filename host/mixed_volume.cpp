@@ -78,13 +78,30 @@ MixedVolume as_mixed(const Volume& volume, int granularity) {
   return m;
 }
 
-float sample_at(const MixedVolume& v, const Vec3& point) {
-  const VdvrGrid grid = sampler_grid(v);
+namespace {
+
+/// A world point in cells, clamped to the grid's box.
+std::array<float, 3> in_cells(const MixedVolume& v, const Vec3& point) {
   std::array<float, 3> c{};
   for (std::size_t a = 0; a < 3; ++a) {
     const double cell = (point[a] - v.grid.origin[a]) / v.grid.spacing[a];
     c[a] = static_cast<float>(std::clamp(cell, 0.0, static_cast<double>(v.grid.cells[a])));
   }
+  return c;
+}
+
+}  // namespace
+
+Index3 brick_at(const MixedVolume& v, const Vec3& point) {
+  const VdvrGrid grid = sampler_grid(v);
+  const std::array<float, 3> c = in_cells(v, point);
+  return {vdvr_brick_of(c[0], grid.granularity, grid.bricks_x), vdvr_brick_of(c[1], grid.granularity, grid.bricks_y),
+          vdvr_brick_of(c[2], grid.granularity, grid.bricks_z)};
+}
+
+float sample_at(const MixedVolume& v, const Vec3& point) {
+  const VdvrGrid grid = sampler_grid(v);
+  const std::array<float, 3> c = in_cells(v, point);
   const std::int32_t bx = vdvr_brick_of(c[0], grid.granularity, grid.bricks_x);
   const std::int32_t by = vdvr_brick_of(c[1], grid.granularity, grid.bricks_y);
   const std::int32_t bz = vdvr_brick_of(c[2], grid.granularity, grid.bricks_z);

@@ -1,1 +1,100 @@
-int main() { return 0; }
+// vdvr: the command line. Finds the command in the table, runs it, and maps exceptions to exit codes:
+// 0 done, 1 mismatch or tolerance out of reach, 2 bad usage or input, 3 device or resource, 130/143
+// interrupted.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "apps/vdvr/arguments.hpp"
+#include "apps/vdvr/command.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+
+const std::vector<Command>& commands() {
+  static const std::vector<Command> table{
+      {"devices", "[--probe]", "OpenCL devices, their limits, and which sampler they use", devices_command},
+      {"simulate", "(--phantom NAME|FILE.json | --volume FILE) -o FILE.h5",
+       "projections of a phantom or of a volume", simulate_command},
+      {"info", "FILE", "what a file is: geometry, certificate, storage", info_command},
+      {"reconstruct", "IN -o OUT", "uniform filtered back-projection", reconstruct_command},
+      {"plan", "IN --epsilon E", "bounds, rates, storage, memory and time foreseen; builds nothing",
+       plan_command},
+      {"build", "IN --epsilon E -o OUT.vdvr", "the certified mixed-resolution volume", build_command},
+      {"verify", "OUT.vdvr --projections IN", "measures a certificate again from scratch", verify_command},
+      {"probe", "FILE --points P.csv -o V.csv", "values at points of a volume or of the exact field",
+       probe_command},
+      {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
+      {"export", "OUT.vdvr -o VOL.mha", "a uniform volume from a certified one", export_command},
+      {"run", "IN --epsilon E -o DIR", "plan, build, verify, render: everything from one scan", run_command},
+      {"bench", "fbp|build|render ...", "timings, one JSON line per case", bench_command}};
+  return table;
+}
+
+namespace {
+
+void print_overview() {
+  fmt::print("vdvr {}: X-ray CT projections and a tolerance in, a certified volume and pictures out\n\n",
+             VDVR_VERSION);
+  fmt::print(
+      "usage: vdvr COMMAND [options]\n       vdvr COMMAND --help\n       vdvr --version\n\ncommands:\n");
+  for (const Command& c : commands()) fmt::print("  {:<12} {}\n", c.name, c.purpose);
+}
+
+/// Errors of usage and input are one line each; a build log or a list of devices may take more.
+std::string as_message(const Error& error) {
+  std::string text = error.what();
+  if (error.exit_code() > 2) return text;
+  for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, " ");
+  return text;
+}
+
+int fail(const std::string& who, const std::string& message, int code) {
+  fmt::print(stderr, "{}: {}\n", who, message);
+  return code;
+}
+
+int run_guarded(const Command& command, std::vector<std::string> tokens) {
+  const std::string who = fmt::format("vdvr {}", command.name);
+  try {
+    catch_signals();
+    Arguments args(command, std::move(tokens));
+    const int code = command.run(args);
+    if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);
+    return code;
+  } catch (const Error& e) {
+    return fail(who, as_message(e), e.exit_code());
+  } catch (const std::bad_alloc&) {
+    return fail(who, "out of memory; choose a smaller --size, or set --max-memory", 3);
+  } catch (const std::exception& e) {
+    return fail(who, e.what(), 3);
+  }
+}
+
+int dispatch(const std::vector<std::string>& words) {
+  if (words.empty()) {
+    print_overview();
+    return 2;
+  }
+  if (words[0] == "--help" || words[0] == "-h" || words[0] == "help") {
+    print_overview();
+    return 0;
+  }
+  if (words[0] == "--version") {
+    fmt::print("vdvr {}\n", VDVR_VERSION);
+    return 0;
+  }
+  for (const Command& command : commands())
+    if (words[0] == command.name) return run_guarded(command, {words.begin() + 1, words.end()});
+  return fail("vdvr", fmt::format("unknown command '{}'; `vdvr --help` lists them", words[0]), 2);
+}
+
+}  // namespace
+}  // namespace vdvr::cli
+
+int main(int argc, char** argv) { return vdvr::cli::dispatch({argv + 1, argv + argc}); }

@@ -52,6 +52,9 @@ struct MixedVolume {
 /// A volume with every brick at level 0: the uniform grid as a mixed one, so that one sampler serves both.
 MixedVolume as_mixed(const Volume& volume, int granularity = 4);
 
+/// The brick (x, y, z) a world point belongs to, by the same header; the point is clamped to the grid's box.
+Index3 brick_at(const MixedVolume& volume, const Vec3& point);
+
 /// The value of the certified field at a world point, by the sampler of kernels/shared/mixed_sampler.h on the host
 /// (`buffer` arithmetic, the same bits as the device). The point must lie in the grid's box; it is clamped to it.
 float sample_at(const MixedVolume& volume, const Vec3& point);

@@ -1,0 +1,259 @@
+// vdvr bench: timings, one JSON line per case on standard output. The result is checked before it is timed.
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/simulate.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+Json spread(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return {{"min", values.front()},
+          {"median", 0.5 * (values[(n - 1) / 2] + values[n / 2])},
+          {"max", values.back()}};
+}
+
+Json bench_line(const std::string& name, const Device& device, std::size_t repetitions) {
+  return {{"case", name},
+          {"device", device.info().name},
+          {"driver", device.info().driver},
+          {"repetitions", repetitions}};
+}
+
+void print_line(const Json& json) {
+  fmt::print("{}\n", json.dump());
+  std::fflush(stdout);
+}
+
+/// How fast a stage of the library moves, from the reports that it makes on the way: what lies before its
+/// first report (filtering, upsampling) and after its last one does not count.
+class StageClock {
+ public:
+  Progress callback(const std::string& stage) {
+    return [this, stage](const std::string& reported, double fraction) {
+      throw_if_interrupted();
+      if (reported != stage) return;
+      last_ = {Clock::now(), fraction};
+      if (!first_) first_ = last_;
+    };
+  }
+  /// Of the whole, per second; 0 when there were fewer than two reports.
+  [[nodiscard]] double rate() const {
+    if (!first_ || !(last_.fraction > first_->fraction)) return 0;
+    return (last_.fraction - first_->fraction) / std::chrono::duration<double>(last_.at - first_->at).count();
+  }
+
+ private:
+  struct Report {
+    Clock::time_point at{};
+    double fraction = 0;
+  };
+  std::optional<Report> first_;
+  Report last_;
+};
+
+/// The mean over the ball of half the radius must be the sphere's density: FBP keeps means to far better than
+/// the percent asked for here, and a wrong weight, angle or pitch misses it.
+void check_sphere(const Volume& volume, double radius) {
+  const Index3 n = volume.grid.samples();
+  double sum = 0, count = 0;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        const Vec3 p = volume.grid.position({x, y, z});
+        if (std::hypot(p[0], p[1], p[2]) > 0.5 * radius) continue;
+        sum += static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]);
+        count += 1;
+      }
+  const double mean = sum / count;
+  if (!(std::abs(mean - 1) <= 0.01))
+    throw MismatchError(fmt::format("the reconstructed sphere has density {:.6g}, not 1: not timed", mean));
+}
+
+int bench_fbp(Arguments& args) {
+  args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
+      .value("angles", "180", "views (default 180)")
+      .value("repetitions", "N", "default 5");
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const std::int64_t size = args.integer_or("size", 256, 8, 4096);
+  const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 5, 1, 1000));
+  SimulateOptions simulated;
+  simulated.angles = static_cast<int>(args.integer_or("angles", 180, 2, 1 << 16));
+  simulated.columns = simulated.rows = size;
+  simulated.band_limited = false;
+  const double radius = 0.375 * static_cast<double>(size);
+
+  Device device = open_device(common);
+  ProgressLine progress("bench", common.quiet);
+  const ProjectionSet scan = simulate(sphere(radius), simulated, progress.callback());
+  GridOptions cells;
+  cells.size = Index3{size - 1, size - 1, size - 1};
+  const Grid grid = make_grid(scan.geometry, cells);
+  ReconstructOptions options;
+  options.upsampling = 1;
+  check_sphere(reconstruct(device, scan, grid, options, progress.callback()), radius);
+
+  std::vector<double> seconds, gups;
+  const double updates = static_cast<double>(grid.sample_count()) * simulated.angles;
+  for (std::size_t i = 0; i < repetitions; ++i) {
+    StageClock stages;
+    const auto start = Clock::now();
+    reconstruct(device, scan, grid, options, stages.callback("reconstruct"));
+    seconds.push_back(since(start));
+    gups.push_back(stages.rate() * updates / 1e9);
+  }
+  progress.clear();
+  Json line = bench_line("fbp", device, repetitions);
+  line["samples"] = grid.samples();
+  line["detector"] = {size, size};
+  line["angles"] = simulated.angles;
+  line["seconds"] = spread(seconds);
+  line["gups"] = spread(gups)["median"];  // of the back-projection with its read-back
+  line["gups_end_to_end"] = updates / line["seconds"]["median"].get<double>() / 1e9;
+  print_line(line);
+  return 0;
+}
+
+int bench_build(Arguments& args) {
+  args.positional("IN", "projections").value("repetitions", "N", "default 1");
+  add_plan_options(args);
+  add_build(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const CertifyOptions options = certify_options(args);
+  const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
+  ProgressLine progress("bench", common.quiet);
+  Device device = open_device(common);
+  std::vector<double> seconds;
+  std::optional<BuildResult> built;  // checked by build itself: it throws unless the certificate holds
+  double plan_seconds = 0;
+  for (std::size_t i = 0; i < repetitions; ++i) {
+    built.reset();
+    const auto start = Clock::now();
+    const Planned planned = read_and_plan(device, args, options, progress.callback());
+    plan_seconds = since(start);
+    built = build_certified(device, planned, options, progress.callback());
+    seconds.push_back(since(start));
+  }
+  progress.clear();
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  Json line = bench_line("build", device, repetitions);
+  line["cells"] = built->volume.grid.cells;
+  line["epsilon"] = built->certificate.epsilon;
+  line["seconds"] = spread(seconds);
+  line["stages"] = seconds_json(built->seconds);
+  line["stages"]["read_and_plan"] = plan_seconds;
+  line["peak_host_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  line["peak_device_bytes"] = device.peak_memory();
+  line["storage"] = storage_json(built->volume, 0);
+  print_line(line);
+  return 0;
+}
+
+/// A picture with content: not one colour all over.
+void check_picture(const Image& image) {
+  const std::size_t n = image.rgb.size();
+  for (std::size_t i = 3; i < n; ++i)
+    if (image.rgb[i] != image.rgb[i - 3]) return;
+  throw MismatchError("the first frame is of one colour: not timed");
+}
+
+int bench_render(Arguments& args) {
+  const std::vector<std::string> methods{"vdvr", "dvr", "d2vr"}, supported{"vdvr", "dvr"};
+  args.positional("FILE", "a certified volume or an MHA/NRRD volume");
+  add_limited(args, "method", methods, supported, "the mixed volume, or its base samples alone");
+  args.value("frames", "60", "over a full turn (default 60)").value("size", "512x512", "pixels");
+  args.value("sampler", "auto|image3d|buffer", "default auto");
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const std::string method = limited_choice(args, "method", methods, supported);
+  const std::int64_t frames = args.integer_or("frames", 60, 1, 100000);
+  const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
+  const Scene scene = open_scene(args.path("FILE"), args, method, false);
+  const Brightness bright = brightness_of(scene.volume);
+  RenderOptions o;
+  if (const auto size = args.sizes("size", 2)) {
+    o.width = (*size)[0];
+    o.height = (*size)[1];
+  }
+  o.transfer = two_material_transfer(bright);
+  o.sampler = safe_sampler(sampler == "auto"     ? SamplerKind::automatic
+                           : sampler == "buffer" ? SamplerKind::buffer
+                                                 : SamplerKind::image3d,
+                           scene.certificate);
+
+  Device device = open_device(common);
+  ProgressLine progress("bench", common.quiet);
+  const ResidentVolume resident(device, scene.volume);
+  o.camera = orbit_camera(scene.volume.grid, 0, 20, 1);
+  RenderResult last =
+      raycast(device, resident, o);  // also builds the kernels and lets `auto` choose, before timing
+  check_picture(last.image);
+  std::vector<double> fps, rays, samples;
+  for (std::int64_t f = 0; f < frames; ++f) {
+    report(progress.callback(), "render", static_cast<double>(f) / static_cast<double>(frames));
+    o.camera =
+        orbit_camera(scene.volume.grid, 360.0 * static_cast<double>(f) / static_cast<double>(frames), 20, 1);
+    const auto start = Clock::now();
+    last = raycast(device, resident, o);
+    const double seconds = since(start);
+    fps.push_back(1 / seconds);
+    rays.push_back(static_cast<double>(o.width * o.height) / seconds);
+    samples.push_back(static_cast<double>(last.samples) / seconds);
+  }
+  progress.clear();
+  Json line = bench_line("render", device, fps.size());
+  line["method"] = method;
+  line["size"] = {o.width, o.height};
+  line["cells"] = scene.volume.grid.cells;
+  line["sampler"] = sampler_name(last.sampler);
+  line["resident_bytes"] = resident.bytes();
+  std::vector<double> seconds(fps.size());
+  std::transform(fps.begin(), fps.end(), seconds.begin(), [](double x) { return 1 / x; });
+  line["seconds"] = spread(seconds);
+  line["fps"] = spread(fps);
+  line["rays_per_second"] = spread(rays)["median"];
+  line["samples_per_second"] = spread(samples)["median"];
+  print_line(line);
+  return 0;
+}
+
+}  // namespace
+
+int bench_command(Arguments& args) {
+  const std::string name = args.take_word();
+  if (name == "fbp") return bench_fbp(args);
+  if (name == "build") return bench_build(args);
+  if (name == "render") return bench_render(args);
+  if (!name.empty())
+    throw InputError(fmt::format("'{}' is not a case of this version; there are fbp, build, render", name));
+  args.group(
+          "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N]; each has its "
+          "own --help")
+      .flag("help,h", "this text");
+  if (!args.parse()) return 0;
+  throw InputError("name a case: fbp, build or render");
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,60 @@
+#include "apps/vdvr/certify.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "apps/vdvr/inputs.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/vdvr_file.hpp"
+
+namespace vdvr::cli {
+
+void add_plan_options(Arguments& args) {
+  add_scan(args);
+  add_tolerance(args);
+  add_field(args);
+  add_grid(args);
+  add_rates(args);
+}
+
+CertifyOptions certify_options(const Arguments& args) {
+  return {field_options(args), grid_options(args), rate_options(args), tolerance(args), build_options(args)};
+}
+
+Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
+                      const Progress& progress) {
+  Planned planned;
+  planned.scan = load_scan(args.path("IN"), args, options.field, progress);
+  FieldOptions field = options.field;
+  field.center = center_of(field, planned.scan.geometry);
+  const Grid grid = make_grid(planned.scan.geometry, options.grid);
+  planned.plan = make_plan(device, planned.scan, grid, field, options.rates, options.tolerance, progress);
+  return planned;
+}
+
+BuildResult build_certified(Device& device, const Planned& planned, const CertifyOptions& options,
+                            const Progress& progress) {
+  BuildResult result = build(device, planned.scan, planned.plan, options.build, progress);
+  Certificate& c = result.certificate;
+  if (!c.holds_buffer)
+    throw ToleranceError(fmt::format(
+        "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
+        c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
+  c.options_json = options_json(planned.plan, options.build, planned.scan.geometry,
+                                center_of(planned.plan.field, planned.scan.geometry));
+  c.content_sha256 = content_sha256(result.volume);
+  return result;
+}
+
+int certificate_exit_code(const char* command, const Certificate& certificate) {
+  if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
+  fmt::print(stderr,
+             "vdvr {}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
+             "render with "
+             "--sampler buffer, or ask for a larger epsilon\n",
+             command);
+  return 1;
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,42 @@
+// The way from the words after `plan`, `build`, `run` and `bench build` to a plan and to a certified volume.
+#pragma once
+
+#include "apps/vdvr/options.hpp"
+#include "vdvr/build.hpp"
+#include "vdvr/plan.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr::cli {
+
+/// Scan, tolerance, field, grid and rate options.
+void add_plan_options(Arguments& args);
+
+/// Everything that can be refused before a scan is read.
+struct CertifyOptions {
+  FieldOptions field;
+  GridOptions grid;
+  RateOptions rates;
+  Tolerance tolerance;
+  BuildOptions build;
+};
+CertifyOptions certify_options(const Arguments& args);
+
+struct Planned {
+  ProjectionSet scan;
+  Plan plan;
+};
+/// Reads IN and plans.
+Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
+                      const Progress& progress);
+
+/// Builds, and completes the certificate with the options and the content's hash. Throws ToleranceError when
+/// it does not hold for the `buffer` sampler, which every device has.
+BuildResult build_certified(Device& device, const Planned& planned, const CertifyOptions& options,
+                            const Progress& progress);
+
+/// 0 when the certificate holds for every sampler of the device it was built on, else 1 after a line on
+/// stderr.
+int certificate_exit_code(const char* command, const Certificate& certificate);
+
+}  // namespace vdvr::cli

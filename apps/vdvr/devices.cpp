@@ -1,0 +1,102 @@
+// vdvr devices: platforms, devices, limits, which sampler and why.
+#include <fmt/format.h>
+
+#include "apps/vdvr/command.hpp"
+#include "apps/vdvr/options.hpp"
+#include "apps/vdvr/output.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/raycast.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+/// Which samplers a device can have, from its queries alone.
+std::string sampler_reason(const DeviceInfo& d) {
+  if (!d.images) return "buffer: the device has no images";
+  if (!d.linear_float_image) return "buffer: no CL_R/CL_FLOAT 3D image format";
+  return "buffer or image3d: CL_R/CL_FLOAT 3D images exist; --probe measures which is faster and how exact "
+         "it is";
+}
+
+Json device_json(const DeviceInfo& d) {
+  return {{"index", d.index},
+          {"platform", d.platform},
+          {"name", d.name},
+          {"vendor", d.vendor},
+          {"version", d.version},
+          {"driver", d.driver},
+          {"type", d.is_gpu   ? "gpu"
+                   : d.is_cpu ? "cpu"
+                              : "other"},
+          {"compute_units", d.compute_units},
+          {"global_memory", d.global_memory},
+          {"max_allocation", d.max_allocation},
+          {"local_memory", d.local_memory},
+          {"max_work_group", d.max_work_group},
+          {"images", d.images},
+          {"linear_float_image", d.linear_float_image},
+          {"image3d_max", {d.image3d_max[0], d.image3d_max[1], d.image3d_max[2]}},
+          {"sampler", sampler_reason(d)}};
+}
+
+Json probe_json(const SamplerProbe& p) {
+  return {{"image3d", p.image3d},
+          {"weight_error", p.weight_error},
+          {"delta", p.delta},
+          {"constant_error", p.constant_error},
+          {"buffer_samples_per_second", p.buffer_rate},
+          {"image3d_samples_per_second", p.image3d_rate},
+          {"chosen", p.chosen}};
+}
+
+void print_device(const Json& d) {
+  const auto text = [&](const char* key) { return d[key].get<std::string>(); };
+  const auto memory = [&](const char* key) { return bytes_text(d[key].get<std::uint64_t>()); };
+  fmt::print("{}: {} ({}, {})\n", d["index"].get<int>(), text("name"), text("type"), text("platform"));
+  fmt::print("  version      {}, driver {}\n", text("version"), text("driver"));
+  fmt::print("  compute      {} units, work-groups up to {}\n", d["compute_units"].get<int>(),
+             d["max_work_group"].get<int>());
+  fmt::print("  memory       {} global, {} in one allocation, {} local\n", memory("global_memory"),
+             memory("max_allocation"), memory("local_memory"));
+  fmt::print("  image3d      up to {}\n", d["image3d_max"].dump());
+  fmt::print("  sampler      {}\n", text("sampler"));
+  if (!d.contains("probe")) return;
+  const Json& p = d["probe"];
+  fmt::print("  probe        {} chosen; buffer {:.4g} samples/s", p["chosen"].get<std::string>(),
+             p["buffer_samples_per_second"].get<double>());
+  if (p["image3d"].get<bool>()) {
+    fmt::print(", image3d {:.4g} samples/s; weights off by {:.3g}, charged {:.3g}; constants off by {:.3g}",
+               p["image3d_samples_per_second"].get<double>(), p["weight_error"].get<double>(),
+               p["delta"].get<double>(), p["constant_error"].get<double>());
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+
+int devices_command(Arguments& args) {
+  args.flag("probe", "measure the sampler's error and bandwidth (of --device, or of all)");
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  std::vector<DeviceInfo> infos = Device::list();
+  if (args.has("device")) infos = {open_device(common).info()};
+
+  Json list = Json::array();
+  for (const DeviceInfo& info : infos) {
+    Json entry = device_json(info);
+    if (args.has("probe")) {
+      Device device(std::to_string(info.index), common.max_memory);
+      entry["probe"] = probe_json(probe_sampler(device));
+    }
+    list.push_back(entry);
+  }
+  print_result(common, Json{{"devices", list}}, [&] {
+    if (list.empty()) fmt::print("no OpenCL device; install one, for a CPU the package pocl-opencl-icd\n");
+    for (const Json& entry : list) print_device(entry);
+  });
+  return 0;
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,98 @@
+// vdvr info: what any file of ours or any input is.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/volume_file.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+int certified_info(const std::filesystem::path& path, const CommonOptions& common) {
+  const VdvrFile file = read_vdvr(path, common.max_memory);
+  std::string mismatch;
+  try {
+    check_certificate(path, file);
+  } catch (const MismatchError& e) {
+    mismatch = e.what();
+  }
+  Json json = {{"file", path.string()},
+               {"kind", "certified volume"},
+               {"generator", file.generator},
+               {"format_version", file.format_version},
+               {"grid", grid_json(file.volume.grid)}};
+  json["grid"]["granularity"] = file.volume.granularity;
+  json["grid"]["rate"] = file.volume.rate;
+  json["bricks"] = levels_json(file.volume);
+  json["storage"] = storage_json(file.volume, file.file_bytes);
+  json["content_matches"] = mismatch.empty();
+  json["certificate"] = certificate_json(file.certificate);
+  print_result(common, json, [&] {
+    fmt::print("{}: certified volume, format {}, by {}\n", path.string(), file.format_version,
+               file.generator);
+    print_grid(file.volume.grid);
+    print_storage(file.volume, file.file_bytes);
+    print_certificate(file.certificate);
+    if (mismatch.empty()) fmt::print("content        matches the certificate's hash\n");
+  });
+  if (!mismatch.empty()) throw MismatchError(mismatch);
+  return 0;
+}
+
+int volume_info(const std::filesystem::path& path, const CommonOptions& common) {
+  const Volume volume = read_volume(path, common.max_memory);
+  const auto [lo, hi] = std::minmax_element(volume.samples.begin(), volume.samples.end());
+  const Json json = {
+      {"file", path.string()}, {"kind", "volume"}, {"grid", grid_json(volume.grid)}, {"range", {*lo, *hi}}};
+  print_result(common, json, [&] {
+    fmt::print("{}: volume, samples {:.6g} to {:.6g}\n", path.string(), *lo, *hi);
+    print_grid(volume.grid);
+  });
+  return 0;
+}
+
+int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
+  ProgressLine progress(args.command(), common.quiet);
+  const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
+  const Grid grid = make_grid(scan.geometry, {});
+  const auto [lo, hi] = std::minmax_element(scan.data.begin(), scan.data.end());
+  progress.clear();
+  const Json json = {{"file", path.string()},
+                     {"kind", "projections"},
+                     {"geometry", geometry_json(scan.geometry)},
+                     {"report", report_json(scan.report)},
+                     {"range", {*lo, *hi}},
+                     {"default_grid", grid_json(grid)}};
+  print_result(common, json, [&] {
+    print_scan(scan);
+    fmt::print("  integrals    {:.6g} to {:.6g}\n", *lo, *hi);
+    print_grid(grid);
+  });
+  return 0;
+}
+
+}  // namespace
+
+int info_command(Arguments& args) {
+  args.positional("FILE", "a certified volume, a volume, or projections");
+  add_scan(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const auto path = args.path("FILE");
+  switch (kind_of(path, args)) {
+    case InputKind::certified:
+      return certified_info(path, common);
+    case InputKind::volume:
+      return volume_info(path, common);
+    case InputKind::scan:
+      break;
+  }
+  return scan_info(path, args, common);
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,212 @@
+#include "apps/vdvr/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+const std::vector<std::string> kFilters{"ram-lak", "shepp-logan", "cosine", "hamming", "hann"};
+
+/// Options whose other values belong to later versions: name, all values, supported ones, help.
+struct Limited {
+  const char* name;
+  std::vector<std::string> all, supported;
+  const char* help;
+};
+const std::vector<Limited> kBuildLimits{
+    {"closing", {"coarse", "paper", "none"}, {"coarse"}, "how bricks of different levels meet"},
+    {"coefficients", {"sampled", "midrange"}, {"sampled"}, "what the stored samples are"},
+    {"levels", {"isotropic", "anisotropic"}, {"isotropic"}, "levels per brick or per axis"},
+    {"storage", {"auto", "f32", "u16", "u8"}, {"auto", "f32"}, "sample type of base and tiles"},
+    {"terms", {"all", "grid"}, {"all"}, "error terms that are charged"},
+    {"epsilon-of", {"range", "max"}, {"range"}, "what --epsilon is a fraction of"}};
+
+bool is_power_of_two(std::int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
+
+/// "auto" gives none; else a power of two up to `highest`.
+std::optional<int> rate(const Arguments& args, const std::string& name, std::int64_t highest) {
+  if (args.text_or(name, "auto") == "auto") return std::nullopt;
+  const std::int64_t n = args.integer_or(name, 1, 1, highest);
+  if (!is_power_of_two(n)) throw InputError(fmt::format("--{}: {} is not a power of two", name, n));
+  return static_cast<int>(n);
+}
+
+}  // namespace
+
+void add_common(Arguments& args) {
+  args.group("Common")
+      .value("device", "INDEX|cpu|gpu|NAME", "OpenCL device (default: a GPU if there is one)")
+      .value("max-memory", "2G", "limit of our host and device allocations together")
+      .flag("json", "one JSON object on standard output, nothing else")
+      .flag("quiet", "no progress and no summary")
+      .flag("force", "overwrite existing outputs")
+      .flag("help,h", "this text");
+}
+
+CommonOptions common_options(const Arguments& args) {
+  CommonOptions common;
+  common.device = args.text_or("device", "");
+  if (args.has("max-memory")) common.max_memory = parse_bytes("--max-memory", args.text("max-memory"));
+  common.json = args.has("json");
+  common.quiet = args.has("quiet");
+  common.force = args.has("force");
+  return common;
+}
+
+void add_scan(Arguments& args) {
+  args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view");
+}
+
+void add_field(Arguments& args) {
+  args.group("Field (what is certified)")
+      .value("center", "C", "column onto which the rotation axis projects")
+      .value("filter", "NAME", fmt::format("{} (default ram-lak)", fmt::join(kFilters, "|")))
+      .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)");
+}
+
+FieldOptions field_options(const Arguments& args) {
+  FieldOptions field;
+  field.filter = args.choice("filter", kFilters, field.filter);
+  field.cutoff = args.positive_or("filter-cutoff", field.cutoff);
+  if (field.cutoff > 1) throw InputError(fmt::format("--filter-cutoff: {} is above 1", field.cutoff));
+  field.center = args.number("center");
+  return field;
+}
+
+bool has_field_options(const Arguments& args) {
+  return args.has("center") || args.has("filter") || args.has("filter-cutoff");
+}
+
+void add_grid(Arguments& args) {
+  args.group("Grid")
+      .value("size", "NxNxN", "cells in x, y, z (default: the covered region)")
+      .value("spacing", "S", "cell width (default: the detector pitch)")
+      .value("origin", "X,Y,Z", "first sample (default: centred)")
+      .value("roi", "X0,Y0,Z0,X1,Y1,Z1", "certify and count only bricks inside");
+}
+
+GridOptions grid_options(const Arguments& args) {
+  GridOptions grid;
+  if (const auto size = args.sizes("size", 3)) grid.size = Index3{(*size)[0], (*size)[1], (*size)[2]};
+  if (args.has("spacing")) grid.spacing = args.positive_or("spacing", 1);
+  grid.origin = args.vec3("origin");
+  return grid;
+}
+
+void add_rates(Arguments& args) {
+  args.group("Rates")
+      .value("upsampling", "auto|N", "of the filtered projections in u, a power of two")
+      .value("u-filter", "auto|linear|cubic", "interpolation of the upsampled projections")
+      .value("gold", "auto|N", "oversampling of the gold standard, a power of two");
+}
+
+RateOptions rate_options(const Arguments& args) {
+  RateOptions rates;
+  rates.upsampling = rate(args, "upsampling", 256);
+  rates.u_filter = args.choice("u-filter", {"auto", "linear", "cubic"}, "auto");
+  rates.gold = rate(args, "gold", 64);
+  return rates;
+}
+
+void add_tolerance(Arguments& args) {
+  args.group("Tolerance")
+      .value("epsilon", "0.03|3%", "fraction of the reference range")
+      .value("epsilon-abs", "E", "in density units");
+}
+
+Tolerance tolerance(const Arguments& args) {
+  if (args.has("epsilon") == args.has("epsilon-abs"))
+    throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
+  Tolerance result;
+  if (args.has("epsilon-abs")) {
+    result.absolute = args.positive_or("epsilon-abs", 0);
+    return result;
+  }
+  std::string text = args.text("epsilon");
+  const bool percent = text.back() == '%';
+  if (percent) text.pop_back();
+  const double fraction = parse_number("--epsilon", text) / (percent ? 100 : 1);
+  if (!(fraction > 0)) throw InputError(fmt::format("--epsilon: {} is not above 0", args.text("epsilon")));
+  if (fraction > 1)
+    throw InputError(
+        fmt::format("--epsilon: {} is more than the whole range; write 3% or 0.03", args.text("epsilon")));
+  result.relative = fraction;
+  return result;
+}
+
+void add_limited(Arguments& args, const std::string& name, const std::vector<std::string>& all,
+                 const std::vector<std::string>& supported, const std::string& help) {
+  args.value(
+      name, fmt::format("{}", fmt::join(all, "|")),
+      all == supported ? help : fmt::format("{}; this version has: {}", help, fmt::join(supported, ", ")));
+}
+
+std::string limited_choice(const Arguments& args, const std::string& name,
+                           const std::vector<std::string>& all, const std::vector<std::string>& supported) {
+  const std::string given = args.choice(name, all, supported.front());
+  if (std::find(supported.begin(), supported.end(), given) == supported.end())
+    throw InputError(
+        fmt::format("--{} {}: this version supports only: {}", name, given, fmt::join(supported, ", ")));
+  return given;
+}
+
+void refuse(const Arguments& args, const std::vector<std::string>& names, const std::string& reason) {
+  for (const auto& name : names)
+    if (args.has(name)) throw InputError(fmt::format("--{}: {}", name, reason));
+}
+
+void add_build(Arguments& args) {
+  args.group("Build")
+      .value("granularity", "1|2|4|8", "base cells per brick and axis (default 4)")
+      .value("window", "LO,HI", "test only where the field meets these values");
+  for (const auto& l : kBuildLimits) add_limited(args, l.name, l.all, l.supported, l.help);
+  args.flag("paper", "the paper's settings; not in this version").flag("resume", "not in this version");
+}
+
+BuildOptions build_options(const Arguments& args) {
+  for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
+  refuse(args, {"paper"}, "this version has only its own settings (closing coarse, coefficients sampled)");
+  refuse(args, {"resume"}, "this version cannot resume; start again without it");
+  BuildOptions build;
+  build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
+  if (!is_power_of_two(build.granularity))
+    throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", build.granularity));
+  if (const auto w = args.numbers("window", 2)) {
+    if (!((*w)[0] <= (*w)[1])) throw InputError(fmt::format("--window: {} lies above {}", (*w)[0], (*w)[1]));
+    build.window = std::pair{(*w)[0], (*w)[1]};
+  }
+  if (const auto r = args.numbers("roi", 6)) {
+    for (std::size_t a = 0; a < 3; ++a)
+      if (!((*r)[a] < (*r)[a + 3]))
+        throw InputError(fmt::format("--roi: {} is not below {}", (*r)[a], (*r)[a + 3]));
+    build.roi.emplace();
+    std::copy(r->begin(), r->end(), build.roi->begin());
+  }
+  return build;
+}
+
+std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
+                         double center) {
+  nlohmann::ordered_json j;
+  j["granularity"] = build.granularity;
+  j["closing"] = "coarse";
+  j["coefficients"] = "sampled";
+  j["levels"] = "isotropic";
+  j["storage"] = "f32";
+  j["terms"] = "all";
+  j["epsilon_of"] = "range";
+  j["upsampling"] = plan.upsampling_u;
+  j["u_filter"] = plan.u_filter;
+  j["gold"] = plan.gold_rate;
+  j["geometry"] = {{"columns", geometry.columns},    {"rows", geometry.rows}, {"pitch_u", geometry.pitch_u},
+                   {"pitch_v", geometry.pitch_v},    {"center", center},      {"unit", geometry.unit},
+                   {"theta_rad", geometry.theta_rad}};
+  return j.dump();
+}
+
+}  // namespace vdvr::cli

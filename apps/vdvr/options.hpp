@@ -1,0 +1,57 @@
+// Option groups shared by several commands: declared by add_*, read by the function of the group's name.
+// What belongs to a later version is declared too, so that it is refused by name and never silently ignored.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/vdvr/arguments.hpp"
+#include "vdvr/build.hpp"
+#include "vdvr/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/plan.hpp"
+#include "vdvr/reconstruct.hpp"
+
+namespace vdvr::cli {
+
+struct CommonOptions {
+  std::string device;
+  std::uint64_t max_memory = 0;
+  bool json = false, quiet = false, force = false;
+};
+
+void add_common(Arguments& args);
+CommonOptions common_options(const Arguments& args);
+inline Device open_device(const CommonOptions& common) { return Device(common.device, common.max_memory); }
+
+/// --angles-file, for stacks that carry no angles.
+void add_scan(Arguments& args);
+void add_field(Arguments& args);
+void add_grid(Arguments& args);
+void add_rates(Arguments& args);
+void add_tolerance(Arguments& args);
+void add_build(Arguments& args);
+
+FieldOptions field_options(const Arguments& args);
+bool has_field_options(const Arguments& args);
+GridOptions grid_options(const Arguments& args);
+RateOptions rate_options(const Arguments& args);
+/// Exactly one of --epsilon and --epsilon-abs.
+Tolerance tolerance(const Arguments& args);
+/// Includes --roi of the grid group.
+BuildOptions build_options(const Arguments& args);
+
+/// InputError when one of `names` was given: `reason` says why the command does not take it.
+void refuse(const Arguments& args, const std::vector<std::string>& names, const std::string& reason);
+/// Declares and checks in one place an option of which only some values exist in this version.
+void add_limited(Arguments& args, const std::string& name, const std::vector<std::string>& all,
+                 const std::vector<std::string>& supported, const std::string& help);
+std::string limited_choice(const Arguments& args, const std::string& name,
+                           const std::vector<std::string>& all, const std::vector<std::string>& supported);
+
+/// What a volume is built with, for the certificate's `options`; includes the scan's geometry, so that a
+/// reader of the file can tell which points are covered without the projections.
+std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
+                         double center);
+
+}  // namespace vdvr::cli

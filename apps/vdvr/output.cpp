@@ -1,0 +1,247 @@
+#include "apps/vdvr/output.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "host/io/atomic_file.hpp"
+#include "vdvr/error.hpp"
+
+namespace fs = std::filesystem;
+
+namespace vdvr::cli {
+
+void check_output(const fs::path& path, bool force, const std::vector<fs::path>& inputs) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored))
+    throw InputError(fmt::format("{}: is a folder, not a file to write", path.string()));
+  for (const auto& input : inputs)
+    if (fs::equivalent(path, input, ignored))
+      throw InputError(fmt::format("{}: is also the input; choose another output", path.string()));
+  if (fs::exists(path, ignored) && !force)
+    throw InputError(fmt::format("{}: exists already; --force overwrites it", path.string()));
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, ignored))
+    throw InputError(fmt::format("{}: folder '{}' does not exist", path.string(), folder.string()));
+}
+
+OutputFolder::OutputFolder(fs::path folder, std::vector<std::string> names, bool force)
+    : folder_(std::move(folder)), names_(std::move(names)) {
+  std::error_code error;
+  if (fs::exists(folder_, error) && !fs::is_directory(folder_, error))
+    throw InputError(fmt::format("{}: is a file, not a folder", folder_.string()));
+  for (const auto& name : names_)
+    if (fs::exists(folder_ / name, error) && !force)
+      throw InputError(fmt::format("{}: exists already; --force overwrites it", (folder_ / name).string()));
+  made_ = fs::create_directories(folder_, error);
+  if (error) throw InputError(fmt::format("{}: cannot be created: {}", folder_.string(), error.message()));
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  if (made_) fs::remove(folder_, ignored);  // fails, as it should, unless empty
+}
+
+void OutputFolder::begin() {
+  std::error_code ignored;
+  for (const auto& name : names_) fs::remove(folder_ / name, ignored);
+}
+
+void OutputFolder::finish(const std::string& certificate) {
+  io::write_file(folder_ / "certificate.json", certificate + "\n");
+}
+
+void print_result(const CommonOptions& common, const Json& json, const std::function<void()>& as_text) {
+  if (common.json) {
+    fmt::print("{}\n", json.dump(2));
+  } else if (!common.quiet) {
+    as_text();
+  }
+}
+
+// --- JSON
+// -------------------------------------------------------------------------------------------------------------
+
+Json grid_json(const Grid& g) {
+  return {{"cells", g.cells}, {"origin", g.origin}, {"spacing", g.spacing}, {"unit", g.unit}};
+}
+
+Json geometry_json(const ParallelGeometry& g) {
+  Json j = {{"views", g.views()},   {"rows", g.rows},     {"columns", g.columns}, {"pitch_u", g.pitch_u},
+            {"pitch_v", g.pitch_v}, {"center", g.center}, {"unit", g.unit}};
+  if (!g.theta_rad.empty()) {
+    constexpr double degrees = 57.29577951308232;
+    j["first_angle_deg"] = g.theta_rad.front() * degrees;
+    j["last_angle_deg"] = g.theta_rad.back() * degrees;
+  }
+  return j;
+}
+
+Json report_json(const InputReport& r) {
+  return {{"name", r.name},
+          {"sha256", r.sha256},
+          {"format", r.format},
+          {"dead_pixels", r.dead_pixels},
+          {"transmission_floor", r.transmission_floor},
+          {"center_source", r.center_source},
+          {"air_background", r.air_background},
+          {"notes", r.notes}};
+}
+
+Json bounds_json(const std::vector<Bound>& bounds) {
+  Json list = Json::array();
+  for (const auto& b : bounds)
+    list.push_back({{"stage", b.stage},
+                    {"method", b.method},
+                    {"rate", b.rate},
+                    {"value", b.value},
+                    {"rigorous", b.rigorous}});
+  return list;
+}
+
+namespace {
+
+Json term_json(const ErrorTerm& t) { return {{"value", t.value}, {"method", t.method}}; }
+
+Json storage_part(const Storage& s, std::uint64_t file_bytes) {
+  return {{"samples_ratio", s.samples_ratio},
+          {"bytes_ratio", s.bytes_ratio},
+          {"device_bytes", s.device_bytes},
+          {"file_bytes", file_bytes}};
+}
+
+}  // namespace
+
+Json budget_json(const ErrorBudget& b) {
+  Json sampler = {{"buffer", term_json(b.sampler.buffer)}};
+  if (b.sampler.image3d) sampler["image3d"] = term_json(*b.sampler.image3d);
+  return {{"grid", term_json(b.grid)},
+          {"gold", term_json(b.gold)},
+          {"projection", term_json(b.projection)},
+          {"arithmetic", term_json(b.arithmetic)},
+          {"sampler", sampler}};
+}
+
+Json certificate_json(const Certificate& certificate) { return Json::parse(to_json(certificate)); }
+
+Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes) {
+  const Storage interior = storage_of(volume, true);
+  Json j = storage_part(storage_of(volume, false), file_bytes);
+  // The file holds what the device does, uncompressed; of the interior only that payload can be told apart.
+  j["interior"] = storage_part(interior, interior.device_bytes);
+  return j;
+}
+
+Json levels_json(const MixedVolume& volume) {
+  std::map<std::string, std::int64_t> counts;
+  for (const auto& l : volume.level) ++counts[fmt::format("{}{}{}", l[0], l[1], l[2])];
+  return counts;
+}
+
+Json seconds_json(const std::map<std::string, double>& seconds) { return Json(seconds); }
+
+// --- text
+// -------------------------------------------------------------------------------------------------------------
+
+std::string vec_text(const Vec3& v) { return fmt::format("{:.6g}, {:.6g}, {:.6g}", v[0], v[1], v[2]); }
+
+std::string bytes_text(std::uint64_t bytes) {
+  const double b = static_cast<double>(bytes);
+  if (b < 1 << 20) return fmt::format("{:.1f} KiB", b / (1 << 10));
+  if (b < 1 << 30) return fmt::format("{:.1f} MiB", b / (1 << 20));
+  return fmt::format("{:.2f} GiB", b / (1 << 30));
+}
+
+void print_notes(const std::vector<std::string>& notes) {
+  for (const auto& note : notes) fmt::print("  note         {}\n", note);
+}
+
+void print_scan(const ProjectionSet& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  fmt::print("scan           {} ({}), {} views of {} x {} pixels\n", scan.report.name, scan.report.format,
+             g.views(), g.columns, g.rows);
+  fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
+  fmt::print("  centre       column {:.4f} ({})\n", g.center, scan.report.center_source);
+  if (scan.report.dead_pixels != 0) fmt::print("  dead pixels  {} replaced\n", scan.report.dead_pixels);
+  if (scan.report.air_background) fmt::print("  background   linear air background taken off\n");
+  fmt::print("  sha256       {}\n", scan.report.sha256);
+  print_notes(scan.report.notes);
+}
+
+void print_grid(const Grid& g) {
+  fmt::print("grid           {} x {} x {} cells of {:.6g} x {:.6g} x {:.6g} {}, first sample at {}\n",
+             g.cells[0], g.cells[1], g.cells[2], g.spacing[0], g.spacing[1], g.spacing[2], g.unit,
+             vec_text(g.origin));
+}
+
+void print_bounds(const std::vector<Bound>& bounds, double epsilon_abs) {
+  if (bounds.empty()) return;
+  fmt::print("bounds         {:<11} {:>5}  {:>11}  {:>9}  method\n", "stage", "rate", "value", "of eps");
+  for (const auto& b : bounds)
+    fmt::print("               {:<11} {:>4}x  {:>11.4g}  {:>7.1f} %  {}{}\n", b.stage, b.rate, b.value,
+               100 * b.value / epsilon_abs, b.method, b.rigorous ? "" : " (for comparison)");
+}
+
+void print_budget(const ErrorBudget& budget, double epsilon_abs) {
+  const auto line = [&](const char* name, const ErrorTerm& t) {
+    fmt::print("    {:<18} {:>11.4g}  {:>6.1f} %  {}\n", name, t.value, 100 * t.value / epsilon_abs,
+               t.method);
+  };
+  fmt::print("  shares of the tolerance {:.4g} (the largest of each; they do not peak at one point)\n",
+             epsilon_abs);
+  line("grid", budget.grid);
+  line("gold", budget.gold);
+  line("projection", budget.projection);
+  line("arithmetic", budget.arithmetic);
+  line("sampler buffer", budget.sampler.buffer);
+  if (budget.sampler.image3d) line("sampler image3d", *budget.sampler.image3d);
+}
+
+void print_certificate(const Certificate& c) {
+  const auto verdict = [&](const char* sampler, bool holds, double total) {
+    fmt::print("  {:<12} {}: total {:.4g}, {:.1f} % of the tolerance\n", sampler,
+               holds ? "holds" : "DOES NOT HOLD", total, 100 * total / c.epsilon_abs);
+  };
+  fmt::print("certificate    |V - F| <= {:.4g} at every covered point: {:.4g} % of the range {:.4g}\n",
+             c.epsilon_abs, 100 * c.epsilon, c.reference_range);
+  verdict("buffer", c.holds_buffer, c.total_buffer);
+  if (c.holds_image3d && c.total_image3d) verdict("image3d", *c.holds_image3d, *c.total_image3d);
+  print_budget(c.budget, c.epsilon_abs);
+  fmt::print("  measured     |V - gold| {:.4g}, with gold's and the projections' own errors {:.4g}, at {}\n",
+             c.measured_max, c.measured_total, vec_text(c.worst_at));
+  fmt::print("  rates        u {}x {}, gold {}x\n", c.upsampling_u, c.u_filter, c.gold_rate);
+  fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", c.field.filter, c.field.cutoff,
+             c.field.center ? fmt::format(", centre {:.4f}", *c.field.center) : "");
+  fmt::print("  not covered  {} samples ({:.2f} %)\n", c.not_covered_count, 100 * c.not_covered_fraction);
+  if (c.window)
+    fmt::print("  window       only where F lies in [{:.6g}, {:.6g}]\n", c.window->first, c.window->second);
+  if (c.roi) {
+    const auto& r = *c.roi;
+    fmt::print("  roi          only bricks inside {} to {}\n", vec_text({r[0], r[1], r[2]}),
+               vec_text({r[3], r[4], r[5]}));
+  }
+  fmt::print("  input        {} (sha256 {})\n  content      sha256 {}\n", c.input_name, c.input_sha256,
+             c.content_sha256);
+  print_notes(c.notes);
+}
+
+void print_storage(const MixedVolume& volume, std::uint64_t file_bytes) {
+  const Storage all = storage_of(volume, false), interior = storage_of(volume, true);
+  fmt::print("storage        {:.3f} samples per base sample (interior {:.3f}), {} on the device",
+             all.samples_ratio, interior.samples_ratio, bytes_text(all.device_bytes));
+  if (file_bytes != 0) fmt::print(", {} in the file", bytes_text(file_bytes));
+  fmt::print("\n  bricks       {} of {}^3 cells; by level zyx: {}\n", volume.brick_count(),
+             volume.granularity, levels_json(volume).dump());
+}
+
+void print_seconds(const std::map<std::string, double>& seconds) {
+  double sum = 0;
+  std::string text;
+  for (const auto& [stage, s] : seconds) {
+    text += fmt::format("{}{} {:.2f}", text.empty() ? "" : ", ", stage, s);
+    sum += s;
+  }
+  fmt::print("seconds        {:.2f} ({})\n", sum, text);
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,78 @@
+// What commands write: outputs refused up front, folders that fill file by file, JSON and text forms of our
+// values.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/vdvr/options.hpp"
+#include "vdvr/certificate.hpp"
+#include "vdvr/grid.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/plan.hpp"
+#include "vdvr/projections.hpp"
+#include "vdvr/vdvr_file.hpp"
+
+namespace vdvr::cli {
+
+using Json = nlohmann::ordered_json;
+
+/// InputError unless `path` may be written: its folder exists, it is none of `inputs`, and it does not exist
+/// or --force.
+void check_output(const std::filesystem::path& path, bool force,
+                  const std::vector<std::filesystem::path>& inputs);
+
+/// A folder output. Made at once; taken away again when nothing came to lie in it.
+class OutputFolder {
+ public:
+  /// `names`: every file that will be written; refused when one exists and not `force`.
+  OutputFolder(std::filesystem::path folder, std::vector<std::string> names, bool force);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// Removes what an older run left of `names`: none of it belongs to the new certificate. Call it before the
+  /// first file.
+  void begin();
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+  /// Writes certificate.json, the sign that the folder is complete. Call it last.
+  void finish(const std::string& certificate_json);
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<std::string> names_;
+  bool made_ = false;
+};
+
+/// The summary of a command: one JSON object with --json, else what `as_text` prints, nothing with --quiet.
+void print_result(const CommonOptions& common, const Json& json, const std::function<void()>& as_text);
+
+Json grid_json(const Grid& grid);
+Json geometry_json(const ParallelGeometry& geometry);
+Json report_json(const InputReport& report);
+Json bounds_json(const std::vector<Bound>& bounds);
+Json budget_json(const ErrorBudget& budget);
+Json certificate_json(const Certificate& certificate);
+/// With `interior` inside. `file_bytes` 0: not stored in a file.
+Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes);
+/// Bricks per level triple, in file order "zyx".
+Json levels_json(const MixedVolume& volume);
+Json seconds_json(const std::map<std::string, double>& seconds);
+
+std::string vec_text(const Vec3& v);
+/// "2.4 GiB"
+std::string bytes_text(std::uint64_t bytes);
+void print_scan(const ProjectionSet& scan);
+void print_grid(const Grid& grid);
+void print_bounds(const std::vector<Bound>& bounds, double epsilon_abs);
+void print_budget(const ErrorBudget& budget, double epsilon_abs);
+void print_certificate(const Certificate& certificate);
+void print_storage(const MixedVolume& volume, std::uint64_t file_bytes);
+void print_seconds(const std::map<std::string, double>& seconds);
+void print_notes(const std::vector<std::string>& notes);
+
+}  // namespace vdvr::cli

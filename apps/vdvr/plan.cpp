@@ -1,0 +1,74 @@
+// vdvr plan: bounds, rates, shares, storage, memory and time foreseen; builds nothing.
+#include "vdvr/plan.hpp"
+
+#include <fmt/format.h>
+
+#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+Json plan_json(const Planned& p) {
+  const Plan& plan = p.plan;
+  return {
+      {"epsilon", plan.epsilon},
+      {"epsilon_abs", plan.epsilon_abs},
+      {"reference_range", plan.reference_range},
+      {"rates", {{"upsampling_u", plan.upsampling_u}, {"u_filter", plan.u_filter}, {"gold", plan.gold_rate}}},
+      {"bounds", bounds_json(plan.bounds)},
+      {"budget", budget_json(plan.budget)},
+      {"foreseen",
+       {{"gold_samples", plan.gold_samples},
+        {"memory_bytes", plan.memory_bytes},
+        {"seconds", plan.seconds},
+        {"samples_ratio", plan.samples_ratio}}},
+      {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
+      {"grid", grid_json(plan.grid)},
+      {"geometry", geometry_json(p.scan.geometry)},
+      {"report", report_json(p.scan.report)},
+      {"notes", plan.notes}};
+}
+
+void print_plan(const Planned& p) {
+  const Plan& plan = p.plan;
+  print_scan(p.scan);
+  print_grid(plan.grid);
+  print_bounds(plan.bounds, plan.epsilon_abs);
+  fmt::print("plan           epsilon {:.4g} ({:.4g} % of the range {:.4g})\n", plan.epsilon_abs,
+             100 * plan.epsilon, plan.reference_range);
+  fmt::print("  rates        u {}x {}, gold {}x\n", plan.upsampling_u, plan.u_filter, plan.gold_rate);
+  print_budget(plan.budget, plan.epsilon_abs);
+  fmt::print("  not covered  {} samples ({:.2f} %)\n", plan.not_covered_count,
+             100 * plan.not_covered_fraction);
+  fmt::print(
+      "foreseen       {:.3f} samples stored per base sample, {} of memory, {:.1f} s, {} gold samples per "
+      "pass\n",
+      plan.samples_ratio, bytes_text(plan.memory_bytes), plan.seconds, plan.gold_samples);
+  print_notes(plan.notes);
+}
+
+}  // namespace
+
+int plan_command(Arguments& args) {
+  args.positional("IN", "projections").value("pictures", "DIR", "not in this version");
+  add_plan_options(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  refuse(args, {"pictures"}, "this version draws no pictures of the bounds; --json has the numbers");
+  refuse(args, {"roi"}, "a plan is for the whole grid; use --size and --origin, or give --roi to build");
+  const CertifyOptions options{
+      field_options(args), grid_options(args), rate_options(args), tolerance(args), {}};
+
+  Device device = open_device(common);
+  ProgressLine progress(args.command(), common.quiet);
+  const Planned planned = read_and_plan(device, args, options, progress.callback());
+  progress.clear();
+  print_result(common, plan_json(planned), [&] { print_plan(planned); });
+  return 0;
+}
+
+}  // namespace vdvr::cli

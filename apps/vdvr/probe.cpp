@@ -1,0 +1,214 @@
+// vdvr probe: values at the points of a CSV, from a certified volume, a volume, or the exact field of
+// projections.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "host/error_slice.hpp"
+#include "host/io/atomic_file.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
+#include "vdvr/volume_file.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+/// One line of the result; what is absent is an empty field.
+struct Probe {
+  bool covered = false;
+  std::optional<double> value, bound;
+  std::string level;
+};
+
+Vec3 parse_point(const std::string& line, const std::string& where) {
+  Vec3 point{};
+  std::size_t begin = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::size_t comma = line.find(',', begin);
+    if ((comma == std::string::npos) != (a == 2))
+      throw FileError(fmt::format("{}: '{}' is not x,y,z", where, line));
+    std::string field = line.substr(begin, a == 2 ? std::string::npos : comma - begin);
+    field.erase(std::remove(field.begin(), field.end(), ' '), field.end());
+    try {
+      point[a] = parse_number(where, field);
+    } catch (const InputError& e) {
+      throw FileError(e.what());
+    }
+    begin = comma + 1;
+  }
+  return point;
+}
+
+std::vector<Vec3> read_points(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  const auto next_line = [&] {
+    if (!std::getline(file, line)) return false;
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    return true;
+  };
+  if (!file) throw FileError(fmt::format("{}: cannot be read", path.string()));
+  if (!next_line())
+    throw FileError(fmt::format("{}: is empty; its first line is the header x,y,z", path.string()));
+  if (line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
+  if (line != "x,y,z")
+    throw FileError(fmt::format("{}: the header is '{}', not 'x,y,z'", path.string(), line.substr(0, 40)));
+  std::vector<Vec3> points;
+  for (int number = 2; next_line(); ++number)
+    if (!line.empty()) points.push_back(parse_point(line, fmt::format("{}, line {}", path.string(), number)));
+  return points;
+}
+
+std::string to_csv(const std::vector<Vec3>& points, const std::vector<Probe>& probes) {
+  fmt::memory_buffer out;
+  const auto field = [&](const std::optional<double>& v) {
+    if (v)
+      fmt::format_to(std::back_inserter(out), "{}",
+                     *v);  // the shortest text that reads back to the same bits
+    out.push_back(',');
+  };
+  fmt::format_to(std::back_inserter(out), "x,y,z,value,bound,level,covered\n");
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (const double c : points[i]) field(c);
+    field(probes[i].value);
+    field(probes[i].bound);
+    fmt::format_to(std::back_inserter(out), "{},{}\n", probes[i].level, probes[i].covered ? 1 : 0);
+  }
+  return fmt::to_string(out);
+}
+
+bool in_box(const Grid& g, const Vec3& p) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double cell = (p[a] - g.origin[a]) / g.spacing[a];
+    if (!(cell >= 0 && cell <= static_cast<double>(g.cells[a]))) return false;
+  }
+  return true;
+}
+
+std::string level_text(const LevelTriple& l) {
+  return l[0] == l[1] && l[1] == l[2] ? std::to_string(l[0]) : fmt::format("{}{}{}", l[0], l[1], l[2]);
+}
+
+std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
+                                   const std::vector<Vec3>& points, const Progress& progress) {
+  const VdvrFile file = read_vdvr(path, common_options(args).max_memory);
+  check_certificate(path, file);
+  const MixedVolume& volume = file.volume;
+  const Certificate& c = file.certificate;
+  std::optional<ParallelGeometry> geometry = noted_geometry(c);
+  if (args.has("projections"))
+    geometry = load_scan(args.path("projections"), args, c.field, progress).geometry;
+  if (!geometry)
+    throw InputError(
+        fmt::format("{}: does not say which points are covered; give --projections", path.string()));
+  const double center = center_of(c.field, *geometry);
+  const Index3 bricks = volume.bricks();
+  std::vector<Probe> probes;
+  probes.reserve(points.size());
+  for (const Vec3& p : points) {
+    Probe& probe = probes.emplace_back();
+    probe.covered = in_box(volume.grid, p) && is_covered(*geometry, center, p);
+    if (!probe.covered) continue;
+    const Index3 b = brick_at(volume, p);
+    probe.value = static_cast<double>(sample_at(volume, p));
+    probe.level =
+        level_text(volume.level[static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0])]);
+    // Outside the region of interest, and outside the window, nothing is promised.
+    const bool promised =
+        (!c.roi || brick_inside(volume, *c.roi, b)) &&
+        (!c.window || (*probe.value >= c.window->first && *probe.value <= c.window->second));
+    if (promised) probe.bound = c.total_buffer;
+  }
+  return probes;
+}
+
+std::vector<Probe> probe_volume(const std::filesystem::path& path, const Arguments& args,
+                                const std::vector<Vec3>& points) {
+  const MixedVolume volume = as_mixed(read_volume(path, common_options(args).max_memory));
+  std::vector<Probe> probes(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    probes[i].covered = in_box(volume.grid, points[i]);
+    if (!probes[i].covered) continue;
+    probes[i].value = static_cast<double>(sample_at(volume, points[i]));
+    probes[i].level = "0";
+  }
+  return probes;
+}
+
+std::vector<Probe> probe_exact(const std::filesystem::path& path, const Arguments& args,
+                               const std::vector<Vec3>& points, const Progress& progress) {
+  if (!args.has("exact"))
+    throw InputError(
+        fmt::format("{}: is a projection set; --exact gives the field F at the points, or build it first",
+                    path.string()));
+  FieldOptions field = field_options(args);
+  if (args.has("like")) {
+    if (has_field_options(args))
+      throw InputError("--like takes the field options from its file; do not give them again");
+    field = read_vdvr(args.path("like"), common_options(args).max_memory).certificate.field;
+  }
+  const ExactField exact(load_scan(path, args, field, progress), field, progress);
+  std::vector<Probe> probes(points.size());
+  std::vector<Vec3> covered;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if ((probes[i].covered = exact.covered(points[i]))) covered.push_back(points[i]);
+  const std::vector<double> values = exact.at(covered, progress);
+  std::size_t next = 0;
+  for (auto& probe : probes) {
+    if (!probe.covered) continue;
+    probe.value = values[next++];
+    probe.bound = 0;
+  }
+  return probes;
+}
+
+}  // namespace
+
+int probe_command(Arguments& args) {
+  args.positional("FILE", "a certified volume, a volume, or projections")
+      .value("points", "P.csv", "points, with the header x,y,z")
+      .value("output,o", "V.csv", "x,y,z,value,bound,level,covered; empty fields where not covered")
+      .flag("exact", "of projections: the field F in double precision on the host")
+      .value("like", "OUT.vdvr", "with --exact: take the field options from this file")
+      .value("projections", "IN", "of a certified volume from elsewhere: where the covered points are");
+  add_limited(args, "method", {"vdvr", "d2vr"}, {"vdvr"}, "how the value is found");
+  add_scan(args);
+  add_field(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  limited_choice(args, "method", {"vdvr", "d2vr"}, {"vdvr"});
+  const auto path = args.path("FILE"), points_path = args.path("points"), output = args.path("output");
+  check_output(output, common.force, {path, points_path});
+  const InputKind kind = kind_of(path, args);
+  if (kind != InputKind::scan) {
+    refuse(args, {"exact", "like", "angles-file"}, path.string() + " is not a projection set");
+    refuse(args, {"center", "filter", "filter-cutoff"},
+           "defines the field of projections; " + path.string() + " has its own");
+  }
+  if (kind != InputKind::certified)
+    refuse(args, {"projections"}, path.string() + " is not a certified volume");
+  const std::vector<Vec3> points = read_points(points_path);
+
+  ProgressLine progress(args.command(), common.quiet);
+  const std::vector<Probe> probes =
+      kind == InputKind::certified ? probe_certified(path, args, points, progress.callback())
+      : kind == InputKind::volume  ? probe_volume(path, args, points)
+                                   : probe_exact(path, args, points, progress.callback());
+  throw_if_interrupted();
+  io::write_file(output, to_csv(points, probes));
+  progress.clear();
+  const auto covered = std::count_if(probes.begin(), probes.end(), [](const Probe& p) { return p.covered; });
+  print_result(common, {{"output", output.string()}, {"points", points.size()}, {"covered", covered}}, [&] {
+    fmt::print("{}: {} points, {} of them covered\n", output.string(), points.size(), covered);
+  });
+  return 0;
+}
+
+}  // namespace vdvr::cli

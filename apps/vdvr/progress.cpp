@@ -1,0 +1,93 @@
+#include "apps/vdvr/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+volatile std::sig_atomic_t caught_signal = 0;
+
+extern "C" void note_signal(int number) { caught_signal = number; }
+
+std::string time_text(double seconds) {
+  if (seconds < 90) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 5400) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+}  // namespace
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = note_signal;
+  sigemptyset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;  // reads and writes go on; the next report stops the work
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+void throw_if_interrupted() {
+  if (caught_signal != 0) throw Interrupted(128 + static_cast<int>(caught_signal));
+}
+
+ProgressLine::ProgressLine(std::string command, bool quiet)
+    : command_(std::move(command)), quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}
+
+Progress ProgressLine::callback() {
+  return [this](const std::string& stage, double fraction) { report(stage, fraction); };
+}
+
+void ProgressLine::clear() {
+  const std::scoped_lock lock(mutex_);
+  if (drawn_) fmt::print(stderr, "\r\033[K");
+  drawn_ = false;
+}
+
+std::map<std::string, double> ProgressLine::seconds() {
+  const std::scoped_lock lock(mutex_);
+  std::map<std::string, double> result;
+  for (const auto& [name, stage] : stages_)
+    result[name] = std::chrono::duration<double>(stage.last - stage.first).count();
+  return result;
+}
+
+void ProgressLine::report(const std::string& stage, double fraction) {
+  throw_if_interrupted();
+  const std::scoped_lock lock(mutex_);
+  const auto now = Clock::now();
+  const auto [entry, is_new] = stages_.try_emplace(stage, Stage{now, now});
+  entry->second.last = now;
+  if (quiet_) return;
+  if (terminal_) {
+    draw(stage, std::clamp(fraction, 0.0, 1.0), now);
+  } else if (is_new) {
+    fmt::print(stderr, "vdvr {}: {}\n", command_, stage);
+  }
+}
+
+void ProgressLine::draw(const std::string& stage, double fraction, Clock::time_point now) {
+  // Ten pictures a second are enough for the eye and cost nothing.
+  if (drawn_ && fraction < 1 && now - drawn_at_ < std::chrono::milliseconds(100)) return;
+  constexpr int width = 30;
+  const int full = static_cast<int>(fraction * width);
+  const double elapsed = std::chrono::duration<double>(now - stages_.at(stage).first).count();
+  std::string rate;
+  if (elapsed > 0.5 && fraction > 0) {
+    rate = fmt::format("  {:.3g} %/s  {} left", 100 * fraction / elapsed,
+                       time_text(elapsed * (1 - fraction) / fraction));
+  }
+  fmt::print(stderr, "\r\033[K{} {:<14} [{}{}] {:3.0f} %{}", command_, stage, std::string(full, '#'),
+             std::string(width - full, '.'), 100 * fraction, rate);
+  std::fflush(stderr);
+  drawn_ = true;
+  drawn_at_ = now;
+}
+
+}  // namespace vdvr::cli

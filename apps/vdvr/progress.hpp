@@ -1,0 +1,50 @@
+// Progress on stderr and the user's wish to stop. A bar with rate and time left on a terminal, one line per
+// stage otherwise. Every command makes one ProgressLine and hands its callback to the library.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "vdvr/progress.hpp"
+
+namespace vdvr::cli {
+
+/// Installs the handlers of SIGINT and SIGTERM, which only take note; see throw_if_interrupted.
+void catch_signals();
+/// Throws Interrupted (130 or 143) once a signal has come. Called by every progress report and before every
+/// output.
+void throw_if_interrupted();
+
+class ProgressLine {
+ public:
+  ProgressLine(std::string command, bool quiet);
+  ~ProgressLine() { clear(); }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  /// May be called from any thread; valid as long as this object lives.
+  Progress callback();
+  /// Takes the bar off the terminal, so that other text may follow.
+  void clear();
+  /// Seconds between the first and the last report of each stage so far.
+  [[nodiscard]] std::map<std::string, double> seconds();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Stage {
+    Clock::time_point first, last;
+  };
+
+  void report(const std::string& stage, double fraction);
+  void draw(const std::string& stage, double fraction, Clock::time_point now);
+
+  std::string command_;
+  bool quiet_, terminal_, drawn_ = false;
+  std::mutex mutex_;
+  std::map<std::string, Stage> stages_;
+  Clock::time_point drawn_at_{};
+};
+
+}  // namespace vdvr::cli

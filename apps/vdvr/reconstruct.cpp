@@ -1,0 +1,65 @@
+// vdvr reconstruct: uniform filtered back-projection.
+#include "vdvr/reconstruct.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/volume_file.hpp"
+
+namespace vdvr::cli {
+
+int reconstruct_command(Arguments& args) {
+  args.positional("IN", "projections").value("output,o", "OUT.mha|.nrrd", "the volume to write");
+  add_scan(args);
+  add_field(args);
+  add_grid(args);
+  add_rates(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const RateOptions rates = rate_options(args);
+  const GridOptions grid_wanted = grid_options(args);
+  refuse(args, {"roi"}, "a uniform volume has no bricks to leave out; use --size and --origin");
+  if (rates.gold)
+    throw InputError("--gold: a uniform volume has no gold standard; use --spacing for a finer grid");
+  ReconstructOptions options;
+  options.field = field_options(args);
+  options.upsampling = rates.upsampling.value_or(options.upsampling);
+  if (rates.u_filter != "auto") options.u_filter = rates.u_filter;
+  const auto output = args.path("output");
+  if (!is_volume_path(output))
+    throw InputError(fmt::format("{}: write a volume as .mha or .nrrd", output.string()));
+  check_output(output, common.force, {args.path("IN")});
+
+  Device device = open_device(common);
+  ProgressLine progress(args.command(), common.quiet);
+  const ProjectionSet scan = load_scan(args.path("IN"), args, options.field, progress.callback());
+  const Grid grid = make_grid(scan.geometry, grid_wanted);
+  const Volume volume = reconstruct(device, scan, grid, options, progress.callback());
+  throw_if_interrupted();
+  write_volume(output, volume);
+  progress.clear();
+
+  const auto [lo, hi] = std::minmax_element(volume.samples.begin(), volume.samples.end());
+  const Json json = {{"output", output.string()},          {"geometry", geometry_json(scan.geometry)},
+                     {"report", report_json(scan.report)}, {"grid", grid_json(grid)},
+                     {"upsampling", options.upsampling},   {"u_filter", options.u_filter},
+                     {"filter", options.field.filter},     {"range", {*lo, *hi}},
+                     {"device", device.info().name},       {"seconds", seconds_json(progress.seconds())}};
+  print_result(common, json, [&] {
+    print_scan(scan);
+    print_grid(grid);
+    fmt::print("reconstructed  u {}x {}, filter {}: {:.6g} to {:.6g}\n", options.upsampling, options.u_filter,
+               options.field.filter, *lo, *hi);
+    print_seconds(progress.seconds());
+    fmt::print("written        {}\n", output.string());
+  });
+  return 0;
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,179 @@
+// vdvr run: plan, build, verify, render: everything a user wants from a scan, with defaults that work.
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/verification.hpp"
+#include "host/error_slice.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+constexpr std::int64_t kPictureSide = 768;
+
+/// Everything `run` has made, for the summary.
+struct Outcome {
+  Planned planned;
+  BuildResult built;
+  VerifyResult verified;
+  ErrorSlice error;
+  std::string sampler, sampler_reason;
+  std::vector<std::pair<std::string, std::string>> files;  ///< name and what it shows
+  std::map<std::string, double> seconds;
+};
+
+/// Times a step under a name, in the order of the steps.
+template <class Step>
+auto timed(std::map<std::string, double>& seconds, const std::string& name, Step&& step) {
+  const auto start = std::chrono::steady_clock::now();
+  auto result = step();
+  seconds[name] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+std::vector<std::string> file_names() {
+  return {"volume.vdvr", "dvr.png",     "iso.png",   "slice-x.png",
+          "slice-y.png", "slice-z.png", "error.png", "certificate.json"};
+}
+
+/// The error slice and its picture lie across z through the dense part: there the interpolation errs
+/// most.
+void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, const Progress& progress) {
+  const MixedVolume& volume = out.built.volume;
+  const Brightness bright = brightness_of(volume);
+  const ResidentVolume resident(device, volume);
+  RenderOptions o;
+  o.width = o.height = kPictureSide;
+  o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
+  o.transfer = two_material_transfer(bright);
+  o.iso = bright.threshold;
+  o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
+  o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
+  const auto draw = [&](const std::string& name, const std::string& what) {
+    report(progress, "render", 0);
+    const RenderResult r = raycast(device, resident, o);
+    write_png(folder.file(name), r.image);
+    out.files.emplace_back(name, what);
+    out.sampler = sampler_name(r.sampler);
+    out.sampler_reason = r.sampler_reason;
+  };
+
+  // Of a volume of a cell or two in z only slices across z show anything: there the object fills the picture.
+  const bool thin = is_thin(volume.grid);
+  if (!thin) {
+    o.mode = RenderMode::dvr;
+    draw("dvr.png", "direct volume rendering");
+    o.mode = RenderMode::iso;
+    draw("iso.png", fmt::format("iso-surface at {:.4g}", o.iso));
+  }
+  o.mode = RenderMode::slice;
+  for (int axis = thin ? 2 : 0; axis < 3; ++axis) {
+    o.slice_axis = axis;
+    o.slice_position = bright.dense_center[static_cast<std::size_t>(axis)];
+    draw(fmt::format("slice-{}.png", "xyz"[axis]),
+         fmt::format("slice at {} = {:.4g}, through the dense part", "xyz"[axis], *o.slice_position));
+  }
+  if (thin) {
+    o.mode = RenderMode::mip;
+    o.camera = orbit_camera(volume.grid, 0, 89, 1.4);
+    draw("dvr.png", "maximum along rays nearly parallel to the axis");
+  }
+  out.error = error_slice(device, out.planned.scan, volume, out.built.certificate,
+                          {2, out.built.certificate.worst_at[2], kPictureSide, kPictureSide}, progress);
+  write_png(folder.file("error.png"), out.error.image);
+  out.files.emplace_back(
+      "error.png", fmt::format("|V - F| on the slice at z = {:.4g}", out.built.certificate.worst_at[2]));
+}
+
+Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::uint64_t file_bytes) {
+  Json files = Json::object();
+  for (const auto& [name, what] : out.files) files[name] = what;
+  return {
+      {"output", folder.string()},
+      {"files", files},
+      {"geometry", geometry_json(out.planned.scan.geometry)},
+      {"report", report_json(out.planned.scan.report)},
+      {"grid", grid_json(out.built.volume.grid)},
+      {"bricks", levels_json(out.built.volume)},
+      {"storage", storage_json(out.built.volume, file_bytes)},
+      {"verification", verification_json(out.verified, out.built.certificate)},
+      {"error_slice",
+       {{"max_error", out.error.max_error}, {"worst_at", out.error.worst_at}, {"pixels", out.error.pixels}}},
+      {"sampler", {{"used", out.sampler}, {"reason", out.sampler_reason}}},
+      {"seconds", seconds_json(out.seconds)},
+      {"build_seconds", seconds_json(out.built.seconds)},
+      {"certificate", certificate_json(out.built.certificate)}};
+}
+
+void print_outcome(const std::filesystem::path& folder, const Outcome& out, std::uint64_t file_bytes) {
+  const Certificate& c = out.built.certificate;
+  print_scan(out.planned.scan);
+  print_grid(out.built.volume.grid);
+  print_certificate(c);
+  print_verification(out.verified, c);
+  fmt::print("error slice    largest |V - F| on {} pixels: {:.4g}, {:.1f} % of the tolerance\n",
+             out.error.pixels, out.error.max_error, 100 * out.error.max_error / c.epsilon_abs);
+  print_storage(out.built.volume, file_bytes);
+  fmt::print("rendered with  {} ({})\n", out.sampler, out.sampler_reason);
+  print_seconds(out.seconds);
+  fmt::print("files in       {}\n", folder.string());
+  for (const auto& [name, what] : out.files) fmt::print("    {:<18} {}\n", name, what);
+}
+
+}  // namespace
+
+int run_command(Arguments& args) {
+  args.positional("IN", "projections")
+      .value("output,o", "DIR", "the folder for volume, pictures and certificate");
+  add_plan_options(args);
+  add_build(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const CertifyOptions options = certify_options(args);
+  const auto input = args.path("IN"), output = args.path("output");
+  kind_of(input, args);
+  OutputFolder folder(output, file_names(), common.force);
+
+  Device device = open_device(common);
+  ProgressLine line(args.command(), common.quiet);
+  const Progress progress = line.callback();
+  Outcome out;
+  out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, options, progress); });
+  out.built =
+      timed(out.seconds, "build", [&] { return build_certified(device, out.planned, options, progress); });
+  const Certificate& certificate = out.built.certificate;
+  out.verified = timed(out.seconds, "verify", [&] {
+    return verify(device, out.planned.scan, out.built.volume, certificate, {}, progress);
+  });
+  if (!out.verified.holds)
+    throw MismatchError(fmt::format("the certificate is not confirmed: {}", out.verified.failure));
+  throw_if_interrupted();
+
+  folder.begin();
+  write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate);
+  out.files.emplace_back("volume.vdvr", "the certified volume");
+  timed(out.seconds, "pictures", [&] {
+    draw_pictures(device, folder, out, progress);
+    return 0;
+  });
+  if (!(out.error.max_error <= certificate.epsilon_abs))
+    throw MismatchError(fmt::format("the error slice shows {:.6g}, above epsilon {:.6g}", out.error.max_error,
+                                    certificate.epsilon_abs));
+  throw_if_interrupted();
+  folder.finish(to_json(certificate));
+  out.files.emplace_back("certificate.json", "what is promised, and by which argument");
+  line.clear();
+
+  const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
+  print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
+  return certificate_exit_code(args.command(), certificate);
+}
+
+}  // namespace vdvr::cli

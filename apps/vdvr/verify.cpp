@@ -1,0 +1,95 @@
+// vdvr verify: measures a certificate again from the projections and the packed volume alone.
+#include "vdvr/verify.hpp"
+
+#include <fmt/format.h>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/verification.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+
+Json verification_json(const VerifyResult& m, const Certificate& c) {
+  return {
+      {"holds", m.holds},
+      {"epsilon_abs", m.epsilon_abs},
+      {"measured",
+       {{"measured_max", m.measured_max}, {"measured_total", m.measured_total}, {"total", m.total}}},
+      {"certified",
+       {{"measured_max", c.measured_max}, {"measured_total", c.measured_total}, {"total", c.total_buffer}}},
+      {"worst_at", m.worst_at},
+      {"bricks_tested", m.bricks_tested},
+      {"bricks", m.bricks},
+      {"nodes_tested", m.nodes_tested},
+      {"failure", m.failure}};
+}
+
+void print_verification(const VerifyResult& m, const Certificate& c) {
+  fmt::print("verification   {} of {} bricks, {} gold nodes: {}\n", m.bricks_tested, m.bricks, m.nodes_tested,
+             m.holds ? "holds" : "DOES NOT HOLD");
+  const auto line = [](const char* what, double measured, double certified) {
+    fmt::print("    {:<18} measured {:>11.5g}   certified {:>11.5g}\n", what, measured, certified);
+  };
+  line("|V - gold|", m.measured_max, c.measured_max);
+  line("|V - gold| + T + P", m.measured_total, c.measured_total);
+  line("total", m.total, c.total_buffer);
+  fmt::print("    {:<18} {:>20.5g}\n    worst at           {}\n", "tolerance", m.epsilon_abs,
+             vec_text(m.worst_at));
+}
+
+namespace {
+
+/// F is the file's; options given anyway must say the same.
+void check_field_options(const Arguments& args, const FieldOptions& stored) {
+  if (!has_field_options(args)) return;
+  const FieldOptions given = field_options(args);
+  const bool same = (!args.has("filter") || given.filter == stored.filter) &&
+                    (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
+                    (!args.has("center") || given.center == stored.center);
+  if (!same)
+    throw InputError(
+        fmt::format("the file was certified for filter {}, cutoff {}, centre {}; verify takes them from it",
+                    stored.filter, stored.cutoff, stored.center.value_or(0)));
+}
+
+}  // namespace
+
+int verify_command(Arguments& args) {
+  args.positional("FILE", "the certified volume")
+      .value("projections", "IN", "the projections it was built from")
+      .flag("exhaustive", "every gold node; otherwise a stratified sample of bricks and the worst ones");
+  add_scan(args);
+  add_field(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const auto path = args.path("FILE"), projections = args.path("projections");
+  if (kind_of(path, args) != InputKind::certified)
+    throw InputError(fmt::format("{}: is not a certified volume", path.string()));
+
+  ProgressLine progress(args.command(), common.quiet);
+  const VdvrFile file = read_vdvr(path, common.max_memory);
+  const Certificate& certificate = file.certificate;
+  check_certificate(path, file);
+  check_field_options(args, certificate.field);
+  const ProjectionSet scan = load_scan(projections, args, certificate.field, progress.callback());
+  check_input(projections, scan, certificate);
+  Device device = open_device(common);
+  VerifyOptions options;
+  options.exhaustive = args.has("exhaustive");
+  const VerifyResult result = verify(device, scan, file.volume, certificate, options, progress.callback());
+  progress.clear();
+
+  Json json = {
+      {"file", path.string()}, {"projections", projections.string()}, {"exhaustive", options.exhaustive}};
+  json.update(verification_json(result, certificate));
+  print_result(common, json, [&] {
+    fmt::print("{}: content and input match their hashes\n", path.string());
+    print_verification(result, certificate);
+  });
+  if (!result.holds) throw MismatchError(fmt::format("{}: {}", path.string(), result.failure));
+  return 0;
+}
+
+}  // namespace vdvr::cli

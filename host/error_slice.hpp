@@ -1,0 +1,41 @@
+// A picture of |V - F| on one slice, measured pixel by pixel: the certified field against F reconstructed on
+// the pixels themselves. Called by the commands run and render --mode error.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/image.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+struct ErrorSliceOptions {
+  int axis = 2;                            ///< 0 x, 1 y, 2 z
+  double position = 0;                     ///< world
+  std::int64_t width = 512, height = 512;  ///< of the picture with its caption
+};
+
+struct ErrorSlice {
+  Image image;
+  double max_error = 0;
+  Vec3 worst_at{0, 0, 0};
+  std::int64_t pixels = 0;  ///< compared: covered and, where there is a region of interest, inside it
+};
+
+/// True when the brick (x, y, z) lies wholly inside the box x0,y0,z0,x1,y1,z1.
+bool brick_inside(const MixedVolume& volume, const std::array<double, 6>& box, const Index3& brick);
+
+/// Cost: views * pixels updates, twice (a reconstruction has at least one cell across the slice). F by
+/// `reconstruct` with cubic 16x upsampling, whose own error is far below any tolerance that a volume can be
+/// certified to. Throws InputError when the slice misses the volume or the picture is too small for its
+/// caption.
+ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                       const Certificate& certificate, const ErrorSliceOptions& options,
+                       const Progress& progress = {});
+
+}  // namespace vdvr
