@@ -1,0 +1,255 @@
+// Bounds side by side, and rates by trial on sample blocks of the gold stream (docs/error-bounds.md). Called by the command line.
+#include "vdvr/plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "host/gold_stream.hpp"
+#include "host/reconstruct_field.hpp"
+#include "host/sampler_terms.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+const std::vector<int> bound_rates{1, 2, 4, 8, 16, 32};
+
+struct Rates {
+  int upsampling;
+  std::string u_filter;
+  int gold;
+};
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Cheapest first: gold costs eight times per doubling, cubic in u twice the linear, upsampling memory only.
+std::vector<Rates> candidates(const RateOptions& wanted) {
+  std::vector<Rates> all;
+  for (const int gold : {8, 16, 32})
+    for (const auto& [upsampling, filter] : {std::pair<int, const char*>{8, "linear"}, {16, "linear"}, {8, "cubic"}, {16, "cubic"}, {32, "cubic"}})
+      all.push_back({upsampling, filter, gold});
+  for (Rates& r : all) {
+    if (wanted.upsampling) r.upsampling = *wanted.upsampling;
+    if (wanted.gold) r.gold = *wanted.gold;
+  }
+  std::vector<Rates> out;
+  for (const Rates& r : all) {
+    const bool same = std::any_of(out.begin(), out.end(), [&](const Rates& o) { return o.upsampling == r.upsampling && o.u_filter == r.u_filter && o.gold == r.gold; });
+    if (!same && (wanted.u_filter == "auto" || wanted.u_filter == r.u_filter)) out.push_back(r);
+  }
+  return out;
+}
+
+void check_rates(const RateOptions& rates) {
+  const auto power = [](int n, int low) { return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n)); };
+  if (rates.upsampling && !power(*rates.upsampling, 2))
+    throw InputError(fmt::format("--upsampling {} must be a power of two, 2 to 64 (rate 1 has no bound)", *rates.upsampling));
+  if (rates.gold && !power(*rates.gold, 2)) throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
+  if (rates.u_filter != "auto" && rates.u_filter != "linear" && rates.u_filter != "cubic")
+    throw InputError(fmt::format("--u-filter '{}' must be auto, linear or cubic", rates.u_filter));
+}
+
+// Global bounds at every rate, the paper's beside ours.
+std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups, const Grid& grid) {
+  std::vector<Bound> out;
+  const ParallelGeometry& g = scan.geometry;
+  // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take minutes.
+  const double amplitude_cost = static_cast<double>(g.views() * g.rows * g.columns) * static_cast<double>(g.rows + g.columns);
+  if (amplitude_cost < 4e10) {
+    const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates);
+    for (const auto& [rate, value] : a.projection) out.push_back({"projection", "amplitude, linear in u", rate, value, true});
+    for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude, paper Eq. 8", rate, value, true});
+  }
+  for (const int rate : bound_rates) {
+    const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;
+    const double wu = pi / g.pitch_u;
+    out.push_back({"projection", "paper Eq. 5, at samples", rate, du * du / 8 * sups.sampled_second_u, false});
+    out.push_back({"projection", "curvature, linear in u", rate, du * du / 8 * sups.second_u, true});
+    out.push_back({"projection", "curvature, cubic in u", rate, 3.0 / 128 * std::pow(du, 4) * wu * wu * sups.second_u, true});
+    out.push_back({"gold", "paper Eq. 9 without d^3, at samples", rate, (h * h * sups.sampled_second_u + hz * hz * sups.sampled_second_v) / 8, false});
+    out.push_back({"gold", "curvature, global", rate, (h * h * sups.second_u + hz * hz * sups.second_v) / 8, true});
+  }
+  return out;
+}
+
+// What a trial of some blocks at given rates shows.
+struct Trial {
+  double slack = 0, projection = 0, gold = 0, arithmetic = 0;
+  double seconds_per_update = 0, samples_ratio = 0;
+  double gold_samples = 0;
+  std::uint64_t slab_bytes = 0;
+};
+
+// A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
+std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int gold) {
+  Index3 n{};
+  for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
+  std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
+  const std::int64_t side = std::max<std::int64_t>(1, std::min<std::int64_t>(128, 1024 / gold) / (granularity * gold));
+  for (const auto& [fx, fy, fz] : {std::array{0.5, 0.5, 0.5}, std::array{0.25, 0.5, 0.5}, std::array{0.5, 0.2, 0.5}, std::array{0.72, 0.7, 0.5}, std::array{0.35, 0.35, 0.5}}) {
+    const std::array<double, 3> f{fx, fy, fz};
+    Index3 first{};
+    for (std::size_t a = 0; a < 3; ++a)
+      first[a] = std::clamp<std::int64_t>(static_cast<std::int64_t>(f[a] * static_cast<double>(n[a])) - side / 2, 0, std::max<std::int64_t>(0, n[a] - side));
+    for (std::int64_t z = first[2]; z < std::min(n[2], first[2] + side); ++z)
+      for (std::int64_t y = first[1]; y < std::min(n[1], first[1] + side); ++y)
+        for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x) selected[at((z * n[1] + y) * n[0] + x)] = 1;
+  }
+  return selected;
+}
+
+Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const FieldSups& sups, const Grid& grid, const Rates& rates, double epsilon) {
+  int granularity = 4;
+  while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity) granularity /= 2;
+  GoldStream stream(state, filtered, upsampler, {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, gold_remainder(filtered, sups, grid, rates.gold), {}});
+  Trial t;
+  t.arithmetic = stream.arithmetic();
+  t.slab_bytes = stream.slab_bytes(granularity);
+  double tested = 0, tiles = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  stream.run(trial_bricks(grid, granularity, rates.gold), [&](GoldStream::Batch& batch) {
+    const auto errors = batch.classify();
+    const auto p = batch.largest_p();
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const auto& by_level = errors[i].by_level;
+      if (by_level.back() < 0) continue;
+      t.slack = std::max(t.slack, static_cast<double>(by_level.back()));
+      t.projection = std::max(t.projection, static_cast<double>(p[i].first));
+      t.gold = std::max(t.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
+      int level = 0;
+      while (level + 1 < static_cast<int>(by_level.size()) && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= epsilon - 3 * t.arithmetic)) ++level;
+      tested += 1;
+      if (level > 0) tiles += std::pow((granularity << level) + 1, 3);
+    }
+  }, {}, "trial");
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  t.seconds_per_update = seconds / std::max(1.0, stream.updates());
+  t.samples_ratio = 1 + (tested > 0 ? (tiles / tested + 1) / std::pow(granularity, 3) : 0.0);
+  t.gold_samples = 1;
+  for (std::size_t a = 0; a < 3; ++a) t.gold_samples *= static_cast<double>(grid.cells[a] * rates.gold + 1);
+  return t;
+}
+
+double range_of_covered(const Volume& volume, const Coverage& coverage, std::int64_t& not_covered) {
+  const Index3 n = volume.grid.samples();
+  double low = INFINITY, high = -INFINITY;
+  not_covered = 0;
+  std::vector<std::uint8_t> inside(at(n[0] * n[1]));
+  for (std::int64_t y = 0; y < n[1]; ++y)
+    for (std::int64_t x = 0; x < n[0]; ++x) {
+      const Vec3 p = volume.grid.position({x, y, 0});
+      inside[at(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= 0;
+    }
+  for (std::int64_t z = 0; z < n[2]; ++z) {
+    const bool in_height = coverage.margin_z(volume.grid.position({0, 0, z})[2]) >= 0;
+    for (std::int64_t i = 0; i < n[0] * n[1]; ++i) {
+      if (!in_height || !inside[at(i)]) {
+        ++not_covered;
+        continue;
+      }
+      const double v = static_cast<double>(volume.samples[at(z * n[0] * n[1] + i)]);
+      low = std::min(low, v);
+      high = std::max(high, v);
+    }
+  }
+  return high - low;
+}
+
+void set_epsilon(Plan& plan, const Tolerance& tolerance) {
+  if (tolerance.relative.has_value() == tolerance.absolute.has_value()) throw InputError("give one of --epsilon and --epsilon-abs");
+  const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
+  if (!(given > 0) || !std::isfinite(given)) throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
+  if (tolerance.relative) {
+    plan.epsilon = given;
+    plan.epsilon_abs = given * plan.reference_range;
+  } else {
+    plan.epsilon_abs = given;
+    plan.epsilon = plan.reference_range > 0 ? given / plan.reference_range : 0;
+  }
+  if (!(plan.epsilon_abs > 0))
+    throw InputError("the field is constant over the covered samples, so a relative tolerance means nothing; give --epsilon-abs");
+}
+
+}  // namespace
+
+Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
+               const Progress& progress) {
+  check_rates(rates);
+  ParallelGeometry used = scan.geometry;
+  if (field.center) used.center = *field.center;
+  opencl::State& state = device.state();
+  Plan plan;
+  plan.notes = check_scan(used);
+  plan.grid = grid;
+  plan.field = field;
+  report(progress, "plan", 0.0);
+  const FilteredScan filtered = filter_projections(state, scan, field);
+  Upsampler upsampler(state, filtered);
+  const Coverage coverage(filtered.geometry);
+
+  // The reference range at rates whose own error cannot matter.
+  plan.base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
+  std::int64_t not_covered = 0;
+  plan.reference_range = range_of_covered(plan.base, coverage, not_covered);
+  plan.not_covered_count = not_covered;
+  plan.not_covered_fraction = static_cast<double>(not_covered) / static_cast<double>(grid.sample_count());
+  // One plane of covered samples suffices; none does not.
+  if (not_covered == grid.sample_count() && grid.cells[2] > 1) throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+  if (!std::isfinite(plan.reference_range)) plan.reference_range = [&] {  // a one-row scan covers only the plane z = 0, between samples
+    const auto [low, high] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
+    return static_cast<double>(*high) - static_cast<double>(*low);
+  }();
+  set_epsilon(plan, tolerance);
+  report(progress, "plan", 0.3);
+
+  const FieldSups sups = field_sups(state, upsampler, filtered);
+  plan.bounds = global_bounds(filtered, sups, grid);
+  report(progress, "plan", 0.6);
+
+  // The cheapest rates whose slack leaves three quarters of the tolerance to the grid; failing that, whatever fits at all.
+  const auto all = candidates(rates);
+  std::optional<std::pair<Rates, Trial>> chosen, finest;
+  for (const Rates& r : all) {
+    const Trial t = try_rates(state, filtered, upsampler, sups, grid, r, plan.epsilon_abs);
+    plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter, r.upsampling, t.projection, true});
+    plan.bounds.push_back({"gold", "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling), r.gold, t.gold, true});
+    if (!finest || t.slack < finest->second.slack) finest = {r, t};
+    if (1.1 * t.slack + 4 * t.arithmetic <= 0.25 * plan.epsilon_abs) {
+      chosen = {r, t};
+      break;
+    }
+    report(progress, "plan", 0.7);
+  }
+  if (!chosen && 1.2 * finest->second.slack + 6 * finest->second.arithmetic <= plan.epsilon_abs) chosen = finest;
+  if (!chosen) {
+    const Trial& t = finest->second;
+    throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: at upsampling {} {}, gold {}, {} may err by {:.4g} and rounding by {:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
+                                     plan.epsilon_abs, finest->first.upsampling, finest->first.u_filter, finest->first.gold,
+                                     t.projection > t.gold ? "interpolating the projections" : "interpolating gold", t.slack, t.arithmetic,
+                                     1.2 * t.slack + 6 * t.arithmetic, 100 * (1.2 * t.slack + 6 * t.arithmetic) / plan.reference_range));
+  }
+  const auto& [r, t] = *chosen;
+  plan.upsampling_u = r.upsampling;
+  plan.u_filter = r.u_filter;
+  plan.gold_rate = r.gold;
+  plan.budget.projection = {t.projection, "curvature, node-wise, on trial blocks"};
+  plan.budget.gold = {t.gold, "second differences of gold on trial blocks"};
+  plan.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
+  plan.budget.grid = {plan.epsilon_abs - t.slack - t.arithmetic, "what is left"};
+  plan.gold_samples = static_cast<std::uint64_t>(t.gold_samples);
+  // Two passes (classify, verify) over the covered part of the grid.
+  plan.seconds = 2 * t.gold_samples * (1 - plan.not_covered_fraction) * static_cast<double>(used.views()) * t.seconds_per_update;
+  plan.samples_ratio = t.samples_ratio;
+  plan.memory_bytes = state.memory.peak();
+  if (r.upsampling != 8 || r.u_filter != "cubic") plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
+  report(progress, "plan", 1.0);
+  return plan;
+}
+
+}  // namespace vdvr
