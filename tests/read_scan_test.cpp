@@ -23,6 +23,11 @@ using support::TemporaryFolder;
 using Path = std::filesystem::path;
 using Shape = std::vector<hsize_t>;
 
+// Under AddressSanitizer: a size that a damaged file claims makes malloc fail, as it does without the
+// sanitizer.
+extern "C" const char* __asan_default_options();
+extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
+
 namespace {
 
 const Path data = Path(VDVR_SOURCE_DIR) / "data";
@@ -631,22 +636,25 @@ BOOST_AUTO_TEST_CASE(truncated_hdf5_is_refused_or_whole_at_every_length) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(damaged_hdf5_never_ends_otherwise_than_in_a_refusal_or_a_scan) {
+// Only files of our own: their data and metadata carry checksums. HDF5 1.10 itself reads beyond its buffers
+// when an old layout, which has none, is damaged.
+BOOST_AUTO_TEST_CASE(scan_of_ours_with_a_damaged_byte_is_refused_or_unchanged) {
   const TemporaryFolder folder;
-  ProjectionSet scan = read_scan(write_exchange(folder / "a.h5", {}));
+  const ProjectionSet scan = read_scan(write_exchange(folder / "a.h5", {}));
   write_data_exchange(folder / "b.h5", scan);
-  const std::string whole = support::bytes_of(folder / "b.h5");
-  for (std::size_t at = 0; at < whole.size(); at += 7) {
-    std::string damaged = whole;
+  const ProjectionSet whole = read_scan(folder / "b.h5");
+  const std::string bytes = support::bytes_of(folder / "b.h5");
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string damaged = bytes;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x55);
     try {
-      static_cast<void>(read_scan(folder.file("cut.h5", damaged)));
-    } catch (const Error&) {  // a damaged size may also be refused for its memory
-    } catch (const std::exception& e) {
-      BOOST_ERROR("byte " << at << ": " << e.what());
+      const ProjectionSet back = read_scan(folder.file("cut.h5", damaged));
+      BOOST_REQUIRE_MESSAGE(back.data == whole.data, "byte " << at);
+      BOOST_REQUIRE_MESSAGE(back.geometry.theta_rad == whole.geometry.theta_rad, "byte " << at);
+      BOOST_REQUIRE_MESSAGE(back.geometry.center == whole.geometry.center, "byte " << at);
+    } catch (const FileError&) {
     }
   }
-  BOOST_TEST(true);
 }
 
 BOOST_AUTO_TEST_CASE(memory_limit_is_honoured_before_reading) {

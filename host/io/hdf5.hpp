@@ -64,7 +64,7 @@ class Hdf5File {
  public:
   /// Read-only. Throws FileError when missing, truncated or not HDF5.
   static Hdf5File open(const std::filesystem::path& path);
-  /// A new file in place of what is there.
+  /// A new file in place of what is there, in the layouts of HDF5 1.10: all metadata carry checksums.
   static Hdf5File create(const std::filesystem::path& path);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -87,6 +87,7 @@ class Hdf5File {
   /// Chunked by `chunk`, with the Fletcher32 checksum.
   void write(const std::string& object, std::span<const std::int64_t> shape,
              std::span<const std::int64_t> chunk, const float* values);
+  /// One chunk, with the Fletcher32 checksum.
   void write(const std::string& object, std::span<const double> values);
   void write_attribute(const std::string& object, const std::string& name, const std::string& text);
   void write_attribute(const std::string& object, const std::string& name, double value);

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <numeric>
 
 #include "host/io/hdf5.hpp"
 #include "host/io/limits.hpp"
@@ -118,10 +117,15 @@ Frames frames_of(const Stack& stack, std::vector<std::int64_t> numbers, const st
   return frames;
 }
 
-std::vector<std::int64_t> all_of(const Stack& stack) {
-  std::vector<std::int64_t> numbers(static_cast<std::size_t>(stack.count));
-  std::iota(numbers.begin(), numbers.end(), std::int64_t{0});
-  return numbers;
+// All frames of a stack. No list is made: a damaged header may claim any number of them.
+Frames all_frames(const Stack& stack, const std::string& what) {
+  Frames frames;
+  frames.count = stack.count;
+  frames.name = [stack, what](std::int64_t k) {
+    return fmt::format("{}: {} {}", stack.data->name(), what, k);
+  };
+  frames.read = [stack](std::int64_t first, std::int64_t n, double* out) { read_run(stack, first, n, out); };
+  return frames;
 }
 
 // How many numbers a list holds; looked at before it is read, since a damaged header may claim any.
@@ -165,7 +169,7 @@ RawScan open_data_exchange(const Hdf5File& file) {
   scan.rows = data.rows;
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
-  scan.projections = frames_of(data, all_of(data), "projection");
+  scan.projections = all_frames(data, "projection");
   scan.theta_deg = read_angles(file, "/exchange/theta", data);
   scan.center = file.number_attribute(object, "center");
   scan.pitch_u = file.number_attribute(object, "pitch_u").value_or(1);
@@ -185,8 +189,8 @@ RawScan open_data_exchange(const Hdf5File& file) {
   const Stack dark = open_stack(file, "/exchange/data_dark", data.axis);
   require_same_detector(data, white);
   require_same_detector(data, dark);
-  scan.flats = frames_of(white, all_of(white), "flat");
-  scan.darks = frames_of(dark, all_of(dark), "dark");
+  scan.flats = all_frames(white, "flat");
+  scan.darks = all_frames(dark, "dark");
   return scan;
 }
 
