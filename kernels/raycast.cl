@@ -59,6 +59,9 @@
 // Bisections of an iso interval: the hit is known to 2^-13 of a step.
 #define BISECTIONS 12
 
+// A sample that adds less than this per length to the picture, half a step of 8 bits, is not worth six more for shading.
+#define SHADED_WEIGHT 0.001953125f
+
 // A ray clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
 typedef struct {
   float3 world;  // unit direction, world axes
@@ -294,9 +297,9 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
         ++samples;
         if (e.w > 0.0f) {
           float3 rgb = e.xyz;
-          if (p.shading)
-            rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world, p.gradient_full);
           const float weight = (1.0f - alpha) * e.w;
+          if (p.shading && weight > SHADED_WEIGHT * p.step)
+            rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world, p.gradient_full);
           colour += weight * rgb;
           alpha += weight;
         }

@@ -25,6 +25,7 @@ struct TransferFunction {
   std::vector<TransferPoint> points;
 };
 /// A named preset ("default", "grey", "bone", "soft", "mip") stretched over [lo, hi]. Throws InputError.
+/// For CT take lo = max(0, minimum): air is 0, and what lies below is undershoot of the filter.
 TransferFunction transfer_preset(const std::string& name, double lo, double hi);
 /// JSON: {"points": [{"value", "rgb", "opacity"}]}. Throws FileError.
 TransferFunction read_transfer_function(const std::filesystem::path& path);
