@@ -29,7 +29,8 @@ std::int64_t column_stride(std::int64_t rows) {
 double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks) {
   // Start and steps are rounded (u each), both fused products round once, and no intermediate passes the block's reach + 1.
   const double scale = columns.rate / geometry.pitch_u;
-  const double reach = scale * (static_cast<double>(blocks.nx) * blocks.step_x + static_cast<double>(blocks.ny) * blocks.step_y);
+  // |cos| a + |sin| b <= sqrt(a^2 + b^2).
+  const double reach = scale * std::hypot(static_cast<double>(blocks.nx + 4) * blocks.step_x, static_cast<double>(blocks.ny + 2) * blocks.step_y);
   return 0x1p-24 * (5 * reach + 5);
 }
 

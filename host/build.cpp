@@ -83,12 +83,12 @@ class Builder {
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end()) throw InputError("--roi meets no brick of the grid");
 
     filtered_ = filter_projections(state_, scan, plan.field, progress);
+    measure_filter_error(filtered_, scan, plan.field);
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);
-    GoldSettings settings{plan.grid, bricks_.granularity, plan.gold_rate, plan.upsampling_u, plan.u_filter,
-                          gold_remainder(filtered_, sups_, plan.grid, plan.gold_rate), options.window};
-    stream_.emplace(state_, filtered_, *upsampler_, settings);
+    GoldSettings settings{plan.grid, bricks_.granularity, plan.gold_rate, plan.upsampling_u, plan.u_filter, options.window};
+    stream_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     watch_.lap("bounds");
     probe_ = probe_sampler(device);
     watch_.lap("probe");

@@ -30,6 +30,10 @@ struct FilteredScan {
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                                 const Progress& progress = {});
 
+/// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision, view by view, where
+/// that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps the bound.
+void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field);
+
 /// Lanes to which z is padded, and the launch shape of the column kernels, by device class.
 struct ColumnTuning {
   int lanes = 16;

@@ -46,7 +46,7 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& volume) : grid
   bricks = opencl::DeviceArray<VdvrBrick>(state, std::span<const VdvrBrick>(brick_records(volume)), "brick records");
 }
 
-GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const GoldSettings& settings)
+GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups, const GoldSettings& settings)
     : state_(state), scan_(scan), upsampler_(upsampler), settings_(settings), coverage_(scan.geometry),
       columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)) {
   const std::int64_t g = settings.granularity;
@@ -63,8 +63,9 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   }
   const std::int64_t side = block_bricks_ * g * settings.rate + 3;
   const ColumnBlocks largest{side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}};
-  arithmetic_ = arithmetic_bound(state, upsampler, scan, columns_, largest, settings.u_filter);
-  settings_.t_constant += 1.5 * arithmetic_;
+  arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.u_filter);
+  // The second differences of computed gold err by 4 times its error per axis: (1/8) * 3 * 4.
+  t_constant_ = gold_remainder(scan, sups, settings.grid, settings.rate) + 1.5 * arithmetic_;
 }
 
 GoldStream::~GoldStream() = default;
@@ -205,9 +206,9 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
     project_bound(state_, scan_, table, node_columns, cells_xy, cells_xy, settings_.rate, stride, batch.p_);
     const auto window = settings_.window.value_or(std::pair{0.0, 0.0});
     const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
-    cell_slack({{count((nodes_z + 14) / 16), count(nodes - 1), count(nodes - 1) * n}, local}, cells.buffer(), batch.gold_.buffer(), batch.p_.buffer(), to_int(nodes),
+    cell_slack({{count((nodes_z + 15) / 16), count(nodes - 1), count(nodes - 1) * n}, local}, cells.buffer(), batch.gold_.buffer(), batch.p_.buffer(), to_int(nodes),
                to_int(nodes), to_int(nodes_z), to_int(gold_stride), to_int(stride), settings_.rate, to_int(cells_xy), to_int(cells_xy), to_int(static_cast<std::int64_t>(n)),
-               static_cast<cl_float>(settings_.t_constant), settings_.window ? 1 : 0, static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
+               static_cast<cl_float>(t_constant_), settings_.window ? 1 : 0, static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
     node_slack({{count((nodes_z + 15) / 16), count(nodes), count(nodes) * n}, local}, batch.slack_.buffer(), cells.buffer(), batch.margin_.buffer(), last.buffer(),
                to_int(nodes), to_int(nodes), to_int(nodes_z), to_int(stride), to_int(static_cast<std::int64_t>(n)), lowest, to_int(z_low), to_int(z_high));
     on_batch(batch);

@@ -28,7 +28,6 @@ struct GoldSettings {
   int rate = 8;
   int upsampling = 8;
   std::string u_filter = "linear";
-  double t_constant = 0;  ///< gold_remainder + 1.5 times the arithmetic bound
   std::optional<std::pair<double, double>> window;
 };
 
@@ -55,7 +54,7 @@ struct DeviceField {
 
 class GoldStream {
  public:
-  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const GoldSettings& settings);
+  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups, const GoldSettings& settings);
   ~GoldStream();
 
   /// The blocks of one batch on the device, as handed to the callback.
@@ -86,7 +85,7 @@ class GoldStream {
   Coverage coverage_;
   UpsampledColumns columns_;
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
-  double arithmetic_ = 0, updates_ = 0;
+  double arithmetic_ = 0, t_constant_ = 0, updates_ = 0;
 };
 
 class GoldStream::Batch {

@@ -107,7 +107,7 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
 Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const FieldSups& sups, const Grid& grid, const Rates& rates, double epsilon) {
   int granularity = 4;
   while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity) granularity /= 2;
-  GoldStream stream(state, filtered, upsampler, {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, gold_remainder(filtered, sups, grid, rates.gold), {}});
+  GoldStream stream(state, filtered, upsampler, sups, {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
   Trial t;
   t.arithmetic = stream.arithmetic();
   t.slab_bytes = stream.slab_bytes(granularity);
@@ -189,7 +189,8 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.grid = grid;
   plan.field = field;
   report(progress, "plan", 0.0);
-  const FilteredScan filtered = filter_projections(state, scan, field);
+  FilteredScan filtered = filter_projections(state, scan, field);
+  measure_filter_error(filtered, scan, field);
   Upsampler upsampler(state, filtered);
   const Coverage coverage(filtered.geometry);
 

@@ -106,19 +106,22 @@ double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Gri
                   std::pow(hz, 4) * (5.0 / 24) * wv * sups.second_v);
 }
 
-double arithmetic_bound(opencl::State&, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups, const UpsampledColumns& columns,
                         const ColumnBlocks& blocks, const std::string& u_filter) {
   const ParallelGeometry& g = scan.geometry;
-  const double gain = upsampler.gain_u(columns, 0) * lebesgue_constant(g.rows);
+  const double gain_u = upsampler.gain_u(columns, 0), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const double upsampled = gain * samples;  // bounds the sum over views of any |q| that back-projection loads
   const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
-  const double filtering = scan.ramp_error * gain;
-  const double upsampling = unit_roundoff * (product_error(g.columns) + product_error(g.rows) + 2) * upsampled;
-  const double summation = unit_roundoff * (static_cast<double>(g.views()) + 8) * weight_gain * upsampled;
-  // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's (Bernstein: Omega sup |q|).
-  const double position = position_error(g, columns, blocks) / columns.rate * pi * 1.5 * upsampled;
+  const double filtering = scan.ramp_error * gain_u * gain_v;
+  // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the result round).
+  const double upsampling =
+      unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples + (product_error(g.columns) + 2) * gain_u * sups.value);
+  const double summation = unit_roundoff * (static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
+  // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's; that is bounded by Bernstein and by
+  // Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
+  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * 1.5 * slope;
   return weight_gain * (filtering + upsampling) + summation + position;
 }
 

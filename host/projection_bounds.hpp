@@ -32,7 +32,7 @@ double lebesgue_constant(std::int64_t n);
 double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Grid& grid, int rate);
 
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
-double arithmetic_bound(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups, const UpsampledColumns& columns,
                         const ColumnBlocks& blocks, const std::string& u_filter);
 
 /// Table of derivative maxima for the slab whose rows are the gold rows -1 .. cells_z * rate + 1 of its base cells.

@@ -62,11 +62,12 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;
   check_scan(used);
-  const FilteredScan filtered = filter_projections(state, scan, stored.field);
+  FilteredScan filtered = filter_projections(state, scan, stored.field);
+  measure_filter_error(filtered, scan, stored.field);
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
-  GoldStream stream(state, filtered, upsampler,
-                    {volume.grid, volume.granularity, volume.rate, stored.upsampling_u, stored.u_filter, gold_remainder(filtered, sups, volume.grid, volume.rate), stored.window});
+  GoldStream stream(state, filtered, upsampler, sups,
+                    {volume.grid, volume.granularity, volume.rate, stored.upsampling_u, stored.u_filter, stored.window});
 
   const SamplerTerms sampler = sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device), longest_atlas(device.info()));
   const double others = stream.arithmetic() + std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);

@@ -92,7 +92,7 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
                          int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
-  if (z >= nz - 1 || x >= nx - 1 || block >= blocks) return;
+  if (z >= nz || x >= nx - 1 || block >= blocks) return;  // one cell more than there is: it must be marked UNTESTED
   const int row = (nx + 2) * gold_stride;
   __global const float* at = gold + ((size_t)block * (ny + 2) + y + 1) * row + (size_t)(x + 1) * gold_stride + z + 1;
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
