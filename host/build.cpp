@@ -102,25 +102,22 @@ class Builder {
   void classify(double tolerance) {
     // Gold computed in two blocks differs by its rounding; a brick at the gold rate must pass all the same.
     const double strict = tolerance - 2 * stream_->arithmetic();
-    const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
     stream_->run(selected_, [&](GoldStream::Batch& batch) {
-      const auto errors = batch.classify();
+      const auto classes = batch.classify(static_cast<float>(strict));
       const auto& ids = batch.bricks();
       const auto p = batch.largest_p();
       std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
       for (std::size_t i = 0; i < ids.size(); ++i) {
         const std::size_t id = at(ids[i]);
-        const auto& by_level = errors[i].by_level;
-        bricks_.involved[id] = by_level.back() >= 0;
-        if (!bricks_.involved[id]) continue;
-        slack_.total = std::max(slack_.total, static_cast<double>(by_level.back()));
+        const BrickClass& c = classes[i];
+        bricks_.involved[id] = c.tested;
+        if (!c.tested) continue;
+        slack_.total = std::max(slack_.total, static_cast<double>(c.slack));
         slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
-        slack_.gold = std::max(slack_.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
-        if (!(static_cast<double>(by_level.back()) <= strict)) refuse(by_level.back(), strict);
-        int level = 0;
-        while (level < top && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= strict)) ++level;
-        set_level(ids[i], level);
-        if (level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
+        slack_.gold = std::max(slack_.gold, static_cast<double>(c.slack) - static_cast<double>(p[i].second));
+        if (!(static_cast<double>(c.slack) <= strict)) refuse(c.slack, strict);
+        set_level(ids[i], c.level);
+        if (c.level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
       }
       store(batch, tiles);
     }, progress_, "classify");

@@ -129,7 +129,7 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
   const double hz = grid.spacing[2] / static_cast<double>(rate), z_first = grid.origin[2] + static_cast<double>(cell_z) * grid.spacing[2];
   const std::int64_t nodes_z = cells_z * rate + 1;
   const auto rows = detector_rows(scan_.geometry, z_first - hz, hz, nodes_z + 2);
-  const BoundTable table = bound_table(state_, upsampler_, scan_, columns_, settings_.u_filter, rows, settings_.rate, cells_z);
+  const BoundTable table = bound_table(state_, upsampler_, scan_, columns_, settings_.u_filter, rows, grid, settings_.rate, cells_z);
   const UpsampledSlab slab = upsampler_(columns_, rows);
 
   const std::int64_t nodes = cells_xy * rate + 1, gold_stride = column_stride(nodes_z + 2), stride = column_stride(nodes_z + 17);
@@ -218,36 +218,42 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
 
 std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const { return place_.at(brick); }
 
-std::vector<BrickErrors> GoldStream::Batch::classify() {
+std::vector<BrickClass> GoldStream::Batch::classify(float tolerance) {
   const std::int64_t rate = settings_.rate, n = static_cast<std::int64_t>(blocks());
-  const int levels = std::countr_zero(static_cast<unsigned>(rate)) + 1;
+  const int top = std::countr_zero(static_cast<unsigned>(rate));
   const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> interpolate(state_, "classify", "interpolate_columns", defines);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> level_error(
-      state_, "classify", "level_error", defines);
-  const std::uint64_t per_level = count(n * bricks_x_ * bricks_y_ * bricks_z_);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_float>
+      level_error(state_, "classify", "level_error", defines);
+  const std::uint64_t results = count(n * bricks_x_ * bricks_y_ * bricks_z_);
+  opencl::DeviceArray<cl_int> slack_max(state_, results, "brick slack"), before(state_, results, "brick errors"), error(state_, results, "brick errors");
+  slack_max.fill(-1);
   std::vector<std::vector<cl_int>> errors;
-  const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
-  for (int level = 0; level < levels; ++level) {
+  for (int level = 0; level < top; ++level) {
     const std::int64_t spacing = rate >> level, cx = (nx_ - 1) / spacing + 1, cy = (ny_ - 1) / spacing + 1;
-    opencl::DeviceArray<float> along(state_, count(n * cx * cy * stride_), "interpolated columns");
-    opencl::DeviceArray<cl_int> error(state_, per_level, "brick errors");
+    const opencl::DeviceArray<float> along(state_, count(n * cx * cy * stride_ + gold_room), "interpolated columns");
     error.fill(-1);
-    interpolate({{count((nz_ + 15) / 16), count(cx), count(cy * n)}, local}, along.buffer(), gold_.buffer(), to_int(nx_), to_int(ny_), to_int(nz_), to_int(gold_stride_),
+    interpolate({{count(cx), count(cy), count(n)}, {8, 8, 1}}, along.buffer(), gold_.buffer(), to_int(nx_), to_int(ny_), to_int(nz_), to_int(gold_stride_),
                 to_int(stride_), to_int(spacing), to_int(n));
-    level_error({{count((nz_ + 15) / 16), count(nx_), count(ny_ * n)}, local}, error.buffer(), along.buffer(), gold_.buffer(), slack_.buffer(), to_int(nx_), to_int(ny_),
-                to_int(nz_), to_int(gold_stride_), to_int(stride_), to_int(spacing), to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+    level_error({{count(nx_), count(ny_), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(), slack_max.buffer(), before.buffer(), along.buffer(), gold_.buffer(),
+                slack_.buffer(), level == 0 ? 1 : 0, to_int(nx_), to_int(ny_), to_int(nz_), to_int(gold_stride_), to_int(stride_), to_int(spacing), to_int(bricks_x_),
+                to_int(bricks_y_), to_int(bricks_z_), to_int(n), tolerance);
     errors.push_back(error.to_host());
+    std::swap(error, before);
   }
-  std::vector<BrickErrors> out;
+  const auto slacks = slack_max.to_host();
+  std::vector<BrickClass> out;
   for (const std::int64_t brick : bricks_) {
     const auto [b, x, y, z] = place(brick);
-    BrickErrors e;
-    for (const auto& level : errors) {
-      const cl_int bits = level[at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x)];
-      e.by_level.push_back(bits < 0 ? -1.0f : std::bit_cast<float>(bits));
+    const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+    BrickClass c;
+    c.tested = slacks[i] >= 0;
+    if (c.tested) {
+      c.slack = std::bit_cast<float>(slacks[i]);
+      while (c.level < top && !(std::bit_cast<float>(errors[at(c.level)][i]) <= tolerance)) ++c.level;
     }
-    out.push_back(std::move(e));
+    out.push_back(c);
   }
   return out;
 }

@@ -31,9 +31,11 @@ struct GoldSettings {
   std::optional<std::pair<double, double>> window;
 };
 
-/// Result of the node test per brick of a block, [level] -> largest |interpolant - gold| + slack; negative: nothing tested.
-struct BrickErrors {
-  std::vector<float> by_level;
+/// Result of the node test of one brick.
+struct BrickClass {
+  bool tested = false;   ///< some node of it is
+  int level = 0;         ///< the lowest that passes; the top where only gold itself does
+  float slack = 0;       ///< largest T + P of its nodes: what even gold may err
 };
 
 /// What one brick measured against gold.
@@ -93,9 +95,8 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// The node test at levels 0 .. log2(rate) - 1 (isotropic), per brick of bricks(); level log2(rate), gold itself, last:
-  /// its entry is the slack alone.
-  std::vector<BrickErrors> classify();
+  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - gold| + slack <= tolerance.
+  std::vector<BrickClass> classify(float tolerance);
 
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();

@@ -114,18 +114,16 @@ Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& u
   double tested = 0, tiles = 0;
   const auto begin = std::chrono::steady_clock::now();
   stream.run(trial_bricks(grid, granularity, rates.gold), [&](GoldStream::Batch& batch) {
-    const auto errors = batch.classify();
+    const auto classes = batch.classify(static_cast<float>(epsilon - 3 * t.arithmetic));
     const auto p = batch.largest_p();
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      const auto& by_level = errors[i].by_level;
-      if (by_level.back() < 0) continue;
-      t.slack = std::max(t.slack, static_cast<double>(by_level.back()));
+    for (std::size_t i = 0; i < classes.size(); ++i) {
+      const BrickClass& c = classes[i];
+      if (!c.tested) continue;
+      t.slack = std::max(t.slack, static_cast<double>(c.slack));
       t.projection = std::max(t.projection, static_cast<double>(p[i].first));
-      t.gold = std::max(t.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
-      int level = 0;
-      while (level + 1 < static_cast<int>(by_level.size()) && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= epsilon - 3 * t.arithmetic)) ++level;
+      t.gold = std::max(t.gold, static_cast<double>(c.slack) - static_cast<double>(p[i].second));
       tested += 1;
-      if (level > 0) tiles += std::pow((granularity << level) + 1, 3);
+      if (c.level > 0) tiles += std::pow((granularity << c.level) + 1, 3);
     }
   }, {}, "trial");
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -213,7 +211,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.bounds = global_bounds(filtered, sups, grid);
   report(progress, "plan", 0.6);
 
-  // The cheapest rates whose slack leaves three quarters of the tolerance to the grid; failing that, whatever fits at all.
+  // The cheapest rates whose slack leaves two thirds of the tolerance to the grid; failing that, whatever fits at all.
   const auto all = candidates(rates);
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
@@ -221,7 +219,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter, r.upsampling, t.projection, true});
     plan.bounds.push_back({"gold", "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling), r.gold, t.gold, true});
     if (!finest || t.slack < finest->second.slack) finest = {r, t};
-    if (1.1 * t.slack + 4 * t.arithmetic <= 0.25 * plan.epsilon_abs) {
+    if (1.1 * t.slack + 4 * t.arithmetic <= 0.35 * plan.epsilon_abs) {
       chosen = {r, t};
       break;
     }
