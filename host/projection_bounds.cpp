@@ -174,7 +174,7 @@ BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const Filtere
 }
 
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks, std::int64_t cells_x,
-                   std::int64_t cells_y, int rate, std::int64_t stride, opencl::DeviceArray<float>& p) {
+                   std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p) {
   const ParallelGeometry& g = scan.geometry;
   const std::size_t views = static_cast<std::size_t>(g.views());
   const double scale = table.columns.rate / g.pitch_u;
@@ -188,11 +188,11 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
                                static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), 0.0f}};
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "cell positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(
       state, "gold_bounds", "project_bound");
   kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}}, p.buffer(), table.values.buffer(),
          device_steps.buffer(), to_int(g.views()), to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
-         to_int(static_cast<std::int64_t>(blocks.first.size())), rate, to_int(stride), static_cast<cl_float>(table.factor));
+         to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
 }
 
 AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {

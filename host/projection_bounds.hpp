@@ -46,10 +46,9 @@ struct BoundTable {
 BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                        const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z);
 
-/// P of every base cell of blocks of cells_x x cells_y: float p[block][y][x][stride], constant over the `rate` gold cells of a
-/// base cell. `blocks.first` and `blocks.step_*` are gold nodes. Enqueues; does not wait.
+/// P of every base cell of blocks of cells_x x cells_y: float p[block][z][y][x]. `blocks.first` and `blocks.step_*` are gold nodes. Enqueues; does not wait.
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks,
-                   std::int64_t cells_x, std::int64_t cells_y, int rate, std::int64_t stride, opencl::DeviceArray<float>& p);
+                   std::int64_t cells_x, std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p);
 
 /// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, for interpolation in u at each rate and for gold at
 /// each rate. Cost: views * rows * columns per rate, on the host.

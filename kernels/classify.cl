@@ -41,30 +41,30 @@ inline float largest_of(float16 v) {
   return fmax(c.x, c.y);
 }
 
-// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's closed nodes, and
-// at the first level slack_max to the largest slack. Both start negative and stay so where no node of a brick is tested.
-// Bricks that `before` (the errors of the level below) found within `tolerance` are left out. Positive floats order as their
-// bits do. One work-item does one column of one brick layer; its last node is also the next layer's first.
-__kernel void level_error(volatile __global int* error, volatile __global int* slack_max, __global const int* before,
-                          __global const float* along, __global const float* gold, __global const float* slack, int first_level,
+// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's closed nodes. It
+// starts negative and stays so where no node of a brick is tested. Bricks that `before` (the errors of the level below) found
+// within `tolerance` are left out. Positive floats order as their bits do. One work-item does one column of one brick layer;
+// its last node is also the next layer's first.
+__kernel void level_error(volatile __global int* error, __global const int* before, __global const float* along,
+                          __global const float* gold, __global const float* slack, __global const float* margin, float lowest,
                           int nx, int ny, int nz, int gold_stride, int stride, int spacing, int bricks_x, int bricks_y,
                           int bricks_z, int blocks, float tolerance) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
   if (x >= nx || y >= ny || block >= blocks) return;
+  const size_t column = ((size_t)block * ny + y) * nx + x;
+  if (margin[column] < lowest) return;
   // A column on a border belongs to the closed boxes of the bricks on both sides.
   const int bx0 = max((x - 1) / VDVR_BRICK_NODES, 0), bx1 = min(x / VDVR_BRICK_NODES, bricks_x - 1);
   const int by0 = max((y - 1) / VDVR_BRICK_NODES, 0), by1 = min(y / VDVR_BRICK_NODES, bricks_y - 1);
   const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
-  if (!first_level) {
-    bool wanted = false;
-    for (int by = by0; by <= by1; ++by)
-      for (int bx = bx0; bx <= bx1; ++bx) {
-        const int bits = before[(layer + by) * bricks_x + bx];
-        wanted = wanted || (bits >= 0 && !(as_float(bits) <= tolerance));
-      }
-    if (!wanted) return;
-  }
+  bool wanted = false;
+  for (int by = by0; by <= by1; ++by)
+    for (int bx = bx0; bx <= bx1; ++bx) {
+      const int bits = before[(layer + by) * bricks_x + bx];
+      wanted = wanted || (bits >= 0 && !(as_float(bits) <= tolerance));
+    }
+  if (!wanted) return;
   const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
   const int ix = min(x / spacing, cx - 2), iy = min(y / spacing, cy - 2);
   const float fx = (float)(x - ix * spacing) / (float)spacing, fy = (float)(y - iy * spacing) / (float)spacing;
@@ -72,26 +72,19 @@ __kernel void level_error(volatile __global int* error, volatile __global int* s
   __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * stride + first;
   __global const float* b = a + (size_t)cx * stride;
   __global const float* gold_column = gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + first + 1;
-  __global const float* slack_column = slack + (((size_t)block * ny + y) * nx + x) * stride + first;
+  __global const float* slack_column = slack + column * stride + first;
 
   // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
-  float largest = -1.0f, largest_slack = -1.0f;
+  float largest = -1.0f;
   int z = 0;
-  for (; z + 16 <= last - first + 1; z += 16) {
-    largest = fmax(largest, largest_of(ERROR_AT(z)));
-    if (first_level) largest_slack = fmax(largest_slack, largest_of(vload16(0, slack_column + z)));
-  }
+  for (; z + 16 <= last - first + 1; z += 16) largest = fmax(largest, largest_of(ERROR_AT(z)));
   for (; z <= last - first; ++z) {
     const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[stride + z]) + fy * ((1.0f - fx) * b[z] + fx * b[stride + z]);
     largest = fmax(largest, fabs(v - gold_column[z]) + slack_column[z]);
-    if (first_level) largest_slack = fmax(largest_slack, slack_column[z]);
   }
   if (largest < 0.0f) return;
   for (int by = by0; by <= by1; ++by)
-    for (int bx = bx0; bx <= bx1; ++bx) {
-      atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
-      if (first_level) atomic_max(slack_max + (layer + by) * bricks_x + bx, as_int(fmax(largest_slack, 0.0f)));
-    }
+    for (int bx = bx0; bx <= bx1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
 }
 
 // Copies the samples of tiles out of gold: request i writes tile samples float[sz][sy][sx] at `offset`.
