@@ -56,15 +56,27 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "view positions");
 
+  // A tile's rows share the widest interval of any of them.
+  std::vector<cl_int2> rows(n * static_cast<std::size_t>(blocks.ny), cl_int2{{0, static_cast<cl_int>(blocks.nx) - 1}});
+  if (!blocks.wanted.empty()) {
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto& w = blocks.wanted[i];
+      const bool last_row = (i + 1) % static_cast<std::size_t>(blocks.ny) == 0;
+      const auto& next = last_row ? w : blocks.wanted[i + 1];
+      rows[i] = {{std::min(w[0], next[0]), std::max(w[1], next[1])}};
+    }
+  }
+  const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
+
   const int tile_x = state.info.is_gpu ? 1 : 4, tile_y = state.info.is_gpu ? 1 : 2;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
       state, "back_project", "back_project",
       {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
        {"VDVR_LANES", std::to_string(tuning.lanes)},
        {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
   kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x), count((blocks.ny + tile_y - 1) / tile_y) * n}, tuning.local},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), ints(slab.views), ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)),
+         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views), ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)),
          ints(blocks.nx), ints(blocks.ny), ints(n));
 }
 

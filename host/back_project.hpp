@@ -14,6 +14,8 @@ struct ColumnBlocks {
   std::int64_t nx = 0, ny = 0;
   double step_x = 1, step_y = 1;
   std::vector<std::array<double, 2>> first;
+  /// [block][y]: first and last column wanted; others keep what `out` held. Empty: all.
+  std::vector<std::array<std::int32_t, 2>> wanted{};
 };
 
 /// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear | cubic.

@@ -102,25 +102,28 @@ class Builder {
   void classify(double tolerance) {
     // Gold computed in two blocks differs by its rounding; a brick at the gold rate must pass all the same.
     const double strict = tolerance - 2 * stream_->arithmetic();
-    const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
-    stream_->run(selected_, [&](GoldStream::Batch& batch) {
-      const auto errors = batch.classify();
+    const DeviceField base(state_, as_mixed({bricks_.grid, bricks_.base}, bricks_.granularity));
+    std::vector<std::uint8_t> near = stream_->bricks_near_coverage();
+    for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && selected_[i];
+    const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near), "bricks to classify");
+    measures_.assign(bricks_.level.size(), {});
+    stream_->run(near, [&](GoldStream::Batch& batch) {
+      const auto classes = batch.classify(base, static_cast<float>(strict), device_near);
       const auto& ids = batch.bricks();
       const auto p = batch.largest_p();
       std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
       for (std::size_t i = 0; i < ids.size(); ++i) {
         const std::size_t id = at(ids[i]);
-        const auto& by_level = errors[i].by_level;
-        bricks_.involved[id] = by_level.back() >= 0;
+        const BrickClass& c = classes[i];
+        bricks_.involved[id] = c.base.total >= 0;
         if (!bricks_.involved[id]) continue;
-        slack_.total = std::max(slack_.total, static_cast<double>(by_level.back()));
+        measures_[id] = c.base;
+        slack_.total = std::max(slack_.total, static_cast<double>(c.base.slack));
         slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
-        slack_.gold = std::max(slack_.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
-        if (!(static_cast<double>(by_level.back()) <= strict)) refuse(by_level.back(), strict);
-        int level = 0;
-        while (level < top && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= strict)) ++level;
-        set_level(ids[i], level);
-        if (level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
+        slack_.gold = std::max(slack_.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
+        if (!(static_cast<double>(c.base.slack) <= strict)) refuse(c.base.slack, strict);
+        set_level(ids[i], c.level);
+        if (c.level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
       }
       store(batch, tiles);
     }, progress_, "classify");
@@ -129,8 +132,9 @@ class Builder {
 
   // Closes, packs, measures; raises bricks until every node is within the tolerance.
   MixedVolume close_and_measure(double tolerance) {
-    std::vector<std::uint8_t> pending = bricks_.involved;
-    measures_.assign(bricks_.level.size(), {});
+    // Level 0 was measured on the base samples while classifying, and closing does not change those.
+    std::vector<std::uint8_t> pending(bricks_.level.size());
+    for (std::size_t i = 0; i < pending.size(); ++i) pending[i] = bricks_.involved[i] && bricks_.level[i] != LevelTriple{0, 0, 0};
     for (int round = 0;; ++round) {
       MixedVolume volume = close_boundaries(bricks_);
       watch_.lap("close");

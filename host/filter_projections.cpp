@@ -223,11 +223,11 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
   opencl::DeviceArray<float> filtered(*state_, count(chunk * g.columns * g.rows), "filtered chunk");
   opencl::DeviceArray<float> resampled(*state_, count(chunk * g.columns * slab.rows_padded), "rows of a slab");
 
-  const int block_rows = 8;
+  const int block_rows = 8;  // rows per work-item of the kernel
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_ulong, cl_ulong, cl_ulong, cl_ulong,
                  cl_ulong, cl_ulong> product(
       *state_, "batched_product", "batched_product",
-      {{"VDVR_LANES", std::to_string(tuning.lanes)}, {"VDVR_ROWS", std::to_string(block_rows)}});
+      {{"VDVR_LANES", std::to_string(tuning.lanes)}});
   const auto range = [&](std::int64_t product_rows, std::int64_t batches) {
     return opencl::Range{{count(slab.rows_padded / tuning.lanes), opencl::round_up(count(product_rows), block_rows) / block_rows, count(batches)},
                          {tuning.local[0], tuning.local[1], 1}};

@@ -31,17 +31,19 @@ struct GoldSettings {
   std::optional<std::pair<double, double>> window;
 };
 
-/// Result of the node test per brick of a block, [level] -> largest |interpolant - gold| + slack; negative: nothing tested.
-struct BrickErrors {
-  std::vector<float> by_level;
-};
-
 /// What one brick measured against gold.
 struct BrickMeasure {
   std::int64_t brick = 0;
   float total = -1;      ///< largest |V - gold| + T + P; negative: no tested node
   float error = 0;       ///< largest |V - gold|
+  float slack = 0;       ///< largest T + P: what even gold may err
   std::uint32_t violated = 0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
+};
+
+/// Result of the node test of one brick.
+struct BrickClass {
+  BrickMeasure base;     ///< the base samples, as stored, measured on it
+  int level = 0;         ///< the lowest that passes; the top where only gold itself does
 };
 
 /// A stored field on the device, for the verification kernel.
@@ -65,6 +67,9 @@ class GoldStream {
   /// selected brick is skipped, and a few selected bricks are streamed as blocks of one brick.
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress, const std::string& stage);
 
+  /// Bricks that may hold a tested node; the others need not be streamed.
+  [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
+
   /// fp32 error bound of any gold sample.
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
@@ -73,8 +78,7 @@ class GoldStream {
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
-  struct Slab;
-  void run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t block_bricks,
+  void run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t bricks_x, std::int64_t bricks_y,
                 const std::vector<std::array<std::int64_t, 2>>& blocks, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                 const std::function<void(double)>& tick);
 
@@ -84,6 +88,7 @@ class GoldStream {
   GoldSettings settings_;
   Coverage coverage_;
   UpsampledColumns columns_;
+  std::vector<float> cell_p_;  // P per base cell once computed, [z][y][x]; negative: not yet
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   double arithmetic_ = 0, t_constant_ = 0, updates_ = 0;
 };
@@ -93,9 +98,9 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// The node test at levels 0 .. log2(rate) - 1 (isotropic), per brick of bricks(); level log2(rate), gold itself, last:
-  /// its entry is the slack alone.
-  std::vector<BrickErrors> classify();
+  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - gold| + slack <= tolerance. Level
+  /// 0 is measured on the stored base samples through the sampler: closing never changes those, so it is final.
+  std::vector<BrickClass> classify(const DeviceField& base, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
 
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();
@@ -123,6 +128,8 @@ class GoldStream::Batch {
 
  private:
   friend class GoldStream;
+  struct Results;
+  Results run_measure(const DeviceField& field, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
   Batch(opencl::State& state, const GoldSettings& settings) : state_(state), settings_(settings) {}
   [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
   [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }
@@ -131,6 +138,7 @@ class GoldStream::Batch {
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
   std::int64_t nx_ = 0, ny_ = 0, nz_ = 0, gold_stride_ = 0, stride_ = 0;
+  float lowest_ = 0;  // margin below which a column is untested
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;

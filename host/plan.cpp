@@ -26,6 +26,9 @@ struct Rates {
   int gold;
 };
 
+// Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
+constexpr double share = 0.35;
+
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Cheapest first: gold costs eight times per doubling, cubic in u twice the linear, upsampling memory only.
@@ -104,7 +107,8 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   return selected;
 }
 
-Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const FieldSups& sups, const Grid& grid, const Rates& rates, double epsilon) {
+Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const FieldSups& sups, const Volume& base, const Rates& rates, double epsilon) {
+  const Grid& grid = base.grid;
   int granularity = 4;
   while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity) granularity /= 2;
   GoldStream stream(state, filtered, upsampler, sups, {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
@@ -113,19 +117,20 @@ Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& u
   t.slab_bytes = stream.slab_bytes(granularity);
   double tested = 0, tiles = 0;
   const auto begin = std::chrono::steady_clock::now();
-  stream.run(trial_bricks(grid, granularity, rates.gold), [&](GoldStream::Batch& batch) {
-    const auto errors = batch.classify();
+  const DeviceField field(state, as_mixed(base, granularity));
+  const auto selected = trial_bricks(grid, granularity, rates.gold);
+  const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected), "trial bricks");
+  stream.run(selected, [&](GoldStream::Batch& batch) {
+    const auto classes = batch.classify(field, static_cast<float>(epsilon - 3 * t.arithmetic), device_selected);
     const auto p = batch.largest_p();
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      const auto& by_level = errors[i].by_level;
-      if (by_level.back() < 0) continue;
-      t.slack = std::max(t.slack, static_cast<double>(by_level.back()));
+    for (std::size_t i = 0; i < classes.size(); ++i) {
+      const BrickClass& c = classes[i];
+      if (c.base.total < 0) continue;
+      t.slack = std::max(t.slack, static_cast<double>(c.base.slack));
       t.projection = std::max(t.projection, static_cast<double>(p[i].first));
-      t.gold = std::max(t.gold, static_cast<double>(by_level.back()) - static_cast<double>(p[i].second));
-      int level = 0;
-      while (level + 1 < static_cast<int>(by_level.size()) && !(static_cast<double>(by_level[static_cast<std::size_t>(level)]) <= epsilon - 3 * t.arithmetic)) ++level;
+      t.gold = std::max(t.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
       tested += 1;
-      if (level > 0) tiles += std::pow((granularity << level) + 1, 3);
+      if (c.level > 0) tiles += std::pow((granularity << c.level) + 1, 3);
     }
   }, {}, "trial");
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -213,15 +218,18 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.bounds = global_bounds(filtered, sups, grid);
   report(progress, "plan", 0.6);
 
-  // The cheapest rates whose slack leaves three quarters of the tolerance to the grid; failing that, whatever fits at all.
+  // The cheapest rates whose slack leaves two thirds of the tolerance to the grid; failing that, whatever fits at all.
   const auto all = candidates(rates);
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
-    const Trial t = try_rates(state, filtered, upsampler, sups, grid, r, plan.epsilon_abs);
+    // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
+    const double step = filtered.geometry.pitch_u / r.upsampling;
+    if (r.u_filter == "linear" && &r != &all.back() && 2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs) continue;
+    const Trial t = try_rates(state, filtered, upsampler, sups, plan.base, r, plan.epsilon_abs);
     plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter, r.upsampling, t.projection, true});
     plan.bounds.push_back({"gold", "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling), r.gold, t.gold, true});
     if (!finest || t.slack < finest->second.slack) finest = {r, t};
-    if (1.1 * t.slack + 4 * t.arithmetic <= 0.25 * plan.epsilon_abs) {
+    if (1.1 * t.slack + 4 * t.arithmetic <= share * plan.epsilon_abs) {
       chosen = {r, t};
       break;
     }

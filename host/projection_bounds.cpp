@@ -126,7 +126,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
 }
 
 BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                       const std::string& u_filter, const std::vector<double>& rows, int rate, std::int64_t cells_z) {
+                       const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z) {
   const ParallelGeometry& g = scan.geometry;
   const bool cubic = u_filter == "cubic";
   const int order = cubic ? 4 : 2;
@@ -136,7 +136,8 @@ BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const Filtere
   table.cells_z = cells_z;
   // Linear: d^2/8 |q_uu|. Cubic on four points: (3/128) d^4 |q_uuuu|. Summation of the maxima in fp32 rounds up to K + 8 times.
   table.factor = (cubic ? 3.0 / 128 * std::pow(step, 4) : step * step / 8) * (1 + (static_cast<double>(g.views()) + 8) * 0x1p-23);
-  table.values = opencl::DeviceArray<cl_float2>(state, count(cells_z * g.views() * columns.count), "projection bounds");
+  const std::int64_t entries = cells_z * g.views() * columns.count;
+  opencl::DeviceArray<cl_float2> maxima(state, count(entries), "projection maxima");
 
   std::vector<float> rounding;
   for (const double m : scan.view_max) rounding.push_back(static_cast<float>(derivative_rounding(upsampler, scan, columns, order, m) * (1 + 0x1p-20)));
@@ -153,15 +154,27 @@ BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const Filtere
     const UpsampledSlab d = upsampler(columns, rows, order, 0, 0, first, n);
     opencl::DeviceArray<float> sup(state, count(n * d.rows_padded), "row maxima");
     row_sup({{count(d.rows_padded), count(n), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(n), to_int(columns.count), to_int(d.rows_padded));
-    fill({{count(columns.count), count(n), count(cells_z)}, {64, 1, 1}}, table.values.buffer(), d.values.buffer(), sup.buffer(),
+    fill({{count(columns.count), count(n), count(cells_z)}, {64, 1, 1}}, maxima.buffer(), d.values.buffer(), sup.buffer(),
          device_rounding.buffer(), to_int(first), to_int(n), to_int(g.views()), to_int(columns.count), to_int(d.rows_padded), to_int(d.rows),
          rate, to_int(cells_z), cubic ? 1 : 0, cubic ? 2 : 1, static_cast<cl_float>(remainder));
   }
+
+  std::vector<cl_int> reach;
+  for (const double theta : g.theta_rad) {
+    // Half a base cell's shadow, one gold step beyond it, one column for the floor of its centre and one for fp32.
+    const double half = (0.5 + 1.0 / rate) * (grid.spacing[0] * std::abs(std::cos(theta)) + grid.spacing[1] * std::abs(std::sin(theta)));
+    reach.push_back(static_cast<cl_int>(std::ceil(half * columns.rate / g.pitch_u)) + 1);
+  }
+  const opencl::DeviceArray<cl_int> device_reach(state, std::span<const cl_int>(reach), "cell shadows");
+  table.values = opencl::DeviceArray<cl_float2>(state, count(entries), "projection bounds");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(state, "gold_bounds", "dilate_table");
+  dilate({{count(columns.count), count(cells_z * g.views()), 1}, {64, 1, 1}}, table.values.buffer(), maxima.buffer(), device_reach.buffer(),
+         to_int(g.views()), to_int(columns.count), to_int(cells_z * g.views()));
   return table;
 }
 
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks, std::int64_t cells_x,
-                   std::int64_t cells_y, int rate, std::int64_t stride, opencl::DeviceArray<float>& p) {
+                   std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p) {
   const ParallelGeometry& g = scan.geometry;
   const std::size_t views = static_cast<std::size_t>(g.views());
   const double scale = table.columns.rate / g.pitch_u;
@@ -171,17 +184,15 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
     for (std::size_t k = 0; k < views; ++k) {
       const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]);
       const double t = (blocks.first[b][0] + cell_x / 2) * c + (blocks.first[b][1] + cell_y / 2) * s;
-      // One gold step beyond the cell on each side, and a little for rounding.
-      const double half = scale * ((cell_x / 2 + blocks.step_x) * std::abs(c) + (cell_y / 2 + blocks.step_y) * std::abs(s));
       steps[b * views + k] = {{static_cast<float>(cell_x * c * scale), static_cast<float>(cell_y * s * scale),
-                               static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), static_cast<float>(half * (1 + 1e-6) + 1e-2)}};
+                               static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), 0.0f}};
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "cell positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(
       state, "gold_bounds", "project_bound");
   kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}}, p.buffer(), table.values.buffer(),
          device_steps.buffer(), to_int(g.views()), to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
-         to_int(static_cast<std::int64_t>(blocks.first.size())), rate, to_int(stride), static_cast<cl_float>(table.factor));
+         to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
 }
 
 AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {

@@ -35,7 +35,8 @@ double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Gri
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups, const UpsampledColumns& columns,
                         const ColumnBlocks& blocks, const std::string& u_filter);
 
-/// Table of derivative maxima for the slab whose rows are the gold rows -1 .. cells_z * rate + 1 of its base cells.
+/// Derivative maxima under the shadow of a base cell centred on each column, for the slab whose rows are the gold rows
+/// -1 .. cells_z * rate + 1 of its base cells.
 struct BoundTable {
   opencl::DeviceArray<cl_float2> values;  ///< [base cell z][view][column]
   UpsampledColumns columns;
@@ -43,12 +44,11 @@ struct BoundTable {
   double factor = 0;  ///< times the summed maxima: the error of interpolating in u
 };
 BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                       const std::string& u_filter, const std::vector<double>& rows, int rate, std::int64_t cells_z);
+                       const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z);
 
-/// P of every base cell of blocks of cells_x x cells_y: float p[block][y][x][stride], constant over the `rate` gold cells of a
-/// base cell. `blocks.first` and `blocks.step_*` are gold nodes. Enqueues; does not wait.
+/// P of every base cell of blocks of cells_x x cells_y: float p[block][z][y][x]. `blocks.first` and `blocks.step_*` are gold nodes. Enqueues; does not wait.
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks,
-                   std::int64_t cells_x, std::int64_t cells_y, int rate, std::int64_t stride, opencl::DeviceArray<float>& p);
+                   std::int64_t cells_x, std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p);
 
 /// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, for interpolation in u at each rate and for gold at
 /// each rate. Cost: views * rows * columns per rate, on the host.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <random>
 
 #include "host/gold_stream.hpp"
@@ -31,22 +32,29 @@ bool meets(const MixedVolume& v, std::int64_t brick, const std::array<double, 6>
   return true;
 }
 
-// Every brick, or for each level the wanted share of its bricks and the one that holds the certificate's worst node. Samples come
-// in whole stacks across z of a few columns, so that few slabs have to be filtered.
+// Every brick, or for each level the wanted share of its bricks and the one that holds the certificate's worst node.
 std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate& stored, const VerifyOptions& options) {
   const std::size_t n = v.level.size();
   std::vector<std::uint8_t> selected(n, options.exhaustive ? 1 : 0);
   if (!options.exhaustive) {
-    std::map<LevelTriple, std::vector<std::size_t>> strata;
-    for (std::size_t i = 0; i < n; ++i) strata[v.level[i]].push_back(i);
+    // A few layers of bricks, so that few slabs have to be filtered; every level in each of them.
+    const Index3 counts = v.bricks();
+    std::vector<std::int64_t> layers(at(counts[2]));
+    std::iota(layers.begin(), layers.end(), std::int64_t{0});
     std::mt19937 random(options.seed);
+    std::shuffle(layers.begin(), layers.end(), random);
+    layers.resize(std::min<std::size_t>(layers.size(), 5));
+    std::map<LevelTriple, std::vector<std::size_t>> strata;
+    for (const std::int64_t z : layers)
+      for (std::int64_t i = z * counts[0] * counts[1]; i < (z + 1) * counts[0] * counts[1]; ++i) strata[v.level[at(i)]].push_back(at(i));
+    const double share = options.fraction * static_cast<double>(counts[2]) / static_cast<double>(layers.size());
     for (auto& [level, members] : strata) {
       std::shuffle(members.begin(), members.end(), random);
-      const auto wanted = std::max<std::size_t>(8, static_cast<std::size_t>(std::ceil(options.fraction * static_cast<double>(members.size()))));
+      const auto wanted = std::max<std::size_t>(8, static_cast<std::size_t>(std::ceil(share * static_cast<double>(members.size()))));
       for (std::size_t i = 0; i < std::min(wanted, members.size()); ++i) selected[members[i]] = 1;
     }
-    const Index3 b = brick_at(v, stored.worst_at), count = v.bricks();
-    selected[at((b[2] * count[1] + b[1]) * count[0] + b[0])] = 1;
+    const Index3 b = brick_at(v, stored.worst_at);
+    selected[at((b[2] * counts[1] + b[1]) * counts[0] + b[0])] = 1;
   }
   if (stored.roi)
     for (std::size_t i = 0; i < n; ++i)

@@ -5,6 +5,7 @@
 // per block and view a float4 {step of s along x, along y, s at the block's first sample less an integer, that integer}.
 // One work-item carries VDVR_LANES samples of z for a tile of neighbours in x and y: position, index and weights are shared by
 // the whole column, and the loads are contiguous. Positions are relative to the block, so fp32 holds them (docs/error-bounds.md).
+// rows int2[block][y]: the first and last column of that row (and of the tile's rows above it) that anyone wants.
 // Called by host/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
@@ -87,13 +88,17 @@
 #define PUT(sum, i, c, r) \
   if (x + c < nx && y + r < ny) STORE(sum, target + (size_t)(r * nx + c) * out_stride);
 
-__kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps, int views,
-                           int columns, int z_padded, int out_stride, int nx, int ny, int blocks) {
+__kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
+                           __global const int2* rows, int views, int columns, int z_padded, int out_stride, int nx, int ny, int blocks) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
   const int x = (int)get_global_id(1) * TILE_X;
   const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
   const int block = row / tile_rows, y = (row - block * tile_rows) * TILE_Y;
   if (z >= z_padded || x >= nx || block >= blocks) return;
+
+  // Columns outside every wanted interval are left as they are.
+  const int2 wanted = rows[(size_t)block * ny + y];
+  if (x > wanted.y || x + TILE_X - 1 < wanted.x) return;
 
   const TILE tile_x = (float)x + OFFSET_X, tile_y = (float)y + OFFSET_Y;
   FOR_TILE(CLEAR)

@@ -9,10 +9,6 @@
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
-#ifndef VDVR_ROWS
-#define VDVR_ROWS 8
-#endif
-
 #if VDVR_LANES == 1
 #define VEC float
 #define LOAD(p) (*(p))
@@ -27,32 +23,36 @@
 #define STORE(v, p) (*(__global float16*)(p) = (v))
 #endif
 
+// Eight rows of `a` share each vector of `v`. Named sums, not arrays: compilers keep these in registers.
+#define FOR_ROWS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+// Rows beyond the matrix repeat its last one and are not stored.
+#define ROW(r)                                                                                          \
+  __global const float* row##r = a + (size_t)b * a_batch + (size_t)min(i + r, rows - 1) * terms;        \
+  VEC total##r = (VEC)(0.0f);
+#define CLEAR(r) VEC sum##r = (VEC)(0.0f);
+#define ADD(r) sum##r = fma((VEC)(row##r[j]), x, sum##r);
+#define TOTAL(r) total##r += sum##r;
+#define PUT(r) \
+  if (i + r < rows) STORE(total##r, target + r * 16);
+
 __kernel void batched_product(__global float* out, __global const float* a, __global const float* v, int rows, int terms,
-                              int z_padded, int batches, ulong out_first, ulong out_batch,
-                              ulong out_chunk, ulong a_batch, ulong v_batch, ulong v_chunk) {
+                              int z_padded, int batches, ulong out_first, ulong out_batch, ulong out_chunk, ulong a_batch,
+                              ulong v_batch, ulong v_chunk) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
-  const int i = (int)get_global_id(1) * VDVR_ROWS;
+  const int i = (int)get_global_id(1) * 8;
   const int b = (int)get_global_id(2);
   if (z >= z_padded || i >= rows || b >= batches) return;
   __global const float* column = v + (size_t)b * v_batch + (size_t)(z / 16) * v_chunk + z % 16;
-
-  // Rows beyond the matrix repeat its last one and are not stored.
-  __global const float* row[VDVR_ROWS];
-  VEC total[VDVR_ROWS];
-  for (int r = 0; r < VDVR_ROWS; ++r) {
-    row[r] = a + (size_t)b * a_batch + (size_t)min(i + r, rows - 1) * terms;
-    total[r] = (VEC)(0.0f);
-  }
+  FOR_ROWS(ROW)
   for (int first = 0; first < terms; first += 32) {
     const int last = min(first + 32, terms);
-    VEC sum[VDVR_ROWS];
-    for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = (VEC)(0.0f);
+    FOR_ROWS(CLEAR)
     for (int j = first; j < last; ++j) {
       const VEC x = LOAD(column + (size_t)j * 16);
-      for (int r = 0; r < VDVR_ROWS; ++r) sum[r] = fma((VEC)(row[r][j]), x, sum[r]);
+      FOR_ROWS(ADD)
     }
-    for (int r = 0; r < VDVR_ROWS; ++r) total[r] += sum[r];
+    FOR_ROWS(TOTAL)
   }
-  for (int r = 0; r < VDVR_ROWS; ++r)
-    if (i + r < rows) STORE(total[r], out + out_first + (size_t)b * out_batch + (size_t)(z / 16) * out_chunk + (size_t)(i + r) * 16 + z % 16);
+  __global float* target = out + out_first + (size_t)b * out_batch + (size_t)(z / 16) * out_chunk + (size_t)i * 16 + z % 16;
+  FOR_ROWS(PUT)
 }

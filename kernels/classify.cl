@@ -5,67 +5,86 @@
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
-#if VDVR_BRICK_NODES < 16
-#define SEGMENT VDVR_BRICK_NODES
-#else
-#define SEGMENT 16
-#endif
-
 // Gold at every `spacing`-th column, interpolated linearly along z from its every `spacing`-th node:
-// along[block][y / spacing][x / spacing][stride].
+// along[block][y / spacing][x / spacing][stride]. One work-item fills one column.
 __kernel void interpolate_columns(__global float* along, __global const float* gold, int nx, int ny, int nz, int gold_stride,
                                   int stride, int spacing, int blocks) {
   const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / cy, y = (int)get_global_id(2) - block * cy;
-  if (z >= nz || x >= cx || block >= blocks) return;
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1), block = (int)get_global_id(2);
+  if (x >= cx || y >= cy || block >= blocks) return;
   __global const float* from =
       gold + (((size_t)block * (ny + 2) + y * spacing + 1) * (nx + 2) + x * spacing + 1) * gold_stride + 1;
   __global float* to = along + (((size_t)block * cy + y) * cx + x) * stride;
   const float step = 1.0f / (float)spacing;
-  for (int k = z; k < min(z + 16, nz); ++k) {
-    const int below = k / spacing * spacing;
-    const float f = (float)(k - below) * step;
-    to[k] = below == k ? from[k] : (1.0f - f) * from[below] + f * from[below + spacing];
+  for (int k = 0; k + spacing < nz; k += spacing) {
+    const float low = from[k], high = from[k + spacing];
+    to[k] = low;
+    for (int i = 1; i < spacing; ++i) {
+      const float f = (float)i * step;
+      to[k + i] = (1.0f - f) * low + f * high;
+    }
   }
+  to[nz - 1] = from[nz - 1];
 }
 
-// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's closed nodes.
-// error starts negative: it stays so where no node of a brick is tested. Positive floats order as their bits do.
-__kernel void level_error(volatile __global int* error, __global const float* along, __global const float* gold,
-                          __global const float* slack, int nx, int ny, int nz, int gold_stride, int stride, int spacing,
-                          int bricks_x, int bricks_y, int bricks_z, int blocks) {
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
-  if (z >= nz || x >= nx || block >= blocks) return;
+// The level's interpolant at 16 nodes of one column, or gold itself at 1x spacing.
+#define ERROR_AT(z)                                                                                     \
+  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + stride + (z))) +         \
+        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + stride + (z))) -                  \
+        vload16(0, gold_column + (z))) +                                                                \
+   vload16(0, slack_column + (z)))
+
+inline float largest_of(float16 v) {
+  const float8 a = fmax(v.lo, v.hi);
+  const float4 b = fmax(a.lo, a.hi);
+  const float2 c = fmax(b.lo, b.hi);
+  return fmax(c.x, c.y);
+}
+
+// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's closed nodes. It
+// starts negative and stays so where no node of a brick is tested. Bricks that `before` (the errors of the level below) found
+// within `tolerance` are left out. Positive floats order as their bits do. One work-item does one column of one brick layer;
+// its last node is also the next layer's first.
+__kernel void level_error(volatile __global int* error, __global const int* before, __global const float* along,
+                          __global const float* gold, __global const float* slack, __global const float* margin, float lowest,
+                          int nx, int ny, int nz, int gold_stride, int stride, int spacing, int bricks_x, int bricks_y,
+                          int bricks_z, int blocks, float tolerance) {
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
+  if (x >= nx || y >= ny || block >= blocks) return;
+  const size_t column = ((size_t)block * ny + y) * nx + x;
+  if (margin[column] < lowest) return;
+  // A column on a border belongs to the closed boxes of the bricks on both sides.
+  const int bx0 = max((x - 1) / VDVR_BRICK_NODES, 0), bx1 = min(x / VDVR_BRICK_NODES, bricks_x - 1);
+  const int by0 = max((y - 1) / VDVR_BRICK_NODES, 0), by1 = min(y / VDVR_BRICK_NODES, bricks_y - 1);
+  const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
+  bool wanted = false;
+  for (int by = by0; by <= by1; ++by)
+    for (int bx = bx0; bx <= bx1; ++bx) {
+      const int bits = before[(layer + by) * bricks_x + bx];
+      wanted = wanted || (bits >= 0 && !(as_float(bits) <= tolerance));
+    }
+  if (!wanted) return;
   const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
   const int ix = min(x / spacing, cx - 2), iy = min(y / spacing, cy - 2);
   const float fx = (float)(x - ix * spacing) / (float)spacing, fy = (float)(y - iy * spacing) / (float)spacing;
-  __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * stride + z;
+  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
+  __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * stride + first;
   __global const float* b = a + (size_t)cx * stride;
-  const float16 low = (1.0f - fx) * vload16(0, a) + fx * vload16(0, a + stride);
-  const float16 high = (1.0f - fx) * vload16(0, b) + fx * vload16(0, b + stride);
-  const float16 g = vload16(0, gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + z + 1);
-  const float16 s = vload16(0, slack + (((size_t)block * ny + y) * nx + x) * stride + z);
-  const float16 total = fabs((1.0f - fy) * low + fy * high - g) + s;
+  __global const float* gold_column = gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + first + 1;
+  __global const float* slack_column = slack + column * stride + first;
 
-  float lanes[16];
-  vstore16(total, 0, lanes);
-  for (int first = 0; first < 16; first += SEGMENT) {
-    const int k = z + first;
-    if (k >= nz) break;
-    float largest = lanes[first];
-    for (int i = 1; i < SEGMENT; ++i) largest = k + i < nz ? fmax(largest, lanes[first + i]) : largest;
-    // A node on a border belongs to the closed boxes of the bricks on both sides.
-    const int bz = min(k / VDVR_BRICK_NODES, bricks_z - 1);
-    for (int by = max((y - 1) / VDVR_BRICK_NODES, 0); by <= min(y / VDVR_BRICK_NODES, bricks_y - 1); ++by)
-      for (int bx = max((x - 1) / VDVR_BRICK_NODES, 0); bx <= min(x / VDVR_BRICK_NODES, bricks_x - 1); ++bx) {
-        volatile __global int* e = error + (((size_t)block * bricks_z + bz) * bricks_y + by) * bricks_x + bx;
-        if (largest >= 0.0f) atomic_max(e, as_int(largest));
-        if (k % VDVR_BRICK_NODES == 0 && k > 0 && k / VDVR_BRICK_NODES == bz && lanes[first] >= 0.0f)
-          atomic_max(e - (size_t)bricks_y * bricks_x, as_int(lanes[first]));
-      }
+  // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
+  float largest = -1.0f;
+  int z = 0;
+  for (; z + 16 <= last - first + 1; z += 16) largest = fmax(largest, largest_of(ERROR_AT(z)));
+  for (; z <= last - first; ++z) {
+    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[stride + z]) + fy * ((1.0f - fx) * b[z] + fx * b[stride + z]);
+    largest = fmax(largest, fabs(v - gold_column[z]) + slack_column[z]);
   }
+  if (largest < 0.0f) return;
+  for (int by = by0; by <= by1; ++by)
+    for (int bx = bx0; bx <= bx1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
 }
 
 // Copies the samples of tiles out of gold: request i writes tile samples float[sz][sy][sx] at `offset`.

@@ -1,8 +1,7 @@
 // Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered projections, T from
 // second differences of gold, and the node slack that the node test adds to |V - gold|.
 // Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[base cell z][view][n] = sup of the positive and
-// of the negative part over the rows of a base cell and the stencil of column cell n; p float[block][base cell y][base cell x]
-// [stride], constant over the gold cells of a base cell; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one
+// of the negative part over the rows of a base cell and the stencil of column cell n; p float[block][base cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one
 // node of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack float[block][y][x][stride], node z at z.
 // Called by host/gold_stream.cpp and host/projection_bounds.cpp.
 
@@ -40,27 +39,44 @@ __kernel void bound_table(__global float2* table, __global const float* d, __glo
   table[((size_t)c * all_views + first_view + k) * columns + n] = (float2)(plus, minus);
 }
 
-// P per base cell: for each view the largest table entry over the columns that the cell, widened by one gold step, can hit.
-// steps: per block and view {s per base cell along x, along y, s at the first cell's centre, half width in columns}.
+// Running maximum: out[.][n] = max of table[.][n - reach .. n + reach], reach by view. A base cell's shadow on the columns has
+// the same width wherever the cell lies.
+__kernel void dilate_table(__global float2* out, __global const float2* table, __global const int* reach, int views,
+                           int columns, int rows) {
+  const int n = (int)get_global_id(0), r = (int)get_global_id(1);
+  if (n >= columns || r >= rows) return;
+  const int width = reach[r % views];
+  __global const float2* row = table + (size_t)r * columns;
+  float2 largest = (float2)(0.0f);
+  for (int m = max(n - width, 0); m <= min(n + width, columns - 1); ++m) largest = fmax(largest, row[m]);
+  out[(size_t)r * columns + n] = largest;
+}
+
+// P per base cell: for each view the dilated table's entry under the cell's centre.
+// steps: per block and view {s per base cell along x, along y, s at the first cell's centre, 0}.
 __kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps, int views,
-                            int columns, int cells_x, int cells_y, int cells_z, int blocks, int rate, int stride,
-                            float factor) {
+                            int columns, int cells_x, int cells_y, int cells_z, int blocks, float factor) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cells_z, z = (int)get_global_id(2) - block * cells_z;
   if (x >= cells_x || y >= cells_y || block >= blocks) return;
-  float plus = 0.0f, minus = 0.0f;
+  float2 sum = (float2)(0.0f);
   for (int k = 0; k < views; ++k) {
     const float4 step = steps[(size_t)block * views + k];
-    const float s = step.z + step.x * (float)x + step.y * (float)y;
-    const int first = clamp((int)floor(s - step.w), 0, columns - 1), last = clamp((int)floor(s + step.w), 0, columns - 1);
-    __global const float2* row = table + ((size_t)z * views + k) * columns;
-    float2 largest = (float2)(0.0f);
-    for (int n = first; n <= last; ++n) largest = fmax(largest, row[n]);
-    plus += largest.x;
-    minus += largest.y;
+    const int n = clamp((int)floor(step.z + step.x * (float)x + step.y * (float)y), 0, columns - 1);
+    sum += table[((size_t)z * views + k) * columns + n];
   }
-  __global float* target = p + (((size_t)block * cells_y + y) * cells_x + x) * stride + (size_t)z * rate;
-  for (int i = 0; i < rate; ++i) target[i] = factor * fmax(plus, minus);
+  p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
+}
+
+// P of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
+__kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y, int cells_z, int rate,
+                           int stride, int blocks) {
+  const int z = (int)get_global_id(0), x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / cells_y, y = (int)get_global_id(2) - block * cells_y;
+  if (z >= stride || x >= cells_x || block >= blocks) return;
+  const int cell = z / rate;
+  rows[(((size_t)block * cells_y + y) * cells_x + x) * stride + z] =
+      cell < cells_z ? p[(((size_t)block * cells_z + cell) * cells_y + y) * cells_x + x] : 0.0f;
 }
 
 // Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.

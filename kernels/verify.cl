@@ -1,6 +1,6 @@
 // Measures the stored field V against gold at every tested node of a block, through the sampler that renders it
-// (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, and which of its 27
-// parts (corners, edges, faces, inside) hold a node above the tolerance.
+// (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, the largest T + P, and
+// which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
 // Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
 // Called by host/gold_stream.cpp.
 #include "shared/mixed_sampler.h"
@@ -8,10 +8,16 @@
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
 inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
-__kernel void verify_nodes(volatile __global int* total, volatile __global int* error, volatile __global int* violated,
-                           __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
-                           __global const float* gold, __global const float* slack, __global const int4* first_brick,
-                           __global const uchar* selected, int nx, int ny, int gold_stride, int stride, int rate,
+inline float largest_of(float8 v) {
+  const float4 a = fmax(v.lo, v.hi);
+  const float2 b = fmax(a.lo, a.hi);
+  return fmax(b.x, b.y);
+}
+
+__kernel void verify_nodes(volatile __global int* total, volatile __global int* error, volatile __global int* slack_max,
+                           volatile __global int* violated, __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
+                           __global const float* gold, __global const float* slack, __global const float* margin,
+                           __global const int4* first_brick, __global const uchar* selected, float lowest, int nx, int ny, int gold_stride, int stride, int rate,
                            int bricks_x, int bricks_y, int bricks_z, int blocks, float tolerance) {
   const int side = grid.granularity * rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
@@ -28,36 +34,54 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
   const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
   const int last_z = min(g, grid.cells_z - bz * g) * rate;
   if (ix > last_x || iy > last_y) return;
+  const int node_x = brick_x * g * rate + ix, node_y = brick_y * g * rate + iy, node_z = brick_z * g * rate;
+  const size_t column = ((size_t)block * ny + node_y) * nx + node_x;
+  if (margin[column] < lowest) return;
   const VdvrBrick b = bricks[brick];
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const VdvrLocal x = vdvr_local((float)(bx * g) + (float)ix / (float)rate, bx, b.level_x, g, grid.cells_x);
   const VdvrLocal y = vdvr_local((float)(by * g) + (float)iy / (float)rate, by, b.level_y, g, grid.cells_y);
+  const float interval = (float)(1 << b.level_z) / (float)rate;
   __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
 
-  const int node_x = brick_x * g * rate + ix, node_y = brick_y * g * rate + iy, node_z = brick_z * g * rate;
   __global const float* gold_column = gold + (((size_t)block * (ny + 2) + node_y + 1) * (nx + 2) + node_x + 1) * gold_stride + node_z + 1;
-  __global const float* slack_column = slack + (((size_t)block * ny + node_y) * nx + node_x) * stride + node_z;
-  float largest_total = -1.0f, largest_error = 0.0f;
-  int parts = 0, index = -1;
-  float low = 0.0f, high = 0.0f;
-  for (int k = 0; k <= last_z; ++k) {
-    const float s = slack_column[k];
-    if (s < 0.0f) continue;
-    const VdvrLocal z = vdvr_local((float)(bz * g) + (float)k / (float)rate, bz, b.level_z, g, grid.cells_z);
-    if (z.index != index) {  // the two faces that vdvr_trilinear would interpolate, kept from node to node
-      index = z.index;
-      low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
-      high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+  __global const float* slack_column = slack + column * stride + node_z;
+  float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
+  int parts = 0;
+  // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node between them, and
+  // the nodes' fractions are the dyadic ones vdvr_local gives.
+  const int per_interval = rate >> b.level_z;
+  for (int index = 0; index * per_interval < last_z; ++index) {
+    const float low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
+    const float high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+    const int first_node = index * per_interval, nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
+    int i = 0;
+    for (; i + 8 <= nodes; i += 8) {
+      const float8 t = ((float)i + (float8)(0, 1, 2, 3, 4, 5, 6, 7)) * interval;
+      const float8 s = vload8(0, slack_column + first_node + i);
+      const float8 e = fabs(((1.0f - t) * low + t * high) - vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
+      const float8 both = e + s;
+      // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the comparison.
+      if (any((s >= 0.0f) & !(both <= tolerance))) break;
+      largest_total = fmax(largest_total, largest_of(both));
+      largest_slack = fmax(largest_slack, largest_of(s));
+      largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), e, s >= 0.0f)));
     }
-    const float e = fabs(vdvr_lerp(low, high, z.fraction) - gold_column[k]);
-    largest_total = fmax(largest_total, e + s);
-    largest_error = fmax(largest_error, e);
-    // Written so that NaN counts as a violation.
-    if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
+    for (; i < nodes; ++i) {
+      const int k = first_node + i;
+      const float s = slack_column[k];
+      if (!(s >= 0.0f)) continue;
+      const float e = fabs(vdvr_lerp(low, high, (float)i * interval) - gold_column[k]);
+      largest_total = fmax(largest_total, e + s);
+      largest_slack = fmax(largest_slack, s);
+      largest_error = fmax(largest_error, e);
+      if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
+    }
   }
-  if (largest_total < 0.0f) return;
+  if (largest_slack < 0.0f) return;
   const size_t out = (((size_t)block * bricks_z + brick_z) * bricks_y + brick_y) * bricks_x + brick_x;
-  atomic_max(total + out, as_int(largest_total));
+  atomic_max(total + out, as_int(fmax(largest_total, 0.0f)));
   atomic_max(error + out, as_int(largest_error));
+  atomic_max(slack_max + out, as_int(largest_slack));
   if (parts) atomic_or(violated + out, parts);
 }
