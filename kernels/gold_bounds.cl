@@ -80,16 +80,16 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
 }
 
 // Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.
-#define DIFFERENCES(node)                                                                       \
-  {                                                                                             \
-    __global const float* at = node;                                                            \
-    const float16 twice = 2.0f * vload16(0, at);                                                \
-    const float16 dx = vload16(0, at - gold_stride) + vload16(0, at + gold_stride) - twice;     \
-    const float16 dy = vload16(0, at - row) + vload16(0, at + row) - twice;                     \
-    const float16 dz = vload16(0, at - 1) + vload16(0, at + 1) - twice;                         \
-    px = fmax(px, dx); mx = fmin(mx, dx);                                                       \
-    py = fmax(py, dy); my = fmin(my, dy);                                                       \
-    pz = fmax(pz, dz); mz = fmin(mz, dz);                                                       \
+#define DIFFERENCES(node)                                                                           \
+  {                                                                                                 \
+    __global const float* centre = node;                                                            \
+    const float16 twice = 2.0f * vload16(0, centre);                                                \
+    const float16 dx = vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) - twice; \
+    const float16 dy = vload16(0, centre - row) + vload16(0, centre + row) - twice;                 \
+    const float16 dz = vload16(0, centre - 1) + vload16(0, centre + 1) - twice;                     \
+    px = fmax(px, dx); mx = fmin(mx, dx);                                                           \
+    py = fmax(py, dy); my = fmin(my, dy);                                                           \
+    pz = fmax(pz, dz); mz = fmin(mz, dz);                                                           \
   }
 #define RANGE(node)                                                                             \
   {                                                                                             \

@@ -1,0 +1,293 @@
+#define BOOST_TEST_MODULE close_boundaries
+#include "host/close_boundaries.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <cstring>
+#include <optional>
+#include <random>
+
+#include "host/brick_layout.hpp"
+#include "tests/reference/mixed_field.hpp"
+#include "tests/support/tolerance.hpp"
+
+using namespace vdvr;
+
+namespace {
+
+struct Case {
+  Index3 cells;
+  int granularity;
+  int rate;
+  std::vector<LevelTriple> triples;
+  double involved = 1;  ///< share of the bricks
+  unsigned seed = 1;
+};
+
+const std::vector<LevelTriple> isotropic{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
+const std::vector<LevelTriple> anisotropic{{0, 0, 0}, {1, 1, 1}, {0, 2, 1}, {2, 0, 0},
+                                           {0, 1, 0}, {1, 0, 2}, {2, 2, 2}};
+
+std::int64_t id_of(const Index3& bricks, const Index3& p) {
+  return (p[2] * bricks[1] + p[1]) * bricks[0] + p[0];
+}
+
+// Smooth, with noise on every gold node: a function of the node alone.
+float gold_at(const Index3& node, int rate) {
+  const auto hash =
+      static_cast<std::uint32_t>(node[0] * 73856093 ^ node[1] * 19349663 ^ node[2] * 83492791) * 2654435761u;
+  const double x = static_cast<double>(node[0]) / rate, y = static_cast<double>(node[1]) / rate,
+               z = static_cast<double>(node[2]) / rate;
+  return static_cast<float>(std::sin(0.7 * x + 0.3 * y) + std::cos(0.5 * z - 0.2 * x) +
+                            static_cast<double>(hash) * 0x1p-34);
+}
+
+// Random levels; every brick's gold differs by a tiny amount of its own, as gold computed in different blocks
+// does.
+OpenBricks random_bricks(const Case& c) {
+  OpenBricks b;
+  b.grid.cells = c.cells;
+  b.granularity = c.granularity;
+  b.rate = c.rate;
+  const Index3 n = b.grid.samples();
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x)
+        b.base.push_back(gold_at({x * c.rate, y * c.rate, z * c.rate}, c.rate));
+  MixedVolume shape;
+  shape.grid = b.grid;
+  shape.granularity = b.granularity;
+  const Index3 bricks = shape.bricks();
+  std::mt19937 random(c.seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::uniform_int_distribution<std::size_t> pick(0, c.triples.size() - 1);
+  for (std::int64_t i = 0; i < shape.brick_count(); ++i) {
+    const bool involved = unit(random) < c.involved;
+    const LevelTriple l = involved ? c.triples[pick(random)] : LevelTriple{0, 0, 0};
+    b.involved.push_back(involved ? 1 : 0);
+    b.level.push_back(l);
+    b.gold.emplace_back();
+    if (l == LevelTriple{0, 0, 0}) continue;
+    const Index3 p{i % bricks[0], i / bricks[0] % bricks[1], i / bricks[0] / bricks[1]};
+    const auto side = shape.tile_shape(l);
+    const float own = 1 + 0x1p-20f * static_cast<float>(unit(random));
+    const auto node = [&](std::size_t a, std::int64_t s) {
+      return std::min(p[a] * c.granularity * c.rate + s * (c.rate >> l[2 - a]), c.cells[a] * c.rate);
+    };
+    for (std::int64_t z = 0; z < side[0]; ++z)
+      for (std::int64_t y = 0; y < side[1]; ++y)
+        for (std::int64_t x = 0; x < side[2]; ++x)
+          b.gold.back().push_back(own * gold_at({node(0, x), node(1, y), node(2, z)}, c.rate));
+  }
+  return b;
+}
+
+double largest_sample(const MixedVolume& v) {
+  float largest = 0;
+  for (const float s : v.base) largest = std::max(largest, std::abs(s));
+  for (const auto& [triple, samples] : v.tiles)
+    for (const float s : samples) largest = std::max(largest, std::abs(s));
+  return static_cast<double>(largest);
+}
+
+// Two bricks and the closed box they share, in fine nodes (rate per cell).
+struct Shared {
+  Index3 a, b, low, high;
+};
+
+// Calls visit for every pair of bricks that share a face, an edge or a corner.
+template <class Visit>
+void for_each_pair(const OpenBricks& b, const MixedVolume& v, Visit&& visit) {
+  const Index3 n = v.bricks();
+  for (std::int64_t i = 0; i < v.brick_count(); ++i)
+    for (int direction = 14; direction < 27; ++direction) {  // each pair once
+      const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]},
+          q{p[0] + direction % 3 - 1, p[1] + direction / 3 % 3 - 1, p[2] + direction / 9 - 1};
+      bool inside = true;
+      Shared s{p, q, {}, {}};
+      for (std::size_t a = 0; a < 3; ++a) {
+        inside = inside && q[a] >= 0 && q[a] < n[a];
+        const std::int64_t width = b.granularity * b.rate, last = b.grid.cells[a] * b.rate;
+        s.low[a] = std::max(p[a], q[a]) * width;
+        s.high[a] = std::min((std::min(p[a], q[a]) + 1) * width, last);
+      }
+      if (inside && b.involved[static_cast<std::size_t>(i)] &&
+          b.involved[static_cast<std::size_t>(id_of(n, q))])
+        visit(s);
+    }
+}
+
+LevelTriple level_of(const MixedVolume& v, const Index3& brick) {
+  return v.level[static_cast<std::size_t>(id_of(v.bricks(), brick))];
+}
+
+// The stored sample of a brick at a fine node, if it has one there.
+std::optional<float> stored_at(const MixedVolume& v, const Index3& brick, const Index3& node) {
+  const LevelTriple l = level_of(v, brick);
+  Index3 sample{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t local = node[a] - brick[a] * v.granularity * v.rate, spacing = v.rate >> l[2 - a];
+    if (local % spacing != 0) return std::nullopt;
+    sample[a] = local / spacing;
+  }
+  return static_cast<float>(reference::stored_sample(v, brick, sample));
+}
+
+// The shared sampler's value at a cell coordinate, from a chosen brick's side.
+float sampled_from(const MixedVolume& v, const Index3& brick, const Vec3& cell) {
+  const VdvrBrick r = brick_record(v, tile_offsets(v), brick[0], brick[1], brick[2]);
+  const LevelTriple l = level_of(v, brick);
+  const float* samples = v.base.data() + r.offset;
+  if (l != LevelTriple{0, 0, 0}) samples = v.tiles.at(l).data() + (r.offset - tile_offsets(v).at(l));
+  const auto local = [&](std::size_t a) {
+    return vdvr_local(static_cast<float>(cell[a]), static_cast<vdvr_i32>(brick[a]), l[2 - a], v.granularity,
+                      static_cast<vdvr_i32>(v.grid.cells[a]));
+  };
+  return vdvr_sample_in_brick(samples, r.stride_y, r.stride_z, local(0), local(1), local(2));
+}
+
+void check_closed(const Case& c) {
+  const OpenBricks open = random_bricks(c);
+  const MixedVolume v = close_boundaries(open);
+  BOOST_TEST((v.level == open.level));
+  BOOST_TEST((v.base == open.base));
+
+  std::int64_t shared = 0, different_bits = 0, jumps = 0, steps = 0;
+  const double across_levels = 14 * tolerance::unit_roundoff * largest_sample(v);
+  std::mt19937 random(c.seed + 7);
+  for_each_pair(open, v, [&](const Shared& s) {
+    const bool same_level = level_of(v, s.a) == level_of(v, s.b);
+    const auto compare = [&](const Vec3& cell) {
+      const double difference = std::abs(static_cast<double>(sampled_from(v, s.a, cell)) -
+                                         static_cast<double>(sampled_from(v, s.b, cell)));
+      if (!(difference <= across_levels)) ++jumps;
+      if (same_level && difference != 0) ++steps;
+    };
+    for (std::int64_t z = s.low[2]; z <= s.high[2]; ++z)
+      for (std::int64_t y = s.low[1]; y <= s.high[1]; ++y)
+        for (std::int64_t x = s.low[0]; x <= s.high[0]; ++x) {
+          const auto a = stored_at(v, s.a, {x, y, z}), b = stored_at(v, s.b, {x, y, z});
+          const double h = 1.0 / c.rate;
+          compare({static_cast<double>(x) * h, static_cast<double>(y) * h, static_cast<double>(z) * h});
+          if (!a || !b) continue;
+          ++shared;
+          if (std::memcmp(&*a, &*b, sizeof(float)) != 0) ++different_bits;
+        }
+    for (int i = 0; i < 16; ++i) {  // between samples; multiples of 2^-12 of a cell are exact in fp32
+      Vec3 cell{};
+      for (std::size_t a = 0; a < 3; ++a) {
+        std::uniform_int_distribution<std::int64_t> at(s.low[a] * 4096 / c.rate, s.high[a] * 4096 / c.rate);
+        cell[a] = static_cast<double>(at(random)) / 4096;
+      }
+      compare(cell);
+    }
+  });
+  BOOST_TEST(shared > 0);
+  BOOST_TEST(different_bits == 0);
+  BOOST_TEST(jumps == 0);
+  BOOST_TEST(steps == 0);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(closed_field_is_continuous_and_shares_its_bits) {
+  for (const int g : {1, 2, 4})
+    for (const auto* triples : {&isotropic, &anisotropic})
+      for (const unsigned seed : {1u, 2u, 3u})
+        check_closed({{4 * g, 3 * g, 4 * g}, g, 4, *triples, 1.0, seed});
+}
+
+BOOST_AUTO_TEST_CASE(partial_last_bricks_close_too) {
+  for (const auto* triples : {&isotropic, &anisotropic})
+    for (const Index3& cells : {Index3{10, 7, 5}, {5, 9, 13}, {4, 1, 6}})
+      check_closed({cells, 4, 4, *triples, 1.0, 5});
+  check_closed({{7, 3, 5}, 2, 8, {{0, 0, 0}, {3, 3, 3}, {1, 1, 1}, {0, 3, 2}}, 1.0, 6});
+}
+
+BOOST_AUTO_TEST_CASE(bricks_that_take_part_close_among_themselves) {
+  for (const auto* triples : {&isotropic, &anisotropic})
+    for (const unsigned seed : {11u, 12u}) check_closed({{14, 12, 10}, 2, 4, *triples, 0.7, seed});
+}
+
+BOOST_AUTO_TEST_CASE(base_lattice_samples_are_the_base_samples) {
+  const OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, 0.9, 3});
+  const MixedVolume v = close_boundaries(open);
+  const Index3 n = v.bricks(), samples = v.grid.samples();
+  for (std::int64_t i = 0; i < v.brick_count(); ++i) {
+    const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+    const auto last = [&](std::size_t a) { return std::min(v.grid.cells[a], (p[a] + 1) * v.granularity); };
+    for (std::int64_t z = p[2] * v.granularity; z <= last(2); ++z)
+      for (std::int64_t y = p[1] * v.granularity; y <= last(1); ++y)
+        for (std::int64_t x = p[0] * v.granularity; x <= last(0); ++x)
+          BOOST_REQUIRE(stored_at(v, p, {x * v.rate, y * v.rate, z * v.rate}).value() ==
+                        v.base[static_cast<std::size_t>((z * samples[1] + y) * samples[0] + x)]);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(samples_inside_a_brick_stay_gold_and_planes_beyond_the_grid_repeat) {
+  const OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, 1.0, 4});
+  const MixedVolume v = close_boundaries(open);
+  const Index3 n = v.bricks();
+  for (std::int64_t i = 0; i < v.brick_count(); ++i) {
+    const LevelTriple l = v.level[static_cast<std::size_t>(i)];
+    if (l == LevelTriple{0, 0, 0}) continue;
+    const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+    const auto side = v.tile_shape(l);
+    const float* tile = v.tiles.at(l).data() +
+                        static_cast<std::int64_t>(v.tile[static_cast<std::size_t>(i)]) * v.tile_size(l);
+    Index3 end{};
+    for (std::size_t a = 0; a < 3; ++a)
+      end[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - p[a] * v.granularity) << l[2 - a];
+    const auto index = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+      return (z * side[1] + y) * side[2] + x;
+    };
+    for (std::int64_t z = 0; z < side[0]; ++z)
+      for (std::int64_t y = 0; y < side[1]; ++y)
+        for (std::int64_t x = 0; x < side[2]; ++x) {
+          const bool beyond = x > end[0] || y > end[1] || z > end[2];
+          const bool border = x == 0 || y == 0 || z == 0 || x == end[0] || y == end[1] || z == end[2];
+          const bool on_base = x % (1 << l[2]) == 0 && y % (1 << l[1]) == 0 && z % (1 << l[0]) == 0;
+          if (beyond)
+            BOOST_REQUIRE(tile[index(x, y, z)] ==
+                          tile[index(std::min(x, end[0]), std::min(y, end[1]), std::min(z, end[2]))]);
+          else if (!border && !on_base)
+            BOOST_REQUIRE(tile[index(x, y, z)] ==
+                          open.gold[static_cast<std::size_t>(i)][static_cast<std::size_t>(index(x, y, z))]);
+        }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(neighbours_that_take_no_part_lower_nothing) {
+  OpenBricks open = random_bricks({{6, 6, 6}, 2, 4, {{2, 2, 2}}, 1.0, 8});
+  constexpr std::size_t middle = 13;  // of 3 x 3 x 3
+  for (std::size_t i = 0; i < open.level.size(); ++i) {
+    if (i == middle) continue;
+    open.involved[i] = 0;
+    open.level[i] = {0, 0, 0};
+    open.gold[i].clear();
+  }
+  const MixedVolume v = close_boundaries(open);
+  const auto& tile = v.tiles.at({2, 2, 2});
+  for (std::size_t i = 0; i < tile.size(); ++i) {
+    const std::size_t x = i % 9, y = i / 9 % 9, z = i / 81;
+    if (x % 4 == 0 && y % 4 == 0 && z % 4 == 0) continue;  // base samples
+    BOOST_REQUIRE(tile[i] == open.gold[middle][i]);
+  }
+  for (int part = 0; part < 27; ++part) {
+    const auto incident = incident_bricks(open, middle, {part % 3, part / 3 % 3, part / 9});
+    BOOST_TEST((incident == std::vector<std::int64_t>{middle}));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_coarse_neighbour_decides_the_shared_face) {
+  OpenBricks open = random_bricks({{4, 2, 2}, 2, 4, {{2, 2, 2}}, 1.0, 9});
+  open.level[0] = {0, 0, 0};
+  open.gold[0].clear();
+  const MixedVolume v = close_boundaries(open);
+  for (std::int64_t z = 0; z <= 8; ++z)
+    for (std::int64_t y = 0; y <= 8; ++y) {
+      const double coarse = reference::field_of_brick(
+          v, {0, 0, 0}, {2, static_cast<double>(y) / 4, static_cast<double>(z) / 4});
+      BOOST_TEST(std::abs(static_cast<double>(stored_at(v, {1, 0, 0}, {8, y, z}).value()) - coarse) <=
+                 14 * tolerance::unit_roundoff * largest_sample(v));
+    }
+}
