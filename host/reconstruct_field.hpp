@@ -8,6 +8,7 @@
 #include "host/filter_projections.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 
@@ -22,6 +23,6 @@ double kept_margin(const Grid& grid, int rate);
 UpsampledColumns columns_for(const ParallelGeometry& geometry, const Grid& grid, int upsampling);
 
 Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const Grid& grid, int upsampling,
-                         const std::string& u_filter, const Progress& progress);
+                         const std::string& u_filter, const Progress& progress, StageSeconds* seconds = nullptr);
 
 }  // namespace vdvr

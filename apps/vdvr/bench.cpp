@@ -41,33 +41,6 @@ void print_line(const Json& json) {
   std::fflush(stdout);
 }
 
-/// How fast a stage of the library moves, from the reports that it makes on the way: what lies before its
-/// first report (filtering, upsampling) and after its last one does not count.
-class StageClock {
- public:
-  Progress callback(const std::string& stage) {
-    return [this, stage](const std::string& reported, double fraction) {
-      throw_if_interrupted();
-      if (reported != stage) return;
-      last_ = {Clock::now(), fraction};
-      if (!first_) first_ = last_;
-    };
-  }
-  /// Of the whole, per second; 0 when there were fewer than two reports.
-  [[nodiscard]] double rate() const {
-    if (!first_ || !(last_.fraction > first_->fraction)) return 0;
-    return (last_.fraction - first_->fraction) / std::chrono::duration<double>(last_.at - first_->at).count();
-  }
-
- private:
-  struct Report {
-    Clock::time_point at{};
-    double fraction = 0;
-  };
-  std::optional<Report> first_;
-  Report last_;
-};
-
 /// The mean over the ball of half the radius must be the sphere's density: FBP keeps means to far better than
 /// the percent asked for here, and a wrong weight, angle or pitch misses it.
 void check_sphere(const Volume& volume, double radius) {
@@ -114,11 +87,17 @@ int bench_fbp(Arguments& args) {
   std::vector<double> seconds, gups;
   const double updates = static_cast<double>(grid.sample_count()) * simulated.angles;
   for (std::size_t i = 0; i < repetitions; ++i) {
-    StageClock stages;
     const auto start = Clock::now();
-    reconstruct(device, scan, grid, options, stages.callback("reconstruct"));
+    reconstruct(device, scan, grid, options, [](const std::string&, double) { throw_if_interrupted(); });
     seconds.push_back(since(start));
-    gups.push_back(stages.rate() * updates / 1e9);
+  }
+  // Again stage by stage: waiting between stages is not part of the end-to-end time.
+  StageSeconds stages;
+  for (std::size_t i = 0; i < repetitions; ++i) {
+    StageSeconds once;
+    reconstruct(device, scan, grid, options, {}, &once);
+    gups.push_back(updates / once.at("back-project") / 1e9);
+    for (const auto& [stage, s] : once) stages[stage] += s / static_cast<double>(repetitions);
   }
   progress.clear();
   Json line = bench_line("fbp", device, repetitions);
@@ -126,7 +105,8 @@ int bench_fbp(Arguments& args) {
   line["detector"] = {size, size};
   line["angles"] = simulated.angles;
   line["seconds"] = spread(seconds);
-  line["gups"] = spread(gups)["median"];  // of the back-projection with its read-back
+  line["gups"] = spread(gups)["median"];  // of the back-projection alone
+  line["stages"] = seconds_json(stages);
   line["gups_end_to_end"] = updates / line["seconds"]["median"].get<double>() / 1e9;
   print_line(line);
   return 0;

@@ -1,6 +1,7 @@
 // Uniform filtered back-projection, and the grid it runs on.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -28,6 +29,8 @@ inline bool is_covered(const ParallelGeometry& geometry, double center, const Ve
   return coverage_margin(geometry, center, point) >= 0;
 }
 
+using StageSeconds = std::map<std::string, double>;
+
 struct ReconstructOptions {
   FieldOptions field;
   int upsampling = 8;               ///< in u; a power of two
@@ -36,8 +39,9 @@ struct ReconstructOptions {
 
 /// F on the samples of `grid` by FBP on the device; samples farther than a cell's diagonal outside the covered region are 0.
 /// Cost: views * samples updates. Memory: views * (columns * upsampling) * rows of one slab, sized by --max-memory.
+/// With `seconds` the stages (filter, upsample, back-project, read back) wait for each other and are timed.
 Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid, const ReconstructOptions& options,
-                   const Progress& progress = {});
+                   const Progress& progress = {}, StageSeconds* seconds = nullptr);
 
 /// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
 /// Returns notes for the user: limited angle, grouped views.
