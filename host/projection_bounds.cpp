@@ -117,7 +117,9 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the result round).
   const double upsampling =
       unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples + (product_error(g.columns) + 2) * gain_u * sups.value);
-  const double summation = unit_roundoff * (static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
+  // One rounding per multiply-add from the view that a term enters at, and the weights' own.
+  const double per_view = u_filter == "cubic" ? 4 : 2;
+  const double summation = unit_roundoff * (per_view * static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
   // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's; that is bounded by Bernstein and by
   // Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
