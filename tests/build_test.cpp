@@ -238,8 +238,8 @@ BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {
 }
 
 BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
-  const ProjectionSet scan = noise_scan(19, 9, 33, 11);
-  const Built built = build_of(scan, {grid_of(scan, {8, 8, 8}, 0.9), 0.3});
+  const ProjectionSet scan = simulated(sphere(10, 1), 33, 17, 30);  // smooth enough for bricks of level 0
+  const Built built = build_of(scan, {grid_of(scan, {16, 16, 8}, 1.0), 0.3});
   // The first sample inside a brick that reads the base.
   MixedVolume altered = built.result.volume;
   const auto coarse = std::find(altered.level.begin(), altered.level.end(), LevelTriple{0, 0, 0});
@@ -250,7 +250,7 @@ BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
   altered.base[static_cast<std::size_t>((inside[2] * samples[1] + inside[1]) * samples[0] + inside[0])] +=
       static_cast<float>(2.5 * built.plan.epsilon_abs);
   BOOST_TEST(!verifies(scan, altered, built.result.certificate));
-  BOOST_TEST(!verifies(noise_scan(19, 9, 33, 12), built.result.volume, built.result.certificate));
+  BOOST_TEST(!verifies(noise_scan(30, 17, 33, 12), built.result.volume, built.result.certificate));
 }
 
 BOOST_AUTO_TEST_CASE(absurd_tolerance_is_out_of_reach) {
