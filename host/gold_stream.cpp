@@ -270,7 +270,7 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
       each_cell([&](std::size_t i, std::size_t cell) { p[i] = cell_p_[cell]; });
       batch.p_.write(p);
     } else {
-      if (!table) table = bound_table(state_, upsampler_, scan_, columns_, settings_.u_filter, rows, grid, settings_.rate, cells_z);
+      if (!table) table = bound_table(state_, upsampler_, scan_, columns_for(scan_.geometry, grid, std::min(8, settings_.upsampling)), settings_.upsampling, settings_.u_filter, rows, grid, settings_.rate, cells_z);
       project_bound(state_, scan_, *table, node_columns, cells_x, cells_y, settings_.rate, batch.p_);
       batch.p_.read(std::span<float>(p));
       each_cell([&](std::size_t i, std::size_t cell) { cell_p_[cell] = p[i]; });
@@ -310,7 +310,7 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
       kernel(state_, "verify", "verify_nodes");
   const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
-  kernel({{count(bricks_x_) * side, count(bricks_y_) * side, count(bricks_z_) * n}, {side, 1, 1}}, r.total.buffer(), r.error.buffer(), r.slack.buffer(),
+  kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(), r.error.buffer(), r.slack.buffer(),
          r.violated.buffer(), field.samples.buffer(), field.bricks.buffer(), field.grid, gold_.buffer(), slack_.buffer(), margin_.buffer(), first.buffer(),
          selected.buffer(), lowest_, to_int(nx_), to_int(ny_), to_int(gold_stride_), to_int(stride_), settings_.rate, to_int(bricks_x_), to_int(bricks_y_),
          to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)), tolerance);

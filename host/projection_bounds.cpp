@@ -125,12 +125,12 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   return weight_gain * (filtering + upsampling) + summation + position;
 }
 
-BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns, int upsampling,
                        const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z) {
   const ParallelGeometry& g = scan.geometry;
   const bool cubic = u_filter == "cubic";
   const int order = cubic ? 4 : 2;
-  const double step = g.pitch_u / columns.rate, dense = pi / (2.0 * columns.rate);
+  const double step = g.pitch_u / upsampling, dense = pi / (2.0 * columns.rate);
   BoundTable table;
   table.columns = columns;
   table.cells_z = cells_z;

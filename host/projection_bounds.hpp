@@ -43,7 +43,8 @@ struct BoundTable {
   std::int64_t cells_z = 0;
   double factor = 0;  ///< times the summed maxima: the error of interpolating in u
 };
-BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+/// `columns` is where derivatives are evaluated, at most as dense as the `upsampling` whose interpolation is bounded.
+BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns, int upsampling,
                        const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z);
 
 /// P of every base cell of blocks of cells_x x cells_y: float p[block][z][y][x]. `blocks.first` and `blocks.step_*` are gold nodes. Enqueues; does not wait.

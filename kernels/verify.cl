@@ -8,6 +8,11 @@
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
 inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
+// Positive floats order as their bits do. Most columns do not raise the maximum: a plain read spares them the atomic.
+inline void raise(volatile __global int* target, float v) {
+  if (as_int(v) > *target) atomic_max(target, as_int(v));
+}
+
 inline float largest_of(float8 v) {
   const float4 a = fmax(v.lo, v.hi);
   const float2 b = fmax(a.lo, a.hi);
@@ -19,69 +24,72 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
                            __global const float* gold, __global const float* slack, __global const float* margin,
                            __global const int4* first_brick, __global const uchar* selected, float lowest, int nx, int ny, int gold_stride, int stride, int rate,
                            int bricks_x, int bricks_y, int bricks_z, int blocks, float tolerance) {
-  const int side = grid.granularity * rate + 1;
+  const int g = grid.granularity, side = g * rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
   const int iy = (int)get_global_id(1) % side, brick_y = (int)get_global_id(1) / side;
-  const int block = (int)get_global_id(2) / bricks_z, brick_z = (int)get_global_id(2) - block * bricks_z;
+  const int block = (int)get_global_id(2);
   if (brick_x >= bricks_x || brick_y >= bricks_y || block >= blocks) return;
   const int4 first = first_brick[block];
-  const int bx = first.x + brick_x, by = first.y + brick_y, bz = first.z + brick_z;
-  if (bx >= grid.bricks_x || by >= grid.bricks_y || bz >= grid.bricks_z) return;
-  const size_t brick = ((size_t)bz * grid.bricks_y + by) * grid.bricks_x + bx;
-  if (!selected[brick]) return;
-
-  const int g = grid.granularity;
+  const int bx = first.x + brick_x, by = first.y + brick_y;
+  if (bx >= grid.bricks_x || by >= grid.bricks_y) return;
   const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
-  const int last_z = min(g, grid.cells_z - bz * g) * rate;
   if (ix > last_x || iy > last_y) return;
-  const int node_x = brick_x * g * rate + ix, node_y = brick_y * g * rate + iy, node_z = brick_z * g * rate;
-  const size_t column = ((size_t)block * ny + node_y) * nx + node_x;
+  const size_t column = ((size_t)block * ny + brick_y * g * rate + iy) * nx + brick_x * g * rate + ix;
   if (margin[column] < lowest) return;
-  const VdvrBrick b = bricks[brick];
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
-  const VdvrLocal x = vdvr_local((float)(bx * g) + (float)ix / (float)rate, bx, b.level_x, g, grid.cells_x);
-  const VdvrLocal y = vdvr_local((float)(by * g) + (float)iy / (float)rate, by, b.level_y, g, grid.cells_y);
-  const float interval = (float)(1 << b.level_z) / (float)rate;
-  __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
+  const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
+  __global const float* gold_start =
+      gold + (((size_t)block * (ny + 2) + brick_y * g * rate + iy + 1) * (nx + 2) + brick_x * g * rate + ix + 1) * gold_stride + 1;
+  __global const float* slack_start = slack + column * stride;
 
-  __global const float* gold_column = gold + (((size_t)block * (ny + 2) + node_y + 1) * (nx + 2) + node_x + 1) * gold_stride + node_z + 1;
-  __global const float* slack_column = slack + column * stride + node_z;
-  float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
-  int parts = 0;
-  // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node between them, and
-  // the nodes' fractions are the dyadic ones vdvr_local gives.
-  const int per_interval = rate >> b.level_z;
-  for (int index = 0; index * per_interval < last_z; ++index) {
-    const float low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
-    const float high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
-    const int first_node = index * per_interval, nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
-    int i = 0;
-    for (; i + 8 <= nodes; i += 8) {
-      const float8 t = ((float)i + (float8)(0, 1, 2, 3, 4, 5, 6, 7)) * interval;
-      const float8 s = vload8(0, slack_column + first_node + i);
-      const float8 e = fabs(((1.0f - t) * low + t * high) - vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
-      const float8 both = e + s;
-      // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the comparison.
-      if (any((s >= 0.0f) & !(both <= tolerance))) break;
-      largest_total = fmax(largest_total, largest_of(both));
-      largest_slack = fmax(largest_slack, largest_of(s));
-      largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), e, s >= 0.0f)));
+  for (int brick_z = 0; brick_z < bricks_z; ++brick_z) {
+    const int bz = first.z + brick_z;
+    const size_t brick = ((size_t)bz * grid.bricks_y + by) * grid.bricks_x + bx;
+    if (bz >= grid.bricks_z || !selected[brick]) continue;
+    const int last_z = min(g, grid.cells_z - bz * g) * rate;
+    const VdvrBrick b = bricks[brick];
+    const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x), y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
+    __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
+    __global const float* gold_column = gold_start + brick_z * g * rate;
+    __global const float* slack_column = slack_start + brick_z * g * rate;
+    const float interval = (float)(1 << b.level_z) / (float)rate;
+    float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
+    int parts = 0;
+    // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node between them, and
+    // the nodes' fractions are the dyadic ones vdvr_local gives.
+    const int per_interval = rate >> b.level_z;
+    for (int index = 0; index * per_interval < last_z; ++index) {
+      const float low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      const float high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      const int first_node = index * per_interval, nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
+      int i = 0;
+      for (; i + 8 <= nodes; i += 8) {
+        const float8 t = ((float)i + (float8)(0, 1, 2, 3, 4, 5, 6, 7)) * interval;
+        const float8 s = vload8(0, slack_column + first_node + i);
+        const float8 e = fabs(((1.0f - t) * low + t * high) - vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
+        const float8 both = e + s;
+        // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the comparison.
+        if (any((s >= 0.0f) & !(both <= tolerance))) break;
+        largest_total = fmax(largest_total, largest_of(both));
+        largest_slack = fmax(largest_slack, largest_of(s));
+        largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), e, s >= 0.0f)));
+      }
+      for (; i < nodes; ++i) {
+        const int k = first_node + i;
+        const float s = slack_column[k];
+        if (!(s >= 0.0f)) continue;
+        const float e = fabs(vdvr_lerp(low, high, (float)i * interval) - gold_column[k]);
+        largest_total = fmax(largest_total, e + s);
+        largest_slack = fmax(largest_slack, s);
+        largest_error = fmax(largest_error, e);
+        if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
+      }
     }
-    for (; i < nodes; ++i) {
-      const int k = first_node + i;
-      const float s = slack_column[k];
-      if (!(s >= 0.0f)) continue;
-      const float e = fabs(vdvr_lerp(low, high, (float)i * interval) - gold_column[k]);
-      largest_total = fmax(largest_total, e + s);
-      largest_slack = fmax(largest_slack, s);
-      largest_error = fmax(largest_error, e);
-      if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
-    }
+    if (largest_slack < 0.0f) continue;
+    const size_t out = (((size_t)block * bricks_z + brick_z) * bricks_y + brick_y) * bricks_x + brick_x;
+    raise(total + out, fmax(largest_total, 0.0f));
+    raise(error + out, largest_error);
+    raise(slack_max + out, largest_slack);
+    if (parts) atomic_or(violated + out, parts);
   }
-  if (largest_slack < 0.0f) return;
-  const size_t out = (((size_t)block * bricks_z + brick_z) * bricks_y + brick_y) * bricks_x + brick_x;
-  atomic_max(total + out, as_int(fmax(largest_total, 0.0f)));
-  atomic_max(error + out, as_int(largest_error));
-  atomic_max(slack_max + out, as_int(largest_slack));
-  if (parts) atomic_or(violated + out, parts);
 }

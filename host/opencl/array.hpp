@@ -20,31 +20,26 @@ class DeviceArray {
   DeviceArray() = default;
   /// Throws ResourceError or DeviceError before anything is allocated when it cannot fit.
   DeviceArray(State& state, std::uint64_t count, const std::string& what) : state_(&state), count_(count), what_(what) {
-    const std::uint64_t bytes = size_bytes();
-    if (bytes > state.info.max_allocation) {
-      throw ResourceError(fmt::format("{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device",
-                                      what, bytes, state.info.name, state.info.max_allocation));
-    }
-    state.memory.take(bytes, what);
+    if (count > UINT64_MAX / sizeof(T)) throw ResourceError(fmt::format("{}: {} elements pass 2^64 bytes", what, count));
     try {
-      buffer_ = cl::Buffer(state.context, CL_MEM_READ_WRITE, bytes);
-    } catch (const cl::Error& e) {
-      state.memory.give(bytes);
-      throw ResourceError(fmt::format("{}: '{}' refused {} bytes: {}", what, state.info.name, bytes, code_name(e.err())));
+      buffer_ = state.allocate(size_bytes(), what);
+    } catch (...) {
+      state_ = nullptr;
+      throw;
     }
   }
   DeviceArray(State& state, std::span<const T> values, const std::string& what) : DeviceArray(state, values.size(), what) {
     write(values);
   }
   ~DeviceArray() {
-    if (state_) state_->memory.give(size_bytes());
+    if (state_) state_->release(size_bytes(), std::move(buffer_));
   }
   DeviceArray(DeviceArray&& o) noexcept
       : state_(std::exchange(o.state_, nullptr)), count_(std::exchange(o.count_, 0)), what_(std::move(o.what_)),
         buffer_(std::move(o.buffer_)) {}
   DeviceArray& operator=(DeviceArray&& o) noexcept {
     if (this != &o) {
-      if (state_) state_->memory.give(size_bytes());
+      if (state_) state_->release(size_bytes(), std::move(buffer_));
       state_ = std::exchange(o.state_, nullptr);
       count_ = std::exchange(o.count_, 0);
       what_ = std::move(o.what_);

@@ -12,7 +12,7 @@
 namespace vdvr {
 namespace opencl {
 
-void MemoryAccount::take(std::uint64_t bytes, const std::string& what) {
+void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
     throw ResourceError(fmt::format(
         "{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or choose a smaller --size", what,
@@ -20,7 +20,55 @@ void MemoryAccount::take(std::uint64_t bytes, const std::string& what) {
         static_cast<double>(limit_) / (1 << 20)));
   }
   used_ += bytes;
-  peak_ = std::max(peak_, used_);
+  peak_ = std::max(peak_, used_ + kept);
+}
+
+cl::Buffer BufferPool::take(std::uint64_t bytes) {
+  const auto found = buffers_.find(bytes);
+  if (found == buffers_.end()) return {};
+  cl::Buffer buffer = std::move(found->second);
+  buffers_.erase(found);
+  bytes_ -= bytes;
+  return buffer;
+}
+
+void BufferPool::keep(std::uint64_t bytes, cl::Buffer buffer) {
+  // Small buffers cost nothing to make; a handful of large ones is all that a stage repeats.
+  if (bytes < (1u << 20)) return;
+  if (buffers_.size() >= 12) clear();
+  buffers_.emplace(bytes, std::move(buffer));
+  bytes_ += bytes;
+}
+
+void BufferPool::clear() {
+  buffers_.clear();
+  bytes_ = 0;
+}
+
+cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
+  if (bytes > info.max_allocation) {
+    throw ResourceError(fmt::format("{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device", what, bytes,
+                                    info.name, info.max_allocation));
+  }
+  cl::Buffer buffer = pool.take(bytes);
+  // What the pool keeps is in use as well: it goes first when room is short.
+  if (memory.left() < bytes + pool.bytes()) pool.clear();
+  memory.take(bytes, what, pool.bytes());
+  if (buffer() != nullptr) return buffer;
+  try {
+    return cl::Buffer(context, CL_MEM_READ_WRITE, bytes);
+  } catch (const cl::Error& e) {
+    memory.give(bytes);
+    throw ResourceError(fmt::format("{}: '{}' refused {} bytes: {}", what, info.name, bytes, code_name(e.err())));
+  }
+}
+
+void State::release(std::uint64_t bytes, cl::Buffer buffer) noexcept {
+  memory.give(bytes);
+  try {
+    pool.keep(bytes, std::move(buffer));
+  } catch (...) {  // no memory for the pool's own entry: the buffer is simply freed
+  }
 }
 
 }  // namespace opencl

@@ -17,7 +17,8 @@ class MemoryAccount {
   void set_limit(std::uint64_t bytes) { limit_ = bytes; }
   [[nodiscard]] std::uint64_t limit() const { return limit_; }
   /// Throws ResourceError naming `what` and the remedy when the limit would be passed.
-  void take(std::uint64_t bytes, const std::string& what);
+  /// `kept`: bytes of the pool, for the peak.
+  void take(std::uint64_t bytes, const std::string& what, std::uint64_t kept = 0);
   void give(std::uint64_t bytes) noexcept { used_ -= bytes; }
   [[nodiscard]] std::uint64_t used() const { return used_; }
   [[nodiscard]] std::uint64_t peak() const { return peak_; }
@@ -27,6 +28,20 @@ class MemoryAccount {
   std::uint64_t limit_ = 0, used_ = 0, peak_ = 0;
 };
 
+/// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that fill them.
+class BufferPool {
+ public:
+  /// A kept buffer of exactly this size, or an empty one.
+  cl::Buffer take(std::uint64_t bytes);
+  void keep(std::uint64_t bytes, cl::Buffer buffer);
+  void clear();
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  std::multimap<std::uint64_t, cl::Buffer> buffers_;
+  std::uint64_t bytes_ = 0;
+};
+
 struct State {
   DeviceInfo info;
   cl::Device device;
@@ -34,6 +49,11 @@ struct State {
   cl::CommandQueue queue;
   std::map<std::string, cl::Program> programs;  ///< by name and defines
   MemoryAccount memory;
+  BufferPool pool;
+
+  /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is allocated.
+  cl::Buffer allocate(std::uint64_t bytes, const std::string& what);
+  void release(std::uint64_t bytes, cl::Buffer buffer) noexcept;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".
