@@ -1,8 +1,9 @@
-// F by its definition: direct sums in double precision over host threads (docs/geometry.md). Shares nothing with the device
-// path but the angular weights and the ramp kernel.
+// F by its definition: direct sums in double precision over host threads (docs/geometry.md). Shares nothing
+// with the device path but the angular weights and the ramp kernel.
 #include "vdvr/exact_field.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -10,8 +11,8 @@
 #include "host/coverage.hpp"
 #include "host/parallel.hpp"
 #include "host/ramp_kernel.hpp"
-#include "vdvr/reconstruct.hpp"
 #include "host/view_weights.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 namespace {
@@ -42,7 +43,8 @@ double cosine_sum(const double* a, std::int64_t n, double x) {
 
 }  // namespace
 
-ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress) : geometry_(scan.geometry) {
+ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress)
+    : geometry_(scan.geometry) {
   if (field.center) geometry_.center = *field.center;
   const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
   const auto g = ramp_kernel(field, geometry_.pitch_u, U);
@@ -57,7 +59,8 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
     for (std::int64_t v = 0; v < V; ++v) {
       for (std::int64_t i = 0; i < U; ++i) {
         double sum = 0;
-        for (std::int64_t j = 0; j < U; ++j) sum += g[at(std::abs(i - j))] * static_cast<double>(p[v * U + j]);
+        for (std::int64_t j = 0; j < U; ++j)
+          sum += g[at(std::abs(i - j))] * static_cast<double>(p[v * U + j]);
         q[at(i)] = sum * weights.weight[at(k)];
       }
       for (std::int64_t m = 0; m < U; ++m) {
@@ -82,26 +85,36 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
   std::vector<std::pair<double, const std::vector<std::size_t>*>> heights;
   for (const auto& [z, members] : by_height) heights.emplace_back(z, &members);
 
+  // Heights go together in groups, so that one pass over the coefficients serves the whole group and the
+  // innermost sums run side by side.
+  constexpr std::size_t group = 16;
   std::vector<double> values(points.size());
-  parallel_for(static_cast<std::int64_t>(heights.size()), progress, "exact points", [&](std::int64_t h) {
-    const auto& [z, members] = heights[static_cast<std::size_t>(h)];
-    const double row = z / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
-    const double y = pi * (row + 0.5) / static_cast<double>(V);
-    std::vector<double> basis(static_cast<std::size_t>(V)), line(static_cast<std::size_t>(U));
-    for (std::int64_t l = 0; l < V; ++l) basis[static_cast<std::size_t>(l)] = std::cos(static_cast<double>(l) * y);
-    for (std::int64_t k = 0; k < K; ++k) {
-      const double c = std::cos(geometry_.theta_rad[static_cast<std::size_t>(k)]), s = std::sin(geometry_.theta_rad[static_cast<std::size_t>(k)]);
-      for (std::int64_t m = 0; m < U; ++m) {
-        const double* a = coefficients_.data() + (k * U + m) * V;
-        double sum = 0;
-        for (std::int64_t l = 0; l < V; ++l) sum += a[l] * basis[static_cast<std::size_t>(l)];
-        line[static_cast<std::size_t>(m)] = sum;
+  const auto groups = static_cast<std::int64_t>((heights.size() + group - 1) / group);
+  parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
+    const std::size_t first = static_cast<std::size_t>(g) * group,
+                      count = std::min(group, heights.size() - first);
+    const auto rows = static_cast<std::size_t>(V), columns = static_cast<std::size_t>(U);
+    std::vector<double> basis(rows * group), line(columns * group);  // [l][height], [height][m]
+    for (std::size_t h = 0; h < count; ++h) {
+      const double row = heights[first + h].first / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
+      const double y = pi * (row + 0.5) / static_cast<double>(V);
+      for (std::size_t l = 0; l < rows; ++l) basis[l * group + h] = std::cos(static_cast<double>(l) * y);
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(K); ++k) {
+      const double c = std::cos(geometry_.theta_rad[k]), s = std::sin(geometry_.theta_rad[k]);
+      for (std::size_t m = 0; m < columns; ++m) {
+        const double* a = coefficients_.data() + (k * columns + m) * rows;
+        std::array<double, group> sum{};
+        for (std::size_t l = 0; l < rows; ++l)
+          for (std::size_t h = 0; h < group; ++h) sum[h] += a[l] * basis[l * group + h];
+        for (std::size_t h = 0; h < count; ++h) line[h * columns + m] = sum[h];
       }
-      for (const std::size_t i : *members) {
-        const double t = points[i][0] * c + points[i][1] * s;
-        const double column = t / geometry_.pitch_u + geometry_.center;
-        values[i] += cosine_sum(line.data(), U, pi * (column + 0.5) / static_cast<double>(U));
-      }
+      for (std::size_t h = 0; h < count; ++h)
+        for (const std::size_t i : *heights[first + h].second) {
+          const double t = points[i][0] * c + points[i][1] * s;
+          const double column = t / geometry_.pitch_u + geometry_.center;
+          values[i] += cosine_sum(line.data() + h * columns, U, pi * (column + 0.5) / static_cast<double>(U));
+        }
     }
   });
   return values;

@@ -10,6 +10,7 @@
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
+#include "vdvr/simulate.hpp"
 
 using namespace vdvr;
 using vdvr::testing::noise_scan;
@@ -124,4 +125,38 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_the_same_volume) {
   for (std::size_t i = 0; i < a.samples.size(); ++i) worst = std::max(worst, std::abs(static_cast<double>(a.samples[i]) - static_cast<double>(b.samples[i])));
   BOOST_TEST(worst <= tolerance::fp32_sum(200, field_scale(scan, {})));
   BOOST_TEST(small.peak_memory() <= (std::uint64_t{24} << 20));
+}
+
+// The acceptance of the project's contract: half a percent of the density, the same at any pitch.
+BOOST_AUTO_TEST_CASE(sphere_keeps_its_density_inside_and_nothing_outside_at_any_pitch) {
+  constexpr double half_a_percent = 0.005;
+  for (const double pitch : {1.0, 0.1}) {
+    SimulateOptions options;
+    options.angles = 120;
+    options.columns = options.rows = 65;
+    options.pitch_u = options.pitch_v = pitch;
+    const ProjectionSet scan = simulate(sphere(20 * pitch, 1), options);
+    Device device;
+    const Grid grid = make_grid(scan.geometry, {});
+    const Volume volume = reconstruct(device, scan, grid, {});
+    double inside = 0, outside = 0;
+    std::int64_t inside_count = 0, outside_count = 0;
+    const Index3 n = grid.samples();
+    for (std::int64_t z = 0; z < n[2]; ++z)
+      for (std::int64_t y = 0; y < n[1]; ++y)
+        for (std::int64_t x = 0; x < n[0]; ++x) {
+          const Vec3 p = grid.position({x, y, z});
+          const double radius = std::hypot(p[0], p[1], p[2]) / pitch;
+          const double value = static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]);
+          if (radius <= 16) {
+            inside += value;
+            ++inside_count;
+          } else if (radius >= 24 && radius <= 30) {
+            outside += value;
+            ++outside_count;
+          }
+        }
+    BOOST_TEST(std::abs(inside / static_cast<double>(inside_count) - 1) <= half_a_percent);
+    BOOST_TEST(std::abs(outside / static_cast<double>(outside_count)) <= half_a_percent);
+  }
 }

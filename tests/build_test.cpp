@@ -1,0 +1,294 @@
+#define BOOST_TEST_MODULE build
+#include "vdvr/build.hpp"
+
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <random>
+
+#include "tests/reference/mixed_field.hpp"
+#include "tests/support/scans.hpp"
+#include "tests/support/tolerance.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
+#include "vdvr/simulate.hpp"
+#include "vdvr/verify.hpp"
+
+using namespace vdvr;
+using vdvr::testing::noise_scan;
+
+namespace {
+
+struct Wanted {
+  Grid grid;
+  double epsilon = 0.05;
+  RateOptions rates{};
+  BuildOptions options{};
+  std::uint64_t max_memory = 0;
+};
+
+struct Built {
+  Plan plan;
+  BuildResult result;
+};
+
+Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
+  Device device("", wanted.max_memory);
+  Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, {wanted.epsilon, {}});
+  BuildResult result = build(device, scan, plan, wanted.options);
+  if (wanted.max_memory > 0) BOOST_TEST(device.peak_memory() <= wanted.max_memory);
+  return {std::move(plan), std::move(result)};
+}
+
+Grid grid_of(const ProjectionSet& scan, const Index3& size, double spacing, std::optional<Vec3> origin = {}) {
+  GridOptions options;
+  options.size = size;
+  options.spacing = spacing;
+  options.origin = origin;
+  return make_grid(scan.geometry, options);
+}
+
+// Random points of a box on a few heights: many heights cost the reference much and show no more.
+std::vector<Vec3> random_points(const Vec3& low, const Vec3& high, int heights, int per_height,
+                                unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Vec3> points;
+  for (int h = 0; h < heights; ++h) {
+    const double z = low[2] + unit(random) * (high[2] - low[2]);
+    for (int i = 0; i < per_height; ++i)
+      points.push_back(
+          {low[0] + unit(random) * (high[0] - low[0]), low[1] + unit(random) * (high[1] - low[1]), z});
+  }
+  return points;
+}
+
+Vec3 end_of(const Grid& grid) { return grid.position(grid.cells); }
+
+// The certificate against F in double precision, which shares nothing with the device: no slack at all.
+// `applies` says for which values of F the certificate speaks.
+template <class Applies>
+void check_certificate(const ProjectionSet& scan, const Built& built, const std::vector<Vec3>& points,
+                       Applies&& applies) {
+  const Certificate& c = built.result.certificate;
+  BOOST_TEST(c.holds_buffer);
+  BOOST_TEST(c.holds_image3d.value_or(true));
+  BOOST_TEST(c.total_buffer <= c.epsilon_abs);
+  BOOST_TEST(c.measured_max <= c.measured_total);
+  BOOST_TEST(c.measured_total <= c.total_buffer);
+  const ExactField exact(scan, c.field);
+  const auto F = exact.at(points);
+  double worst = 0;
+  std::int64_t tested = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!exact.covered(points[i]) || !applies(F[i])) continue;
+    ++tested;
+    worst = std::max(worst, std::abs(static_cast<double>(sample_at(built.result.volume, points[i])) - F[i]));
+  }
+  BOOST_TEST(tested > 100);
+  BOOST_TEST(worst <= tolerance::bound(c.total_buffer), "|V - F| reaches " << worst << ", certified "
+                                                                           << c.total_buffer << " of epsilon "
+                                                                           << c.epsilon_abs);
+  BOOST_TEST_MESSAGE("|V - F| reaches " << worst << ", certified " << c.total_buffer << " of epsilon "
+                                        << c.epsilon_abs << ", over " << tested << " points");
+}
+void check_certificate(const ProjectionSet& scan, const Built& built, const std::vector<Vec3>& points) {
+  check_certificate(scan, built, points, [](double) { return true; });
+}
+
+bool verifies(const ProjectionSet& scan, const MixedVolume& volume, const Certificate& certificate,
+              bool exhaustive = true) {
+  Device device;
+  const VerifyResult v = verify(device, scan, volume, certificate, {exhaustive, 0.1, 3});
+  BOOST_TEST(v.holds == v.failure.empty());
+  if (v.holds) BOOST_TEST(v.total <= tolerance::bound(v.epsilon_abs));
+  return v.holds;
+}
+
+// Bricks that both store a sample at a point store the same bits.
+void check_shared_bits(const MixedVolume& v) {
+  const Index3 n = v.bricks();
+  std::int64_t different = 0;
+  for (std::int64_t i = 0; i < v.brick_count(); ++i)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+      Index3 q = p;
+      if (++q[axis] >= n[axis]) continue;
+      const LevelTriple lp = v.level[static_cast<std::size_t>(i)],
+                        lq = v.level[static_cast<std::size_t>((q[2] * n[1] + q[1]) * n[0] + q[0])];
+      Index3 count{};  // steps of the coarser lattice along the face
+      for (std::size_t a = 0; a < 3; ++a)
+        count[a] = a == axis ? 0
+                             : std::min<std::int64_t>(v.granularity, v.grid.cells[a] - p[a] * v.granularity)
+                                   << std::min(lp[2 - a], lq[2 - a]);
+      for (std::int64_t z = 0; z <= count[2]; ++z)
+        for (std::int64_t y = 0; y <= count[1]; ++y)
+          for (std::int64_t x = 0; x <= count[0]; ++x) {
+            const Index3 step{x, y, z};
+            Index3 ip{}, iq{};
+            for (std::size_t a = 0; a < 3; ++a) {
+              const int coarse = std::min(lp[2 - a], lq[2 - a]);
+              ip[a] = a == axis ? static_cast<std::int64_t>(v.granularity) << lp[2 - a]
+                                : step[a] << (lp[2 - a] - coarse);
+              iq[a] = a == axis ? 0 : step[a] << (lq[2 - a] - coarse);
+            }
+            if (reference::stored_sample(v, p, ip) != reference::stored_sample(v, q, iq)) ++different;
+          }
+    }
+  BOOST_TEST(different == 0);
+}
+
+void check_all(const ProjectionSet& scan, const Wanted& wanted, unsigned seed) {
+  const Built built = build_of(scan, wanted);
+  check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 150, seed));
+  check_shared_bits(built.result.volume);
+  BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+  BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate, false));
+}
+
+ProjectionSet simulated(const Phantom& phantom, std::int64_t columns, std::int64_t rows, int angles) {
+  SimulateOptions options;
+  options.angles = angles;
+  options.columns = columns;
+  options.rows = rows;
+  return simulate(phantom, options);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_at_several_tolerances) {
+  const ProjectionSet scan = noise_scan(19, 9, 33);
+  for (const double epsilon : {0.2, 0.08, 0.03})
+    check_all(scan, {grid_of(scan, {12, 10, 8}, 0.9), epsilon}, 1);
+}
+
+BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_for_every_u_filter_and_granularity) {
+  const ProjectionSet scan = noise_scan(17, 7, 29, 5);
+  const Grid grid = grid_of(scan, {9, 7, 6}, 0.8);
+  for (const int granularity : {1, 2, 4})
+    for (const char* filter : {"linear", "cubic"})
+      check_all(scan, {grid, 0.15, {16, filter, 8}, {granularity, {}, {}}}, 2);
+}
+
+BOOST_AUTO_TEST_CASE(certificate_holds_to_the_edge_of_the_covered_region) {
+  const ProjectionSet scan = noise_scan(15, 5, 24, 6);
+  const Grid grid = make_grid(scan.geometry, {});
+  const Built built = build_of(scan, {grid, 0.1});
+  BOOST_TEST(built.result.certificate.not_covered_count > 0);
+  // A ring around the covered radius.
+  auto points = random_points(grid.origin, end_of(grid), 40, 200, 4);
+  for (std::size_t i = 0; i < points.size(); i += 2) {
+    const double radius = std::hypot(points[i][0], points[i][1]),
+                 wanted = 11.2 + 0.8 * (static_cast<double>(i % 97) / 97);
+    for (std::size_t a = 0; a < 2; ++a) points[i][a] *= wanted / radius;
+  }
+  check_certificate(scan, built, points);
+  BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(grids_of_one_cell_take_granularity_one) {
+  const ProjectionSet scan = noise_scan(14, 3, 25, 7);
+  const Wanted wanted{grid_of(scan, {8, 8, 1}, 1.0, Vec3{-4, -4, -0.5}), 0.1};
+  const Built built = build_of(scan, wanted);
+  BOOST_TEST(built.result.volume.granularity == 1);
+  check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 200, 3));
+}
+
+BOOST_AUTO_TEST_CASE(region_of_interest_is_certified_and_the_rest_left_at_level_0) {
+  const ProjectionSet scan = noise_scan(15, 9, 33, 8);
+  const std::array<double, 6> roi{-3, -2, -2, 1, 3, 1};
+  const Wanted wanted{grid_of(scan, {16, 16, 8}, 1.0), 0.05, {}, {2, roi, {}}};
+  const Built built = build_of(scan, wanted);
+  check_certificate(scan, built,
+                    random_points({roi[0], roi[1], roi[2]}, {roi[3], roi[4], roi[5]}, 40, 150, 5));
+  const MixedVolume& v = built.result.volume;
+  BOOST_TEST((v.level.front() == LevelTriple{0, 0, 0}));
+  BOOST_TEST((v.level.back() == LevelTriple{0, 0, 0}));
+  BOOST_TEST((built.result.certificate.roi == roi));
+  BOOST_TEST(verifies(scan, v, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(window_certifies_what_lies_in_it_with_fewer_tiles) {
+  const ProjectionSet scan = noise_scan(15, 7, 29, 9);
+  Wanted wanted{grid_of(scan, {12, 12, 6}, 0.9), 0.05, {}, {1, {}, {}}};
+  const Built whole = build_of(scan, wanted);
+  const double middle = 0.3 * whole.plan.reference_range, half = 0.15 * whole.plan.reference_range;
+  wanted.options.window = {middle - half, middle + half};
+  const Built built = build_of(scan, wanted);
+  const double inner = half - built.plan.epsilon_abs;  // such F lie in gold cells that meet the window
+  check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 300, 6),
+                    [&](double F) { return std::abs(F - middle) <= inner; });
+  BOOST_TEST(storage_of(built.result.volume, false).samples_ratio <
+             storage_of(whole.result.volume, false).samples_ratio);
+  BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {
+  const ProjectionSet scan = noise_scan(19, 9, 33, 10);
+  const Built built = build_of(scan, {grid_of(scan, {8, 8, 8}, 0.9), 0.05});
+  const Certificate& c = built.result.certificate;
+  BOOST_REQUIRE(verifies(scan, built.result.volume, c));
+  BOOST_REQUIRE(!built.result.volume.tiles.empty());
+  for (const auto& [triple, tiles] : built.result.volume.tiles) {
+    MixedVolume altered = built.result.volume;
+    // The middle of a tile lies in its brick's inside.
+    altered.tiles.at(triple)[static_cast<std::size_t>(altered.tile_size(triple) / 2)] +=
+        static_cast<float>(1.5 * c.epsilon_abs);
+    BOOST_TEST(!verifies(scan, altered, c));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
+  const ProjectionSet scan = simulated(sphere(10, 1), 33, 17, 30);  // smooth enough for bricks of level 0
+  const Built built = build_of(scan, {grid_of(scan, {16, 16, 8}, 1.0), 0.3});
+  // The first sample inside a brick that reads the base.
+  MixedVolume altered = built.result.volume;
+  const auto coarse = std::find(altered.level.begin(), altered.level.end(), LevelTriple{0, 0, 0});
+  BOOST_REQUIRE((coarse != altered.level.end()));
+  const Index3 n = altered.bricks(), samples = altered.grid.samples();
+  const std::int64_t i = coarse - altered.level.begin(), g = altered.granularity;
+  const Index3 inside{i % n[0] * g + 1, i / n[0] % n[1] * g + 1, i / n[0] / n[1] * g + 1};
+  altered.base[static_cast<std::size_t>((inside[2] * samples[1] + inside[1]) * samples[0] + inside[0])] +=
+      static_cast<float>(2.5 * built.plan.epsilon_abs);
+  BOOST_TEST(!verifies(scan, altered, built.result.certificate));
+  BOOST_TEST(!verifies(noise_scan(30, 17, 33, 12), built.result.volume, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(absurd_tolerance_is_out_of_reach) {
+  const ProjectionSet scan = noise_scan(13, 5, 25);
+  Device device;
+  const Grid grid = grid_of(scan, {6, 6, 4}, 1.0);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {1e-7, {}}), ToleranceError);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {2, "linear", 2}, {0.01, {}}), ToleranceError);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {-1.0, {}}), InputError);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {std::nan(""), {}}), InputError);
+  // A plan made for another tolerance: build finds out by itself.
+  Plan plan = make_plan(device, scan, grid, {}, {}, {0.2, {}});
+  plan.epsilon_abs = 1e-6 * plan.reference_range;
+  BOOST_CHECK_THROW(build(device, scan, plan, {}), ToleranceError);
+}
+
+BOOST_AUTO_TEST_CASE(small_memory_gives_a_certificate_that_holds) {
+  const ProjectionSet scan = noise_scan(24, 33, 33, 13);
+  const Grid grid = grid_of(scan, {12, 12, 24}, 0.9);
+  for (const std::uint64_t mebibytes : {48, 512}) {
+    const Wanted wanted{grid, 0.2, {8, "cubic", 8}, {}, mebibytes << 20};
+    const Built built = build_of(scan, wanted);
+    check_certificate(scan, built, random_points(grid.origin, end_of(grid), 40, 100, 7));
+    check_shared_bits(built.result.volume);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(sphere_is_certified) {
+  const ProjectionSet scan = simulated(sphere(10, 1), 33, 33, 60);
+  check_all(scan, {grid_of(scan, {16, 16, 16}, 1.0, Vec3{-2, -2, -2}), 0.03}, 8);
+}
+
+BOOST_AUTO_TEST_CASE(marschner_lobb_is_certified) {
+  const ProjectionSet scan = simulated(marschner_lobb(32 / std::sqrt(2.0)), 65, 65, 74);
+  check_all(scan, {grid_of(scan, {32, 32, 16}, 0.70710678), 0.03}, 9);
+}
+
+BOOST_AUTO_TEST_CASE(shepp_logan_is_certified) {
+  const ProjectionSet scan = simulated(shepp_logan(20), 41, 41, 64);
+  check_all(scan, {grid_of(scan, {16, 16, 12}, 1.0, Vec3{-8, -3, -6}), 0.05}, 10);
+}
