@@ -37,6 +37,10 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
                             const Progress& progress) {
   BuildResult result = build(device, planned.scan, planned.plan, options.build, progress);
   Certificate& c = result.certificate;
+  // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
+  // (but in a scan of nothing but zeros, whose range is 0).
+  if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
+    throw InputError("--window or --roi leaves no covered gold node to test: nothing would be certified");
   if (!c.holds_buffer)
     throw ToleranceError(fmt::format(
         "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",

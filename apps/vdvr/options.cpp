@@ -107,7 +107,7 @@ void add_rates(Arguments& args) {
 
 RateOptions rate_options(const Arguments& args) {
   RateOptions rates;
-  rates.upsampling = rate(args, "upsampling", 256);
+  rates.upsampling = rate(args, "upsampling", 64);
   rates.u_filter = args.choice("u-filter", {"auto", "linear", "cubic"}, "auto");
   rates.gold = rate(args, "gold", 64);
   return rates;

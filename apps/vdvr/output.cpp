@@ -193,7 +193,8 @@ void print_budget(const ErrorBudget& budget, double epsilon_abs) {
   line("gold", budget.gold);
   line("projection", budget.projection);
   line("arithmetic", budget.arithmetic);
-  line("sampler buffer", budget.sampler.buffer);
+  // A plan knows no stored samples yet, and so no sampler's share.
+  if (!budget.sampler.buffer.method.empty()) line("sampler buffer", budget.sampler.buffer);
   if (budget.sampler.image3d) line("sampler image3d", *budget.sampler.image3d);
 }
 
@@ -202,8 +203,9 @@ void print_certificate(const Certificate& c) {
     fmt::print("  {:<12} {}: total {:.4g}, {:.1f} % of the tolerance\n", sampler,
                holds ? "holds" : "DOES NOT HOLD", total, 100 * total / c.epsilon_abs);
   };
-  fmt::print("certificate    |V - F| <= {:.4g} at every covered point: {:.4g} % of the range {:.4g}\n",
-             c.epsilon_abs, 100 * c.epsilon, c.reference_range);
+  fmt::print("certificate    |V - F| <= {:.4g} at every covered point{}{}: {:.4g} % of the range {:.4g}\n",
+             c.epsilon_abs, c.roi ? " of the region of interest" : "", c.window ? " within the window" : "",
+             100 * c.epsilon, c.reference_range);
   verdict("buffer", c.holds_buffer, c.total_buffer);
   if (c.holds_image3d && c.total_image3d) verdict("image3d", *c.holds_image3d, *c.total_image3d);
   print_budget(c.budget, c.epsilon_abs);

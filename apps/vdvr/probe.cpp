@@ -95,6 +95,18 @@ std::string level_text(const LevelTriple& l) {
   return l[0] == l[1] && l[1] == l[2] ? std::to_string(l[0]) : fmt::format("{}{}{}", l[0], l[1], l[2]);
 }
 
+/// Whether a brick is among those that a region of interest certifies: the ones that meet it.
+bool brick_meets(const MixedVolume& volume, const std::array<double, 6>& roi, const Index3& brick) {
+  const Grid& g = volume.grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t first = brick[a] * volume.granularity,
+                       last = std::min(g.cells[a], first + volume.granularity);
+    if (g.origin[a] + static_cast<double>(last) * g.spacing[a] < roi[a]) return false;
+    if (g.origin[a] + static_cast<double>(first) * g.spacing[a] > roi[a + 3]) return false;
+  }
+  return true;
+}
+
 std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
                                    const std::vector<Vec3>& points, const Progress& progress) {
   const VdvrFile file = read_vdvr(path, common_options(args).max_memory);
@@ -119,10 +131,9 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
     probe.value = static_cast<double>(sample_at(volume, p));
     probe.level =
         level_text(volume.level[static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0])]);
-    // Outside the region of interest, and outside the window, nothing is promised.
-    const bool promised =
-        (!c.roi || brick_inside(volume, *c.roi, b)) &&
-        (!c.window || (*probe.value >= c.window->first && *probe.value <= c.window->second));
+    // Outside the region of interest nothing is promised. With a window, what is promised depends on F, which
+    // V alone does not tell: where nothing was tested V may lie in the window by mistake.
+    const bool promised = !c.window && (!c.roi || brick_meets(volume, *c.roi, b));
     if (promised) probe.bound = c.total_buffer;
   }
   return probes;
@@ -173,7 +184,8 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
 int probe_command(Arguments& args) {
   args.positional("FILE", "a certified volume, a volume, or projections")
       .value("points", "P.csv", "points, with the header x,y,z")
-      .value("output,o", "V.csv", "x,y,z,value,bound,level,covered; empty fields where not covered")
+      .value("output,o", "V.csv",
+             "x,y,z,value,bound,level,covered; empty where not covered, bound also where not certified")
       .flag("exact", "of projections: the field F in double precision on the host")
       .value("like", "OUT.vdvr", "with --exact: take the field options from this file")
       .value("projections", "IN", "of a certified volume from elsewhere: where the covered points are");

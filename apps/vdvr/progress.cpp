@@ -52,18 +52,25 @@ void ProgressLine::clear() {
 
 std::map<std::string, double> ProgressLine::seconds() {
   const std::scoped_lock lock(mutex_);
+  end_latest(Clock::now());
   std::map<std::string, double> result;
   for (const auto& [name, stage] : stages_)
     result[name] = std::chrono::duration<double>(stage.last - stage.first).count();
   return result;
 }
 
+// A stage reports as it begins a piece of work, so that its last piece ends when something else begins.
+void ProgressLine::end_latest(Clock::time_point now) {
+  if (const auto latest = stages_.find(latest_); latest != stages_.end()) latest->second.last = now;
+}
+
 void ProgressLine::report(const std::string& stage, double fraction) {
   throw_if_interrupted();
   const std::scoped_lock lock(mutex_);
   const auto now = Clock::now();
+  end_latest(now);
   const auto [entry, is_new] = stages_.try_emplace(stage, Stage{now, now});
-  entry->second.last = now;
+  latest_ = stage;
   if (quiet_) return;
   if (terminal_) {
     draw(stage, std::clamp(fraction, 0.0, 1.0), now);

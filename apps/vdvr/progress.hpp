@@ -28,7 +28,7 @@ class ProgressLine {
   Progress callback();
   /// Takes the bar off the terminal, so that other text may follow.
   void clear();
-  /// Seconds between the first and the last report of each stage so far.
+  /// Seconds of each stage so far: a stage lasts until another one reports, the latest until now.
   [[nodiscard]] std::map<std::string, double> seconds();
 
  private:
@@ -36,6 +36,7 @@ class ProgressLine {
   struct Stage {
     Clock::time_point first, last;
   };
+  void end_latest(Clock::time_point now);
 
   void report(const std::string& stage, double fraction);
   void draw(const std::string& stage, double fraction, Clock::time_point now);
@@ -44,6 +45,7 @@ class ProgressLine {
   bool quiet_, terminal_, drawn_ = false;
   std::mutex mutex_;
   std::map<std::string, Stage> stages_;
+  std::string latest_;
   Clock::time_point drawn_at_{};
 };
 

@@ -195,7 +195,12 @@ int render_command(Arguments& args) {
   const auto path = args.path("FILE"), output = args.path("output");
   const bool turntable = args.has("turntable");
   const std::int64_t frames = args.integer_or("turntable", 1, 1, 9999);
-  if (!turntable) check_output(output, common.force, {path});
+  if (!turntable) {
+    if (output.extension() != ".png")
+      throw InputError(
+          fmt::format("{}: pictures are PNG; give the output a name that ends in .png", output.string()));
+    check_output(output, common.force, {path});
+  }
   if (o.mode == RenderMode::error) return render_error(args, common, o, output);
 
   const Scene scene = open_scene(path, args, args.text_or("method", "vdvr"), args.has("unverified"));
@@ -235,7 +240,10 @@ int render_command(Arguments& args) {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
-    fmt::print("  {} samples in {:.3f} s on {}\n", result.samples, result.seconds, device.info().name);
+    // Slices count no samples along rays.
+    fmt::print("  {}{:.3f} s on {}\n",
+               result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,
+               device.info().name);
   });
   return 0;
 }
