@@ -31,7 +31,7 @@ double position_error(const ParallelGeometry& geometry, const UpsampledColumns& 
   const double scale = columns.rate / geometry.pitch_u;
   // |cos| a + |sin| b <= sqrt(a^2 + b^2).
   const double reach = scale * std::hypot(static_cast<double>(blocks.nx + 4) * blocks.step_x, static_cast<double>(blocks.ny + 2) * blocks.step_y);
-  return 0x1p-24 * (5 * reach + 5);
+  return 0x1p-24 * (4 * reach + 6);
 }
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,

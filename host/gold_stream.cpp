@@ -277,7 +277,9 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
     }
     expand({{count(stride), count(cells_x), count(cells_y) * n}, {16, 1, 1}}, p_rows.buffer(), batch.p_.buffer(), to_int(cells_x), to_int(cells_y), to_int(cells_z),
            settings_.rate, to_int(stride), count_n);
-    const auto window = settings_.window.value_or(std::pair{0.0, 0.0});
+    auto window = settings_.window.value_or(std::pair{0.0, 0.0});
+    window.first -= arithmetic_;
+    window.second += arithmetic_;
     const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
     cell_slack({{count((nz + 15) / 16), count(nx - 1), count(ny - 1) * n}, local}, cells.buffer(), batch.gold_.buffer(), p_rows.buffer(), to_int(nx), to_int(ny), to_int(nz),
                to_int(gold_stride), to_int(stride), settings_.rate, to_int(cells_x), to_int(cells_y), count_n, static_cast<cl_float>(t_constant_),

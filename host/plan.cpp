@@ -67,7 +67,7 @@ std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups
   if (amplitude_cost < 4e10) {
     const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates);
     for (const auto& [rate, value] : a.projection) out.push_back({"projection", "amplitude, linear in u", rate, value, true});
-    for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude, paper Eq. 8", rate, value, true});
+    for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude, sum over axes", rate, value, true});
   }
   for (const int rate : bound_rates) {
     const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;

@@ -51,7 +51,7 @@ BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const Filtere
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks,
                    std::int64_t cells_x, std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p);
 
-/// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, for interpolation in u at each rate and for gold at
+/// Amplitude bounds: sum of |A| e, e = sum over the axes of 1 - cos(k d / 2), over the spectrum of the mirror extension, for interpolation in u at each rate and for gold at
 /// each rate. Cost: views * rows * columns per rate, on the host.
 struct AmplitudeBounds {
   std::vector<std::pair<int, double>> projection, gold;
