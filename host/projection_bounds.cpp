@@ -22,6 +22,13 @@ std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 // How much a run-wise sum of n products errs, in units of u times the sum of magnitudes (kernels/batched_product.cl).
 double product_error(std::int64_t n) { return 34 + static_cast<double>(n) / 32; }
 
+// The worst error of trilinear interpolation on a wave, with c = prod cos(k_j d_j / 2): 1 - c while that stays below 0.949; near
+// the grid's Nyquist frequency on several axes it rises to 1.0963, and beyond that frequency waves alias and only 2 is sure.
+double wave_error(double c, bool resolved) {
+  if (!resolved) return 2;
+  return 1 - c < 0.949 ? 1 - c : 1.0963;
+}
+
 // Views per chunk so that derivative slabs stay near 64 MiB.
 std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
   const std::int64_t per_view = columns * (rows + 16) * 4;
@@ -222,7 +229,8 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
           const double wv = pi * static_cast<double>(l) / static_cast<double>(V) / g.pitch_v;
           const double magnitude = std::abs(b[at(m * V + l)]);
           p[r] += magnitude * eu;
-          f[r] += magnitude * (1 - cx * cy * std::cos(wv * grid.spacing[2] / rates[r] / 2));
+          const bool resolved = wu * std::max(grid.spacing[0], grid.spacing[1]) <= rates[r] * pi && wv * grid.spacing[2] <= rates[r] * pi;
+          f[r] += magnitude * wave_error(cx * cy * std::cos(wv * grid.spacing[2] / rates[r] / 2), resolved);
         }
       }
     const std::lock_guard guard(lock);
