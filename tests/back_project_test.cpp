@@ -120,9 +120,13 @@ std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, 
                         static_cast<float>(at - whole), static_cast<float>(whole)}});
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "steps");
+  const std::vector<cl_int2> rows(blocks.first.size() * static_cast<std::size_t>(blocks.ny),
+                                  cl_int2{{0, static_cast<cl_int>(blocks.nx - 1)}});
+  const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
   opencl::DeviceArray<float> out(state, floats_of(blocks, slab.rows), "columns");
   out.fill(0.0f);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", cubic},
               {"VDVR_LANES", std::to_string(lanes)},
@@ -133,7 +137,7 @@ std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, 
   kernel({{groups(slab.rows_padded, lanes), groups(blocks.nx, tile_x),
            groups(blocks.ny, tile_y) * blocks.first.size()},
           {1, 2, 2}},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), ints(slab.views),
+         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
          ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)), ints(blocks.nx),
          ints(blocks.ny), ints(blocks.first.size()));
   return out.to_host();

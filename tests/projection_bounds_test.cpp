@@ -405,6 +405,26 @@ BOOST_AUTO_TEST_CASE(global_bounds_hold_at_every_rate) {
   }
 }
 
+// F = sum of waves cos(k.x + phase): the amplitude bound at rate 1 must hold for any spacing, also one
+// coarser than the detector.
+BOOST_AUTO_TEST_CASE(amplitude_bound_of_gold_holds_without_oversampling) {
+  for (const auto& [name, scan] : scans()) {
+    if (scan.geometry.rows == 1) continue;
+    const Chain chain(scan);
+    for (const double spacing : {0.7, 1.0, 1.4}) {
+      GridOptions options;
+      options.size = Index3{8, 8, 2};
+      options.spacing = spacing;
+      const Grid grid = make_grid(scan.geometry, options);
+      const double rounding = chain.filtered.ramp_error * lebesgue_constant(scan.geometry.columns) *
+                              lebesgue_constant(scan.geometry.rows);
+      BOOST_TEST(trilinear_error(chain, grid, 1, 300, 5) <=
+                     tolerance::bound(amplitude_bounds(chain.filtered, grid, {1}).gold[0].second) + rounding,
+                 name << " spacing " << spacing);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(lebesgue_constant_bounds_the_interpolation_gain) {
   for (const std::int64_t n : {1, 2, 3, 7, 24, 65}) {
     const UpsampledColumns columns = upsampled_columns(n, 16, 0);
