@@ -79,8 +79,12 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
   for (std::size_t a = 0; a < 3; ++a) bricks[a] = (settings_.grid.cells[a] + g - 1) / g;
   const auto is_selected = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return selected[at((z * bricks[1] + y) * bricks[0] + x)] != 0; };
 
-  // Work by slab: as large blocks where most of a block's bricks are wanted, else brick by brick, whose halos cost 1.6 times as
-  // much. Blocks at the grid's end are cut to it.
+  // Work by slab: as large blocks, or brick by brick where few of a block's bricks are wanted: whichever computes fewer samples,
+  // halos included. Blocks at the grid's end are cut to it.
+  const auto samples = [&](std::int64_t wx, std::int64_t wy, std::int64_t height) {
+    const std::int64_t side = g * settings_.rate, nz = std::min(height * g, settings_.grid.cells[2]) * settings_.rate;
+    return static_cast<double>((wx * side + 3) * (wy * side + 3)) * static_cast<double>(opencl::round_up(count(nz + 3), 16));
+  };
   struct Work {
     std::int64_t z, height, width_x, width_y;
     std::vector<std::array<std::int64_t, 2>> first;
@@ -101,7 +105,7 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
             for (std::int64_t x = x0; x < x0 + wx; ++x)
               if (is_selected(x, y, z)) wanted.push_back({x, y, z});
         if (wanted.empty()) continue;
-        if (16 * static_cast<std::int64_t>(wanted.size()) >= 9 * wx * wy * height || block_bricks_ * slab_bricks_ == 1)
+        if (static_cast<double>(wanted.size()) * samples(1, 1, 1) >= samples(wx, wy, height) || block_bricks_ * slab_bricks_ == 1)
           large.try_emplace({wx, wy}, Work{z0, height, wx, wy, {}}).first->second.first.push_back({x0, y0});
         else
           for (const auto& m : wanted) small[at(m[2] - z0)].first.push_back({m[0], m[1]});
@@ -110,7 +114,7 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
     for (auto& w : small)
       if (!w.first.empty()) all.push_back(std::move(w));
   }
-  const auto cost = [](const Work& w) { return static_cast<double>(w.width_x * w.width_y * w.height) * (w.width_x * w.height == 1 ? 1.6 : 1.0); };
+  const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
   double done = 0;
   for (const Work& w : all) {

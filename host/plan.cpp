@@ -27,7 +27,7 @@ struct Rates {
 };
 
 // Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
-constexpr double share = 0.35;
+constexpr double share = 0.4;
 
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -218,7 +218,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.bounds = global_bounds(filtered, sups, grid);
   report(progress, "plan", 0.6);
 
-  // The cheapest rates whose slack leaves two thirds of the tolerance to the grid; failing that, whatever fits at all.
+  // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at all.
   const auto all = candidates(rates);
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
