@@ -14,7 +14,8 @@ struct ViewStep {
 };
 
 // How far s moves per column of a block.
-ViewStep view_step(const ParallelGeometry& g, const UpsampledColumns& c, const ColumnBlocks& b, std::size_t k) {
+ViewStep view_step(const ParallelGeometry& g, const UpsampledColumns& c, const ColumnBlocks& b,
+                   std::size_t k) {
   const double scale = c.rate / g.pitch_u;
   return {std::cos(g.theta_rad[k]) * b.step_x * scale, std::sin(g.theta_rad[k]) * b.step_y * scale};
 }
@@ -26,16 +27,19 @@ std::int64_t column_stride(std::int64_t rows) {
   return 16 * (chunks % 2 == 0 ? chunks + 1 : chunks);
 }
 
-double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks) {
-  // Start and steps are rounded (u each), both fused products round once, and no intermediate passes the block's reach + 1.
+double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns,
+                      const ColumnBlocks& blocks) {
+  // Start and steps are rounded (u each), both fused products round once, and no intermediate passes the
+  // block's reach + 1.
   const double scale = columns.rate / geometry.pitch_u;
   // |cos| a + |sin| b <= sqrt(a^2 + b^2).
-  const double reach = scale * std::hypot(static_cast<double>(blocks.nx + 4) * blocks.step_x, static_cast<double>(blocks.ny + 2) * blocks.step_y);
+  const double reach = scale * std::hypot(static_cast<double>(blocks.nx + 4) * blocks.step_x,
+                                          static_cast<double>(blocks.ny + 2) * blocks.step_y);
   return 0x1p-24 * (4 * reach + 6);
 }
 
-void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,
-                  const std::string& filter, opencl::DeviceArray<float>& out) {
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out) {
   const ColumnTuning tuning = column_tuning(state.info);
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
@@ -45,19 +49,22 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
     for (std::size_t k = 0; k < views; ++k) {
       const std::size_t view = k + static_cast<std::size_t>(slab.first_view);
       const ViewStep step = view_step(geometry, slab.columns, blocks, view);
-      const double t = blocks.first[b][0] * std::cos(geometry.theta_rad[view]) + blocks.first[b][1] * std::sin(geometry.theta_rad[view]);
+      const double t = blocks.first[b][0] * std::cos(geometry.theta_rad[view]) +
+                       blocks.first[b][1] * std::sin(geometry.theta_rad[view]);
       const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center);
       // The lowest s of the block, less one so that rounding cannot make a local position negative.
       const double lowest = s + std::min(0.0, step.along_x * static_cast<double>(blocks.nx + 4)) +
                             std::min(0.0, step.along_y * static_cast<double>(blocks.ny + 2));
       const double whole = std::floor(lowest) - 1;
-      steps[b * views + k] = {{static_cast<float>(step.along_x), static_cast<float>(step.along_y), static_cast<float>(s - whole),
-                               static_cast<float>(whole)}};
+      steps[b * views + k] = {{static_cast<float>(step.along_x), static_cast<float>(step.along_y),
+                               static_cast<float>(s - whole), static_cast<float>(whole)}};
     }
-  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "view positions");
+  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps),
+                                                    "view positions");
 
   // A tile's rows share the widest interval of any of them.
-  std::vector<cl_int2> rows(n * static_cast<std::size_t>(blocks.ny), cl_int2{{0, static_cast<cl_int>(blocks.nx) - 1}});
+  std::vector<cl_int2> rows(n * static_cast<std::size_t>(blocks.ny),
+                            cl_int2{{0, static_cast<cl_int>(blocks.nx) - 1}});
   if (!blocks.wanted.empty()) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto& w = blocks.wanted[i];
@@ -69,15 +76,19 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
 
   const int tile_x = state.info.is_gpu ? 1 : 4, tile_y = state.info.is_gpu ? 1 : 2;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
-      state, "back_project", "back_project",
-      {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
-       {"VDVR_LANES", std::to_string(tuning.lanes)},
-       {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int>
+      kernel(state, "back_project", "back_project",
+             {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
+              {"VDVR_LANES", std::to_string(tuning.lanes)},
+              {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x), count((blocks.ny + tile_y - 1) / tile_y) * n}, tuning.local},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views), ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)),
-         ints(blocks.nx), ints(blocks.ny), ints(n));
+  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x),
+           count((blocks.ny + tile_y - 1) / tile_y) * n},
+          tuning.local},
+         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
+         ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)), ints(blocks.nx),
+         ints(blocks.ny), ints(n));
 }
 
 }  // namespace vdvr

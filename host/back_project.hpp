@@ -1,4 +1,5 @@
-// Back-projection of an upsampled slab onto blocks of sample columns. Called by reconstruct.cpp and gold_stream.cpp.
+// Back-projection of an upsampled slab onto blocks of sample columns. Called by reconstruct.cpp and
+// gold_stream.cpp.
 #pragma once
 
 #include <array>
@@ -9,7 +10,8 @@
 
 namespace vdvr {
 
-/// Equal blocks of nx x ny columns; block b's first column lies at `first[b]` (world x, y), the next at + step.
+/// Equal blocks of nx x ny columns; block b's first column lies at `first[b]` (world x, y), the next at +
+/// step.
 struct ColumnBlocks {
   std::int64_t nx = 0, ny = 0;
   double step_x = 1, step_y = 1;
@@ -18,15 +20,18 @@ struct ColumnBlocks {
   std::vector<std::array<std::int32_t, 2>> wanted{};
 };
 
-/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear | cubic.
-/// Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
-void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab, const ColumnBlocks& blocks,
-                  const std::string& filter, opencl::DeviceArray<float>& out);
+/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear
+/// | cubic. Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out);
 
-/// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not share cache sets.
+/// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
+/// share cache sets.
 std::int64_t column_stride(std::int64_t rows);
 
-/// A bound on the fp32 error of the positions s, in upsampled columns, for such blocks (docs/error-bounds.md, section 7).
-double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns, const ColumnBlocks& blocks);
+/// A bound on the fp32 error of the positions s, in upsampled columns, for such blocks (docs/error-bounds.md,
+/// section 7).
+double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns,
+                      const ColumnBlocks& blocks);
 
 }  // namespace vdvr

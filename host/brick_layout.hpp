@@ -1,5 +1,5 @@
-// Where each brick's samples lie in one sample buffer: base first, then the tiles of each triple in map order.
-// Called by mixed_volume.cpp (sample_at), verify.cpp and resident_volume.cpp.
+// Where each brick's samples lie in one sample buffer: base first, then the tiles of each triple in map
+// order. Called by mixed_volume.cpp (sample_at), verify.cpp and resident_volume.cpp.
 #pragma once
 
 #include <map>
@@ -23,8 +23,8 @@ std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& volume);
 std::uint64_t sample_buffer_size(const MixedVolume& volume);
 
 /// The record of brick (bx, by, bz); texel coordinates are left 0 (the image atlas fills them).
-VdvrBrick brick_record(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets, std::int64_t bx,
-                       std::int64_t by, std::int64_t bz);
+VdvrBrick brick_record(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets,
+                       std::int64_t bx, std::int64_t by, std::int64_t bz);
 
 /// All records, [bz][by][bx].
 std::vector<VdvrBrick> brick_records(const MixedVolume& volume);

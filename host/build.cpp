@@ -1,5 +1,5 @@
-// Builds the certified volume: classify, extract, close, pack, then measure the packed field and repair until it holds
-// (docs/error-bounds.md). Calls gold_stream.cpp and close_boundaries.cpp.
+// Builds the certified volume: classify, extract, close, pack, then measure the packed field and repair until
+// it holds (docs/error-bounds.md). Calls gold_stream.cpp and close_boundaries.cpp.
 #include "vdvr/build.hpp"
 
 #include <fmt/format.h>
@@ -43,7 +43,8 @@ int fitting_granularity(int wanted, const Grid& grid) {
 }
 
 // Bricks that meet the region of interest; all where there is none.
-std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b, const std::optional<std::array<double, 6>>& roi) {
+std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b,
+                                        const std::optional<std::array<double, 6>>& roi) {
   const std::int64_t g = b.granularity;
   Index3 n{};
   for (std::size_t a = 0; a < 3; ++a) n[a] = (b.grid.cells[a] + g - 1) / g;
@@ -54,7 +55,8 @@ std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b, const std::optional
     const Index3 p{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
     for (std::size_t a = 0; a < 3; ++a) {
       const double low = b.grid.origin[a] + static_cast<double>(p[a] * g) * b.grid.spacing[a];
-      const double high = b.grid.origin[a] + static_cast<double>(std::min(b.grid.cells[a], (p[a] + 1) * g)) * b.grid.spacing[a];
+      const double high = b.grid.origin[a] +
+                          static_cast<double>(std::min(b.grid.cells[a], (p[a] + 1) * g)) * b.grid.spacing[a];
       if (high < (*roi)[a] || low > (*roi)[a + 3]) selected[i] = 0;
     }
   }
@@ -70,7 +72,8 @@ struct Slack {
 
 class Builder {
  public:
-  Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options, const Progress& progress)
+  Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
+          const Progress& progress)
       : state_(device.state()), plan_(plan), progress_(progress), watch_(seconds_) {
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
@@ -80,14 +83,16 @@ class Builder {
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
     bricks_.gold.resize(selected_.size());
-    if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end()) throw InputError("--roi meets no brick of the grid");
+    if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
+      throw InputError("--roi meets no brick of the grid");
 
     filtered_ = filter_projections(state_, scan, plan.field, progress);
     measure_filter_error(filtered_, scan, plan.field);
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);
-    GoldSettings settings{plan.grid, bricks_.granularity, plan.gold_rate, plan.upsampling_u, plan.u_filter, options.window};
+    GoldSettings settings{plan.grid,         bricks_.granularity, plan.gold_rate,
+                          plan.upsampling_u, plan.u_filter,       options.window};
     stream_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     watch_.lap("bounds");
     probe_ = probe_sampler(device);
@@ -96,7 +101,8 @@ class Builder {
 
   // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
   double node_tolerance(const SamplerTerms& sampler) const {
-    return plan_.epsilon_abs - stream_->arithmetic() - std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+    return plan_.epsilon_abs - stream_->arithmetic() -
+           std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
   }
 
   void classify(double tolerance) {
@@ -105,28 +111,33 @@ class Builder {
     const DeviceField base(state_, as_mixed({bricks_.grid, bricks_.base}, bricks_.granularity));
     std::vector<std::uint8_t> near = stream_->bricks_near_coverage();
     for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && selected_[i];
-    const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near), "bricks to classify");
+    const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near),
+                                                        "bricks to classify");
     measures_.assign(bricks_.level.size(), {});
-    stream_->run(near, [&](GoldStream::Batch& batch) {
-      const auto classes = batch.classify(base, static_cast<float>(strict), device_near);
-      const auto& ids = batch.bricks();
-      const auto p = batch.largest_p();
-      std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
-      for (std::size_t i = 0; i < ids.size(); ++i) {
-        const std::size_t id = at(ids[i]);
-        const BrickClass& c = classes[i];
-        bricks_.involved[id] = c.base.total >= 0;
-        if (!bricks_.involved[id]) continue;
-        measures_[id] = c.base;
-        slack_.total = std::max(slack_.total, static_cast<double>(c.base.slack));
-        slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
-        slack_.gold = std::max(slack_.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
-        if (!(static_cast<double>(c.base.slack) <= strict)) refuse(c.base.slack, strict);
-        set_level(ids[i], c.level);
-        if (c.level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
-      }
-      store(batch, tiles);
-    }, progress_, "classify");
+    stream_->run(
+        near,
+        [&](GoldStream::Batch& batch) {
+          const auto classes = batch.classify(base, static_cast<float>(strict), device_near);
+          const auto& ids = batch.bricks();
+          const auto p = batch.largest_p();
+          std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
+          for (std::size_t i = 0; i < ids.size(); ++i) {
+            const std::size_t id = at(ids[i]);
+            const BrickClass& c = classes[i];
+            bricks_.involved[id] = c.base.total >= 0;
+            if (!bricks_.involved[id]) continue;
+            measures_[id] = c.base;
+            slack_.total = std::max(slack_.total, static_cast<double>(c.base.slack));
+            slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
+            slack_.gold =
+                std::max(slack_.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
+            if (!(static_cast<double>(c.base.slack) <= strict)) refuse(c.base.slack, strict);
+            set_level(ids[i], c.level);
+            if (c.level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
+          }
+          store(batch, tiles);
+        },
+        progress_, "classify");
     watch_.lap("classify");
   }
 
@@ -134,24 +145,33 @@ class Builder {
   MixedVolume close_and_measure(double tolerance) {
     // Level 0 was measured on the base samples while classifying, and closing does not change those.
     std::vector<std::uint8_t> pending(bricks_.level.size());
-    for (std::size_t i = 0; i < pending.size(); ++i) pending[i] = bricks_.involved[i] && bricks_.level[i] != LevelTriple{0, 0, 0};
+    for (std::size_t i = 0; i < pending.size(); ++i)
+      pending[i] = bricks_.involved[i] && bricks_.level[i] != LevelTriple{0, 0, 0};
     for (int round = 0;; ++round) {
       MixedVolume volume = close_boundaries(bricks_);
       watch_.lap("close");
       const DeviceField field(state_, volume);
-      const opencl::DeviceArray<std::uint8_t> device_pending(state_, std::span<const std::uint8_t>(pending), "bricks to verify");
-      stream_->run(pending, [&](GoldStream::Batch& batch) {
-        for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending)) measures_[at(m.brick)] = m;
-      }, progress_, round == 0 ? "verify" : "repair");
+      const opencl::DeviceArray<std::uint8_t> device_pending(state_, std::span<const std::uint8_t>(pending),
+                                                             "bricks to verify");
+      stream_->run(
+          pending,
+          [&](GoldStream::Batch& batch) {
+            for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending))
+              measures_[at(m.brick)] = m;
+          },
+          progress_, round == 0 ? "verify" : "repair");
       watch_.lap("verify");
       const std::vector<std::uint8_t> raised = raise_violating(pending);
       repaired_ += std::count(raised.begin(), raised.end(), 1);
       if (std::find(raised.begin(), raised.end(), 1) == raised.end()) return volume;
-      stream_->run(raised, [&](GoldStream::Batch& batch) {
-        std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
-        for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
-        store(batch, tiles);
-      }, progress_, "repair");
+      stream_->run(
+          raised,
+          [&](GoldStream::Batch& batch) {
+            std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
+            for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
+            store(batch, tiles);
+          },
+          progress_, "repair");
       watch_.lap("repair");
       pending = with_neighbours(raised);
     }
@@ -162,7 +182,8 @@ class Builder {
     std::vector<std::uint8_t> one(bricks_.level.size(), 0);
     one[at(brick)] = 1;
     Vec3 where{};
-    stream_->run(one, [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, brick); }, {}, "worst");
+    stream_->run(
+        one, [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, brick); }, {}, "worst");
     return where;
   }
 
@@ -178,10 +199,12 @@ class Builder {
  private:
   [[noreturn]] void refuse(float slack, double strict) const {
     const bool projection = slack_.projection > slack_.gold;
-    throw ToleranceError(fmt::format(
-        "epsilon {:.4g} is out of reach at these rates: interpolating {} alone may err by {:.4g} of the {:.4g} left for it; raise {} or allow at least {:.4g}",
-        plan_.epsilon_abs, projection ? "the projections" : "gold", slack, strict, projection ? "--upsampling, or take --u-filter cubic," : "--gold",
-        plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
+    throw ToleranceError(
+        fmt::format("epsilon {:.4g} is out of reach at these rates: interpolating {} alone may err by {:.4g} "
+                    "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
+                    plan_.epsilon_abs, projection ? "the projections" : "gold", slack, strict,
+                    projection ? "--upsampling, or take --u-filter cubic," : "--gold",
+                    plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
   }
 
   void set_level(std::int64_t brick, int level) {
@@ -200,7 +223,8 @@ class Builder {
     }
   }
 
-  // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels only rise.
+  // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels
+  // only rise.
   std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
     const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
     std::vector<std::uint8_t> raise(bricks_.level.size(), 0);
@@ -208,7 +232,8 @@ class Builder {
       if (!pending[i] || measures_[i].violated == 0) continue;
       for (int part = 0; part < 27; ++part) {
         if (!(measures_[i].violated >> part & 1)) continue;
-        const auto incident = incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9});
+        const auto incident =
+            incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9});
         bool any_coarser = false;
         for (const std::int64_t j : incident)
           if (bricks_.level[at(j)][0] < bricks_.level[i][0]) {
@@ -230,7 +255,8 @@ class Builder {
     for (std::size_t i = 0; i < marked.size(); ++i)
       if (marked[i])
         for (int part = 0; part < 27; ++part)
-          for (const std::int64_t j : incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9}))
+          for (const std::int64_t j :
+               incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9}))
             if (bricks_.involved[at(j)]) out[at(j)] = 1;
     return out;
   }
@@ -252,8 +278,8 @@ class Builder {
   std::int64_t repaired_ = 0;
 };
 
-Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
-                    const MixedVolume& volume, const SamplerTerms& sampler) {
+Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan, const Plan& plan,
+                    const BuildOptions& options, const MixedVolume& volume, const SamplerTerms& sampler) {
   Certificate c;
   c.epsilon = plan.epsilon;
   c.epsilon_abs = plan.epsilon_abs;
@@ -270,8 +296,11 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   }
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {builder.slack().gold, "curvature: signed second differences of gold, with remainder"};
-  c.budget.projection = {builder.slack().projection, plan.u_filter == "cubic" ? "curvature: signed sums of |q_uuuu| maxima" : "curvature: signed sums of |q_uu| maxima"};
-  c.budget.arithmetic = {builder.stream().arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
+  c.budget.projection = {builder.slack().projection, plan.u_filter == "cubic"
+                                                         ? "curvature: signed sums of |q_uuuu| maxima"
+                                                         : "curvature: signed sums of |q_uu| maxima"};
+  c.budget.arithmetic = {builder.stream().arithmetic(),
+                         "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
   c.holds_buffer = c.total_buffer <= c.epsilon_abs;
@@ -290,7 +319,9 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.roi = options.roi;
   c.not_covered_count = plan.not_covered_count;
   c.not_covered_fraction = plan.not_covered_fraction;
-  c.not_covered_rule = "a point is covered when all its projections fall on the detector; samples more than two base-cell diagonals outside are stored as 0";
+  c.not_covered_rule =
+      "a point is covered when all its projections fall on the detector; samples more than two base-cell "
+      "diagonals outside are stored as 0";
   c.input_name = scan.report.name;
   c.input_sha256 = scan.report.sha256;
   c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};
@@ -299,20 +330,26 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.driver = device.info().driver;
   c.version = VDVR_VERSION;
   c.notes = plan.notes;
-  c.notes.push_back("covers interpolation, not physics: noise, too few views, the filter window and truncation shape F itself");
-  if (builder.repaired() > 0) c.notes.push_back(fmt::format("closing raised {} bricks by one level", builder.repaired()));
+  c.notes.push_back(
+      "covers interpolation, not physics: noise, too few views, the filter window and truncation shape F "
+      "itself");
+  if (builder.repaired() > 0)
+    c.notes.push_back(fmt::format("closing raised {} bricks by one level", builder.repaired()));
   return c;
 }
 
 }  // namespace
 
-BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options, const Progress& progress) {
-  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 && options.granularity != 8)
+BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
+                  const Progress& progress) {
+  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 &&
+      options.granularity != 8)
     throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
   Builder builder(device, scan, plan, options, progress);
   const std::int64_t atlas = longest_atlas(device.info());
 
-  // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and more if that was short.
+  // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
+  // more if that was short.
   const FieldSlopes base_slopes = field_slopes(as_mixed(plan.base));
   SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), atlas);
   const auto scale = [](SamplerTerms& t, double f) {
@@ -323,12 +360,15 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
   for (int attempt = 0;; ++attempt) {
     const double tolerance = builder.node_tolerance(reserve);
     if (!(tolerance > 0)) {
-      throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}", plan.epsilon_abs, plan.epsilon_abs - tolerance));
+      throw ToleranceError(
+          fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
+                      plan.epsilon_abs, plan.epsilon_abs - tolerance));
     }
     builder.classify(tolerance);
     BuildResult result;
     result.volume = builder.close_and_measure(tolerance);
-    const SamplerTerms sampler = sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(), atlas);
+    const SamplerTerms sampler =
+        sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(), atlas);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt == 2) {

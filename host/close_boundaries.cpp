@@ -1,5 +1,5 @@
-// Closing on the host. Called by build.cpp. Interpolates with the sampler's own lerp, so that the stored samples of a fine brick
-// lie on what its coarse neighbour interpolates.
+// Closing on the host. Called by build.cpp. Interpolates with the sampler's own lerp, so that the stored
+// samples of a fine brick lie on what its coarse neighbour interpolates.
 #include "host/close_boundaries.hpp"
 
 #include <algorithm>
@@ -25,9 +25,9 @@ Index3 brick_position(const OpenBricks& b, std::int64_t brick) {
 
 // One brick's samples under its own index: x, y, z order for everything here.
 struct TileView {
-  Index3 position;       // of the brick
+  Index3 position;  // of the brick
   std::array<int, 3> level;
-  Index3 end;            // last index inside the grid
+  Index3 end;  // last index inside the grid
   std::int64_t stride_y, stride_z;
 
   TileView(const OpenBricks& b, std::int64_t brick) : position(brick_position(b, brick)) {
@@ -35,14 +35,17 @@ struct TileView {
     level = {l[2], l[1], l[0]};
     std::array<std::int64_t, 3> side{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const std::int64_t width = std::min<std::int64_t>(b.granularity, b.grid.cells[a] - position[a] * b.granularity);
+      const std::int64_t width =
+          std::min<std::int64_t>(b.granularity, b.grid.cells[a] - position[a] * b.granularity);
       end[a] = width << level[a];
       side[a] = (static_cast<std::int64_t>(b.granularity) << level[a]) + 1;
     }
     stride_y = side[0];
     stride_z = side[0] * side[1];
   }
-  [[nodiscard]] std::size_t index(const Index3& i) const { return at(i[2] * stride_z + i[1] * stride_y + i[0]); }
+  [[nodiscard]] std::size_t index(const Index3& i) const {
+    return at(i[2] * stride_z + i[1] * stride_y + i[0]);
+  }
 };
 
 // Puts the base samples into a tile: base is the one source of every sample on the base lattice.
@@ -52,14 +55,15 @@ void put_base_samples(const OpenBricks& b, const TileView& t, std::vector<float>
   for (std::int64_t z = 0; z <= t.end[2] >> t.level[2]; ++z)
     for (std::int64_t y = 0; y <= t.end[1] >> t.level[1]; ++y)
       for (std::int64_t x = 0; x <= t.end[0] >> t.level[0]; ++x)
-        tile[t.index({x << t.level[0], y << t.level[1], z << t.level[2]})] =
-            b.base[at(((t.position[2] * g + z) * n[1] + t.position[1] * g + y) * n[0] + t.position[0] * g + x)];
+        tile[t.index({x << t.level[0], y << t.level[1], z << t.level[2]})] = b.base[at(
+            ((t.position[2] * g + z) * n[1] + t.position[1] * g + y) * n[0] + t.position[0] * g + x)];
 }
 
 // The closing of one edge or face of a brick.
 class Entity {
  public:
-  Entity(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side) : own_(b, brick), owner_(own_) {
+  Entity(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side)
+      : own_(b, brick), owner_(own_) {
     const auto incident = incident_bricks(b, brick, side);
     const std::int64_t owner = *std::min_element(incident.begin(), incident.end());
     owner_ = TileView(b, owner);
@@ -86,8 +90,8 @@ class Entity {
   }
 
  private:
-  // The sample that every incident brick takes at a lattice point: base where it lies on the base lattice (already in place),
-  // else the owner's gold sample.
+  // The sample that every incident brick takes at a lattice point: base where it lies on the base lattice
+  // (already in place), else the owner's gold sample.
   void take_from_owner(std::vector<float>& tile, const Index3& i) const {
     bool on_base = true;
     for (std::size_t a = 0; a < 3; ++a) on_base = on_base && i[a] % (std::int64_t{1} << own_.level[a]) == 0;
@@ -117,11 +121,13 @@ class Entity {
       low[a] = below;
       high[a] = below + step;
       i[a] = j;
-      tile[own_.index(i)] = vdvr_lerp(tile[own_.index(low)], tile[own_.index(high)], fraction(j - below, step));
+      tile[own_.index(i)] =
+          vdvr_lerp(tile[own_.index(low)], tile[own_.index(high)], fraction(j - below, step));
     }
   }
 
-  void close_face(std::vector<float>& tile, std::size_t p, std::size_t q, std::int64_t step_p, std::int64_t step_q) const {
+  void close_face(std::vector<float>& tile, std::size_t p, std::size_t q, std::int64_t step_p,
+                  std::int64_t step_q) const {
     Index3 i = fixed_;
     for (i[q] = step_q; i[q] < own_.end[q]; i[q] += step_q)
       for (i[p] = step_p; i[p] < own_.end[p]; i[p] += step_p) take_from_owner(tile, i);
@@ -137,14 +143,17 @@ class Entity {
         if (lp == jp && lq == jq) continue;
         const std::int64_t hp = lp == jp ? lp : lp + step_p, hq = lq == jq ? lq : lq + step_q;
         const float tp = fraction(jp - lp, step_p), tq = fraction(jq - lq, step_q);
-        const float low = vdvr_lerp(value(lp, lq), value(hp, lq), tp), high = vdvr_lerp(value(lp, hq), value(hp, hq), tp);
+        const float low = vdvr_lerp(value(lp, lq), value(hp, lq), tp),
+                    high = vdvr_lerp(value(lp, hq), value(hp, hq), tp);
         i[p] = jp;
         i[q] = jq;
         tile[own_.index(i)] = vdvr_lerp(low, high, tq);
       }
   }
 
-  static float fraction(std::int64_t part, std::int64_t whole) { return static_cast<float>(part) / static_cast<float>(whole); }
+  static float fraction(std::int64_t part, std::int64_t whole) {
+    return static_cast<float>(part) / static_cast<float>(whole);
+  }
 
   TileView own_, owner_;
   const std::vector<float>* owner_gold_ = nullptr;
@@ -166,17 +175,20 @@ void repeat_last_planes(const TileView& t, int granularity, std::vector<float>& 
   for (std::int64_t z = 0; z <= last[2]; ++z)
     for (std::int64_t y = 0; y <= last[1]; ++y)
       for (std::int64_t x = 0; x <= last[0]; ++x)
-        tile[t.index({x, y, z})] = tile[t.index({std::min(x, t.end[0]), std::min(y, t.end[1]), std::min(z, t.end[2])})];
+        tile[t.index({x, y, z})] =
+            tile[t.index({std::min(x, t.end[0]), std::min(y, t.end[1]), std::min(z, t.end[2])})];
 }
 
 std::vector<float> closed_tile(const OpenBricks& b, std::int64_t brick) {
   const TileView t(b, brick);
   std::vector<float> tile = b.gold[at(brick)];
   put_base_samples(b, t, tile);
-  for (const std::size_t inside : {std::size_t{1}, std::size_t{2}})  // edges run along one axis, faces along two
+  for (const std::size_t inside :
+       {std::size_t{1}, std::size_t{2}})  // edges run along one axis, faces along two
     for (int part = 0; part < 27; ++part) {
       const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
-      if (static_cast<std::size_t>(std::count(side.begin(), side.end(), 1)) == inside) Entity(b, brick, side).close(tile);
+      if (static_cast<std::size_t>(std::count(side.begin(), side.end(), 1)) == inside)
+        Entity(b, brick, side).close(tile);
     }
   repeat_last_planes(t, b.granularity, tile);
   return tile;
@@ -184,7 +196,8 @@ std::vector<float> closed_tile(const OpenBricks& b, std::int64_t brick) {
 
 }  // namespace
 
-std::vector<std::int64_t> incident_bricks(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side) {
+std::vector<std::int64_t> incident_bricks(const OpenBricks& b, std::int64_t brick,
+                                          const std::array<int, 3>& side) {
   const Index3 n = brick_counts(b), p = brick_position(b, brick);
   std::array<std::vector<std::int64_t>, 3> range;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -213,12 +226,14 @@ MixedVolume close_boundaries(const OpenBricks& b) {
   std::map<LevelTriple, std::uint32_t> counts;
   for (std::size_t i = 0; i < b.level.size(); ++i)
     if (b.level[i] != LevelTriple{0, 0, 0}) v.tile[i] = counts[b.level[i]]++;
-  for (const auto& [triple, n] : counts) v.tiles[triple].resize(static_cast<std::size_t>(n) * at(v.tile_size(triple)));
+  for (const auto& [triple, n] : counts)
+    v.tiles[triple].resize(static_cast<std::size_t>(n) * at(v.tile_size(triple)));
   parallel_for(static_cast<std::int64_t>(b.level.size()), {}, "close", [&](std::int64_t i) {
     const LevelTriple& l = b.level[at(i)];
     if (l == LevelTriple{0, 0, 0}) return;
     const auto tile = closed_tile(b, i);
-    std::copy(tile.begin(), tile.end(), v.tiles.at(l).begin() + static_cast<std::ptrdiff_t>(std::size_t{v.tile[at(i)]} * tile.size()));
+    std::copy(tile.begin(), tile.end(),
+              v.tiles.at(l).begin() + static_cast<std::ptrdiff_t>(std::size_t{v.tile[at(i)]} * tile.size()));
   });
   return v;
 }

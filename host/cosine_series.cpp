@@ -41,7 +41,8 @@ UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixel
   return c;
 }
 
-std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order, double pitch, int lattice) {
+std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order,
+                                      double pitch, int lattice) {
   const auto width = static_cast<std::size_t>(n);
   std::vector<double> table;  // g on the lattice over one period
   const std::int64_t period = 2 * n * lattice;
@@ -71,8 +72,9 @@ std::vector<double> analysis_matrix(std::int64_t n) {
   std::vector<double> matrix(width * width);
   for (std::size_t m = 0; m < width; ++m)
     for (std::size_t i = 0; i < width; ++i)
-      matrix[m * width + i] = (m == 0 ? 1.0 : 2.0) / static_cast<double>(n) *
-                              std::cos(pi * static_cast<double>(m) * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
+      matrix[m * width + i] =
+          (m == 0 ? 1.0 : 2.0) / static_cast<double>(n) *
+          std::cos(pi * static_cast<double>(m) * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
   return matrix;
 }
 

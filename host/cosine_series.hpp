@@ -1,7 +1,9 @@
-// Band-limited resampling under half-sample mirror extension (a DCT-II cosine series), as dense matrices in double precision.
+// Band-limited resampling under half-sample mirror extension (a DCT-II cosine series), as dense matrices in
+// double precision.
 //
-// A row q_0 .. q_{n-1} defines q(x) = sum_i q_i [ g(x - i) + g(x + i + 1) ] with g(d) = (1/n) [1/2 + sum_{m=1}^{n-1} cos(pi m d / n)].
-// Called by filter_projections.cpp (upsampling in u, rows at the grid's z) and projection_bounds.cpp (derivatives).
+// A row q_0 .. q_{n-1} defines q(x) = sum_i q_i [ g(x - i) + g(x + i + 1) ] with g(d) = (1/n) [1/2 +
+// sum_{m=1}^{n-1} cos(pi m d / n)]. Called by filter_projections.cpp (upsampling in u, rows at the grid's z)
+// and projection_bounds.cpp (derivatives).
 #pragma once
 
 #include <cstdint>
@@ -24,9 +26,11 @@ struct UpsampledColumns {
 /// Covers [-1/2 - margin, n - 1/2 + margin].
 UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixels);
 
-/// double matrix[position][i]: the value (order 0) or the even derivative of the series at each position, with x measured
-/// in `pitch` units. `lattice` > 0 promises that positions are multiples of 1 / lattice, which makes derivatives cheap.
-std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order, double pitch, int lattice);
+/// double matrix[position][i]: the value (order 0) or the even derivative of the series at each position,
+/// with x measured in `pitch` units. `lattice` > 0 promises that positions are multiples of 1 / lattice,
+/// which makes derivatives cheap.
+std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order,
+                                      double pitch, int lattice);
 
 /// double matrix[m][i]: the cosine coefficients a_m, q(x) = sum_m a_m cos(pi m (x + 1/2) / n).
 std::vector<double> analysis_matrix(std::int64_t n);

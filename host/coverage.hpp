@@ -1,5 +1,5 @@
-// The covered region of a scan: points all of whose projections fall on the detector. Called by reconstruct.cpp, plan.cpp,
-// gold_stream.cpp, build.cpp.
+// The covered region of a scan: points all of whose projections fall on the detector. Called by
+// reconstruct.cpp, plan.cpp, gold_stream.cpp, build.cpp.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,8 @@
 
 namespace vdvr {
 
-/// The region across z: the intersection of one strip per view, t_min <= t <= t_max; a convex polygon around the axis.
+/// The region across z: the intersection of one strip per view, t_min <= t <= t_max; a convex polygon around
+/// the axis.
 class Coverage {
  public:
   /// `geometry.center` is the centre in use. Throws InputError when the axis does not fall on the detector.

@@ -18,20 +18,23 @@ namespace vdvr {
 
 /// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
 struct FilteredScan {
-  ParallelGeometry geometry;      ///< with the centre in use
-  std::vector<float> samples;     ///< [view][u][v]
+  ParallelGeometry geometry;   ///< with the centre in use
+  std::vector<float> samples;  ///< [view][u][v]
   std::int64_t fft_length = 0;
-  std::vector<double> view_max;   ///< max |q| of each view's samples
-  double ramp_error = 0;          ///< sum over views of a bound on the fp32 error of any filtered sample (docs/error-bounds.md)
+  std::vector<double> view_max;  ///< max |q| of each view's samples
+  double ramp_error =
+      0;  ///< sum over views of a bound on the fp32 error of any filtered sample (docs/error-bounds.md)
   bool limited_angle = false;
 };
 
-/// Cost: views * rows FFTs of at least twice the columns. Memory: the filtered scan on the host, one chunk on the device.
+/// Cost: views * rows FFTs of at least twice the columns. Memory: the filtered scan on the host, one chunk on
+/// the device.
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                                 const Progress& progress = {});
 
-/// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision, view by view, where
-/// that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps the bound.
+/// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision,
+/// view by view, where that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps
+/// the bound.
 void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field);
 
 /// Lanes to which z is padded, and the launch shape of the column kernels, by device class.
@@ -53,13 +56,15 @@ class Upsampler {
  public:
   Upsampler(opencl::State& state, const FilteredScan& scan) : state_(&state), scan_(&scan) {}
 
-  /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0: the rows are
-  /// multiples of 1 / row_lattice. Views [first_view, first_view + views).
-  /// Cost: views * rows * U * (V + columns) multiply-adds.
-  UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0, int order_v = 0,
-                           int row_lattice = 0, std::int64_t first_view = 0, std::int64_t views = -1);
+  /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0:
+  /// the rows are multiples of 1 / row_lattice. Views [first_view, first_view + views). Cost: views * rows *
+  /// U * (V + columns) multiply-adds.
+  UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0,
+                           int order_v = 0, int row_lattice = 0, std::int64_t first_view = 0,
+                           std::int64_t views = -1);
 
-  /// The largest absolute row sum of the matrix in u of a value or derivative: how much an error of the samples can grow.
+  /// The largest absolute row sum of the matrix in u of a value or derivative: how much an error of the
+  /// samples can grow.
   double gain_u(const UpsampledColumns& columns, int order);
 
   /// Bytes of one slab.

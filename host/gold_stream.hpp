@@ -1,8 +1,9 @@
-// Gold, block by block: F on the grid refined by the gold rate, with the node slack T + P beside it, never whole in memory
-// (docs/error-bounds.md). Called by plan.cpp, build.cpp and verify.cpp.
+// Gold, block by block: F on the grid refined by the gold rate, with the node slack T + P beside it, never
+// whole in memory (docs/error-bounds.md). Called by plan.cpp, build.cpp and verify.cpp.
 //
-// A slab is a run of base cells in z whose filtered rows are on the device; blocks are columns of base cells inside it. A full
-// pass uses large blocks, a repair or a sampled verification blocks of one brick; the code is the same.
+// A slab is a run of base cells in z whose filtered rows are on the device; blocks are columns of base cells
+// inside it. A full pass uses large blocks, a repair or a sampled verification blocks of one brick; the code
+// is the same.
 #pragma once
 
 #include <array>
@@ -34,16 +35,17 @@ struct GoldSettings {
 /// What one brick measured against gold.
 struct BrickMeasure {
   std::int64_t brick = 0;
-  float total = -1;      ///< largest |V - gold| + T + P; negative: no tested node
-  float error = 0;       ///< largest |V - gold|
-  float slack = 0;       ///< largest T + P: what even gold may err
-  std::uint32_t violated = 0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
+  float total = -1;  ///< largest |V - gold| + T + P; negative: no tested node
+  float error = 0;   ///< largest |V - gold|
+  float slack = 0;   ///< largest T + P: what even gold may err
+  std::uint32_t violated =
+      0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
 };
 
 /// Result of the node test of one brick.
 struct BrickClass {
-  BrickMeasure base;     ///< the base samples, as stored, measured on it
-  int level = 0;         ///< the lowest that passes; the top where only gold itself does
+  BrickMeasure base;  ///< the base samples, as stored, measured on it
+  int level = 0;      ///< the lowest that passes; the top where only gold itself does
 };
 
 /// A stored field on the device, for the verification kernel.
@@ -56,16 +58,19 @@ struct DeviceField {
 
 class GoldStream {
  public:
-  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups, const GoldSettings& settings);
+  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+             const GoldSettings& settings);
   ~GoldStream();
 
   /// The blocks of one batch on the device, as handed to the callback.
   class Batch;
   using OnBatch = std::function<void(Batch&)>;
 
-  /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a block without a
-  /// selected brick is skipped, and a few selected bricks are streamed as blocks of one brick.
-  void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress, const std::string& stage);
+  /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a
+  /// block without a selected brick is skipped, and a few selected bricks are streamed as blocks of one
+  /// brick.
+  void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
+           const std::string& stage);
 
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
@@ -79,7 +84,8 @@ class GoldStream {
 
  private:
   void run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t bricks_x, std::int64_t bricks_y,
-                const std::vector<std::array<std::int64_t, 2>>& blocks, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                const std::vector<std::array<std::int64_t, 2>>& blocks,
+                const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                 const std::function<void(double)>& tick);
 
   opencl::State& state_;
@@ -98,14 +104,17 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - gold| + slack <= tolerance. Level
-  /// 0 is measured on the stored base samples through the sampler: closing never changes those, so it is final.
-  std::vector<BrickClass> classify(const DeviceField& base, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
+  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - gold| + slack
+  /// <= tolerance. Level 0 is measured on the stored base samples through the sampler: closing never changes
+  /// those, so it is final.
+  std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
+                                   const opencl::DeviceArray<std::uint8_t>& selected);
 
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();
 
-  /// Calls visit(node index x, y, z in the brick, gold, slack) for every node of one closed brick; reads the block back.
+  /// Calls visit(node index x, y, z in the brick, gold, slack) for every node of one closed brick; reads the
+  /// block back.
   template <class Visit>
   void for_each_node(std::int64_t brick, Visit&& visit) const {
     const auto [b, x, y, z] = place(brick);
@@ -115,7 +124,9 @@ class GoldStream::Batch {
       for (std::int64_t j = 0; j <= side; ++j)
         for (std::int64_t i = 0; i <= side; ++i) {
           const std::int64_t nx = x * side + i, ny = y * side + j, nz = z * side + k;
-          visit(Index3{i, j, k}, gold[static_cast<std::size_t>(((b * (ny_ + 2) + ny + 1) * (nx_ + 2) + nx + 1) * gold_stride_ + nz + 1)],
+          visit(Index3{i, j, k},
+                gold[static_cast<std::size_t>(((b * (ny_ + 2) + ny + 1) * (nx_ + 2) + nx + 1) * gold_stride_ +
+                                              nz + 1)],
                 slack[static_cast<std::size_t>(((b * ny_ + ny) * nx_ + nx) * stride_ + nz)]);
         }
   }
@@ -124,12 +135,14 @@ class GoldStream::Batch {
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
   /// Measures a stored field on every selected brick.
-  std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
+  std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance,
+                                    const opencl::DeviceArray<std::uint8_t>& selected);
 
  private:
   friend class GoldStream;
   struct Results;
-  Results run_measure(const DeviceField& field, float tolerance, const opencl::DeviceArray<std::uint8_t>& selected);
+  Results run_measure(const DeviceField& field, float tolerance,
+                      const opencl::DeviceArray<std::uint8_t>& selected);
   Batch(opencl::State& state, const GoldSettings& settings) : state_(state), settings_(settings) {}
   [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
   [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }

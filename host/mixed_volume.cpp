@@ -9,13 +9,21 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrBrick) == 48 && offsetof(VdvrBrick, level_x) == 16 && offsetof(VdvrBrick, texel_x) == 32);
+static_assert(sizeof(VdvrBrick) == 48 && offsetof(VdvrBrick, level_x) == 16 &&
+              offsetof(VdvrBrick, texel_x) == 32);
 static_assert(sizeof(VdvrGrid) == 32);
 
 VdvrGrid sampler_grid(const MixedVolume& v) {
   const Index3 b = v.bricks();
   const auto i32 = [](std::int64_t n) { return static_cast<std::int32_t>(n); };
-  return {i32(v.grid.cells[0]), i32(v.grid.cells[1]), i32(v.grid.cells[2]), v.granularity, i32(b[0]), i32(b[1]), i32(b[2]), 0};
+  return {i32(v.grid.cells[0]),
+          i32(v.grid.cells[1]),
+          i32(v.grid.cells[2]),
+          v.granularity,
+          i32(b[0]),
+          i32(b[1]),
+          i32(b[2]),
+          0};
 }
 
 std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& v) {
@@ -34,8 +42,8 @@ std::uint64_t sample_buffer_size(const MixedVolume& v) {
   return n;
 }
 
-VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets, std::int64_t bx,
-                       std::int64_t by, std::int64_t bz) {
+VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
+                       std::int64_t bx, std::int64_t by, std::int64_t bz) {
   const Index3 bricks = v.bricks(), samples = v.grid.samples();
   const auto index = static_cast<std::size_t>((bz * bricks[1] + by) * bricks[0] + bx);
   const LevelTriple level = v.level[index];
@@ -50,7 +58,8 @@ VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::ui
     r.stride_z = static_cast<std::uint32_t>(samples[0] * samples[1]);
   } else {
     const auto shape = v.tile_shape(level);
-    r.offset = offsets.at(level) + static_cast<std::uint64_t>(v.tile[index]) * static_cast<std::uint64_t>(v.tile_size(level));
+    r.offset = offsets.at(level) +
+               static_cast<std::uint64_t>(v.tile[index]) * static_cast<std::uint64_t>(v.tile_size(level));
     r.stride_y = static_cast<std::uint32_t>(shape[2]);
     r.stride_z = static_cast<std::uint32_t>(shape[2] * shape[1]);
   }
@@ -95,7 +104,8 @@ std::array<float, 3> in_cells(const MixedVolume& v, const Vec3& point) {
 Index3 brick_at(const MixedVolume& v, const Vec3& point) {
   const VdvrGrid grid = sampler_grid(v);
   const std::array<float, 3> c = in_cells(v, point);
-  return {vdvr_brick_of(c[0], grid.granularity, grid.bricks_x), vdvr_brick_of(c[1], grid.granularity, grid.bricks_y),
+  return {vdvr_brick_of(c[0], grid.granularity, grid.bricks_x),
+          vdvr_brick_of(c[1], grid.granularity, grid.bricks_y),
           vdvr_brick_of(c[2], grid.granularity, grid.bricks_z)};
 }
 
@@ -105,14 +115,17 @@ float sample_at(const MixedVolume& v, const Vec3& point) {
   const std::int32_t bx = vdvr_brick_of(c[0], grid.granularity, grid.bricks_x);
   const std::int32_t by = vdvr_brick_of(c[1], grid.granularity, grid.bricks_y);
   const std::int32_t bz = vdvr_brick_of(c[2], grid.granularity, grid.bricks_z);
-  const auto index = (static_cast<std::size_t>(bz) * static_cast<std::size_t>(grid.bricks_y) + static_cast<std::size_t>(by)) *
-                         static_cast<std::size_t>(grid.bricks_x) + static_cast<std::size_t>(bx);
+  const auto index = (static_cast<std::size_t>(bz) * static_cast<std::size_t>(grid.bricks_y) +
+                      static_cast<std::size_t>(by)) *
+                         static_cast<std::size_t>(grid.bricks_x) +
+                     static_cast<std::size_t>(bx);
   const LevelTriple level = v.level[index];
   const bool in_base = level == LevelTriple{0, 0, 0};
   // Offsets relative to this brick's own array, so that nothing has to be packed for one sample.
   const VdvrBrick r = brick_record(v, {{level, 0}}, bx, by, bz);
   const float* first = (in_base ? v.base.data() : v.tiles.at(level).data()) + r.offset;
-  return vdvr_sample_in_brick(first, r.stride_y, r.stride_z, vdvr_local(c[0], bx, r.level_x, grid.granularity, grid.cells_x),
+  return vdvr_sample_in_brick(first, r.stride_y, r.stride_z,
+                              vdvr_local(c[0], bx, r.level_x, grid.granularity, grid.cells_x),
                               vdvr_local(c[1], by, r.level_y, grid.granularity, grid.cells_y),
                               vdvr_local(c[2], bz, r.level_z, grid.granularity, grid.cells_z));
 }

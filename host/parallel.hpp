@@ -1,4 +1,5 @@
-// A loop over host threads whose progress and exceptions reach the caller. Called by every stage that works on the host.
+// A loop over host threads whose progress and exceptions reach the caller. Called by every stage that works
+// on the host.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +15,8 @@
 
 namespace vdvr {
 
-/// Runs body(i) for 0 <= i < n on all cores. `progress` is called from the calling thread only, and may throw to stop.
+/// Runs body(i) for 0 <= i < n on all cores. `progress` is called from the calling thread only, and may throw
+/// to stop.
 template <class Body>
 void parallel_for(std::int64_t n, const Progress& progress, const std::string& stage, Body&& body) {
   std::atomic<std::int64_t> next{0}, done{0};

@@ -1,4 +1,5 @@
-// Bounds side by side, and rates by trial on sample blocks of the gold stream (docs/error-bounds.md). Called by the command line.
+// Bounds side by side, and rates by trial on sample blocks of the gold stream (docs/error-bounds.md). Called
+// by the command line.
 #include "vdvr/plan.hpp"
 
 #include <fmt/format.h>
@@ -27,7 +28,7 @@ struct Rates {
 };
 
 // Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
-constexpr double share = 0.4;
+constexpr double share = 0.5, patient_share = 0.65;
 
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -35,7 +36,11 @@ std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 std::vector<Rates> candidates(const RateOptions& wanted) {
   std::vector<Rates> all;
   for (const int gold : {8, 16, 32})
-    for (const auto& [upsampling, filter] : {std::pair<int, const char*>{8, "linear"}, {16, "linear"}, {8, "cubic"}, {16, "cubic"}, {32, "cubic"}})
+    for (const auto& [upsampling, filter] : {std::pair<int, const char*>{8, "linear"},
+                                             {16, "linear"},
+                                             {8, "cubic"},
+                                             {16, "cubic"},
+                                             {32, "cubic"}})
       all.push_back({upsampling, filter, gold});
   for (Rates& r : all) {
     if (wanted.upsampling) r.upsampling = *wanted.upsampling;
@@ -43,17 +48,23 @@ std::vector<Rates> candidates(const RateOptions& wanted) {
   }
   std::vector<Rates> out;
   for (const Rates& r : all) {
-    const bool same = std::any_of(out.begin(), out.end(), [&](const Rates& o) { return o.upsampling == r.upsampling && o.u_filter == r.u_filter && o.gold == r.gold; });
+    const bool same = std::any_of(out.begin(), out.end(), [&](const Rates& o) {
+      return o.upsampling == r.upsampling && o.u_filter == r.u_filter && o.gold == r.gold;
+    });
     if (!same && (wanted.u_filter == "auto" || wanted.u_filter == r.u_filter)) out.push_back(r);
   }
   return out;
 }
 
 void check_rates(const RateOptions& rates) {
-  const auto power = [](int n, int low) { return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n)); };
+  const auto power = [](int n, int low) {
+    return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n));
+  };
   if (rates.upsampling && !power(*rates.upsampling, 2))
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 2 to 64 (rate 1 has no bound)", *rates.upsampling));
-  if (rates.gold && !power(*rates.gold, 2)) throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
+    throw InputError(fmt::format("--upsampling {} must be a power of two, 2 to 64 (rate 1 has no bound)",
+                                 *rates.upsampling));
+  if (rates.gold && !power(*rates.gold, 2))
+    throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
   if (rates.u_filter != "auto" && rates.u_filter != "linear" && rates.u_filter != "cubic")
     throw InputError(fmt::format("--u-filter '{}' must be auto, linear or cubic", rates.u_filter));
 }
@@ -62,21 +73,30 @@ void check_rates(const RateOptions& rates) {
 std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups, const Grid& grid) {
   std::vector<Bound> out;
   const ParallelGeometry& g = scan.geometry;
-  // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take minutes.
-  const double amplitude_cost = static_cast<double>(g.views() * g.rows * g.columns) * static_cast<double>(g.rows + g.columns);
+  // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take
+  // minutes.
+  const double amplitude_cost =
+      static_cast<double>(g.views() * g.rows * g.columns) * static_cast<double>(g.rows + g.columns);
   if (amplitude_cost < 4e10) {
     const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates);
-    for (const auto& [rate, value] : a.projection) out.push_back({"projection", "amplitude, linear in u", rate, value, true});
-    for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude, sum over axes", rate, value, true});
+    for (const auto& [rate, value] : a.projection)
+      out.push_back({"projection", "amplitude, linear in u", rate, value, true});
+    for (const auto& [rate, value] : a.gold)
+      out.push_back({"gold", "amplitude, sum over axes", rate, value, true});
   }
   for (const int rate : bound_rates) {
-    const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;
+    const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate,
+                 hz = grid.spacing[2] / rate;
     const double wu = pi / g.pitch_u;
-    out.push_back({"projection", "paper Eq. 5, at samples", rate, du * du / 8 * sups.sampled_second_u, false});
+    out.push_back(
+        {"projection", "paper Eq. 5, at samples", rate, du * du / 8 * sups.sampled_second_u, false});
     out.push_back({"projection", "curvature, linear in u", rate, du * du / 8 * sups.second_u, true});
-    out.push_back({"projection", "curvature, cubic in u", rate, 3.0 / 128 * std::pow(du, 4) * wu * wu * sups.second_u, true});
-    out.push_back({"gold", "paper Eq. 9 without d^3, at samples", rate, (h * h * sups.sampled_second_u + hz * hz * sups.sampled_second_v) / 8, false});
-    out.push_back({"gold", "curvature, global", rate, (h * h * sups.second_u + hz * hz * sups.second_v) / 8, true});
+    out.push_back({"projection", "curvature, cubic in u", rate,
+                   3.0 / 128 * std::pow(du, 4) * wu * wu * sups.second_u, true});
+    out.push_back({"gold", "paper Eq. 9 without d^3, at samples", rate,
+                   (h * h * sups.sampled_second_u + hz * hz * sups.sampled_second_v) / 8, false});
+    out.push_back(
+        {"gold", "curvature, global", rate, (h * h * sups.second_u + hz * hz * sups.second_v) / 8, true});
   }
   return out;
 }
@@ -94,24 +114,33 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   Index3 n{};
   for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
   std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
-  const std::int64_t side = std::max<std::int64_t>(1, std::min<std::int64_t>(128, 1024 / gold) / (granularity * gold));
-  for (const auto& [fx, fy, fz] : {std::array{0.5, 0.5, 0.5}, std::array{0.25, 0.5, 0.5}, std::array{0.5, 0.2, 0.5}, std::array{0.72, 0.7, 0.5}, std::array{0.35, 0.35, 0.5}}) {
+  const std::int64_t side =
+      std::max<std::int64_t>(1, std::min<std::int64_t>(128, 1024 / gold) / (granularity * gold));
+  for (const auto& [fx, fy, fz] :
+       {std::array{0.5, 0.5, 0.5}, std::array{0.25, 0.5, 0.5}, std::array{0.5, 0.2, 0.5},
+        std::array{0.72, 0.7, 0.5}, std::array{0.35, 0.35, 0.5}}) {
     const std::array<double, 3> f{fx, fy, fz};
     Index3 first{};
     for (std::size_t a = 0; a < 3; ++a)
-      first[a] = std::clamp<std::int64_t>(static_cast<std::int64_t>(f[a] * static_cast<double>(n[a])) - side / 2, 0, std::max<std::int64_t>(0, n[a] - side));
+      first[a] =
+          std::clamp<std::int64_t>(static_cast<std::int64_t>(f[a] * static_cast<double>(n[a])) - side / 2, 0,
+                                   std::max<std::int64_t>(0, n[a] - side));
     for (std::int64_t z = first[2]; z < std::min(n[2], first[2] + side); ++z)
       for (std::int64_t y = first[1]; y < std::min(n[1], first[1] + side); ++y)
-        for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x) selected[at((z * n[1] + y) * n[0] + x)] = 1;
+        for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x)
+          selected[at((z * n[1] + y) * n[0] + x)] = 1;
   }
   return selected;
 }
 
-Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const FieldSups& sups, const Volume& base, const Rates& rates, double epsilon) {
+Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
+                const FieldSups& sups, const Volume& base, const Rates& rates, double epsilon) {
   const Grid& grid = base.grid;
   int granularity = 4;
-  while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity) granularity /= 2;
-  GoldStream stream(state, filtered, upsampler, sups, {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
+  while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity)
+    granularity /= 2;
+  GoldStream stream(state, filtered, upsampler, sups,
+                    {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
   Trial t;
   t.arithmetic = stream.arithmetic();
   t.slab_bytes = stream.slab_bytes(granularity);
@@ -119,20 +148,25 @@ Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& u
   const auto begin = std::chrono::steady_clock::now();
   const DeviceField field(state, as_mixed(base, granularity));
   const auto selected = trial_bricks(grid, granularity, rates.gold);
-  const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected), "trial bricks");
-  stream.run(selected, [&](GoldStream::Batch& batch) {
-    const auto classes = batch.classify(field, static_cast<float>(epsilon - 3 * t.arithmetic), device_selected);
-    const auto p = batch.largest_p();
-    for (std::size_t i = 0; i < classes.size(); ++i) {
-      const BrickClass& c = classes[i];
-      if (c.base.total < 0) continue;
-      t.slack = std::max(t.slack, static_cast<double>(c.base.slack));
-      t.projection = std::max(t.projection, static_cast<double>(p[i].first));
-      t.gold = std::max(t.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
-      tested += 1;
-      if (c.level > 0) tiles += std::pow((granularity << c.level) + 1, 3);
-    }
-  }, {}, "trial");
+  const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
+                                                          "trial bricks");
+  stream.run(
+      selected,
+      [&](GoldStream::Batch& batch) {
+        const auto classes =
+            batch.classify(field, static_cast<float>(epsilon - 3 * t.arithmetic), device_selected);
+        const auto p = batch.largest_p();
+        for (std::size_t i = 0; i < classes.size(); ++i) {
+          const BrickClass& c = classes[i];
+          if (c.base.total < 0) continue;
+          t.slack = std::max(t.slack, static_cast<double>(c.base.slack));
+          t.projection = std::max(t.projection, static_cast<double>(p[i].first));
+          t.gold = std::max(t.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
+          tested += 1;
+          if (c.level > 0) tiles += std::pow((granularity << c.level) + 1, 3);
+        }
+      },
+      {}, "trial");
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   t.seconds_per_update = seconds / std::max(1.0, stream.updates());
   t.samples_ratio = 1 + (tested > 0 ? (tiles / tested + 1) / std::pow(granularity, 3) : 0.0);
@@ -167,9 +201,11 @@ double range_of_covered(const Volume& volume, const Coverage& coverage, std::int
 }
 
 void set_epsilon(Plan& plan, const Tolerance& tolerance) {
-  if (tolerance.relative.has_value() == tolerance.absolute.has_value()) throw InputError("give one of --epsilon and --epsilon-abs");
+  if (tolerance.relative.has_value() == tolerance.absolute.has_value())
+    throw InputError("give one of --epsilon and --epsilon-abs");
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
-  if (!(given > 0) || !std::isfinite(given)) throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
+  if (!(given > 0) || !std::isfinite(given))
+    throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
   if (tolerance.relative) {
     plan.epsilon = given;
     plan.epsilon_abs = given * plan.reference_range;
@@ -178,13 +214,15 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance) {
     plan.epsilon = plan.reference_range > 0 ? given / plan.reference_range : 0;
   }
   if (!(plan.epsilon_abs > 0))
-    throw InputError("the field is constant over the covered samples, so a relative tolerance means nothing; give --epsilon-abs");
+    throw InputError(
+        "the field is constant over the covered samples, so a relative tolerance means nothing; give "
+        "--epsilon-abs");
 }
 
 }  // namespace
 
-Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
-               const Progress& progress) {
+Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
+               const RateOptions& rates, const Tolerance& tolerance, const Progress& progress) {
   check_rates(rates);
   ParallelGeometry used = scan.geometry;
   if (field.center) used.center = *field.center;
@@ -206,11 +244,13 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.not_covered_count = not_covered;
   plan.not_covered_fraction = static_cast<double>(not_covered) / static_cast<double>(grid.sample_count());
   // One plane of covered samples suffices; none does not.
-  if (not_covered == grid.sample_count() && grid.cells[2] > 1) throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
-  if (!std::isfinite(plan.reference_range)) plan.reference_range = [&] {  // a one-row scan covers only the plane z = 0, between samples
-    const auto [low, high] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
-    return static_cast<double>(*high) - static_cast<double>(*low);
-  }();
+  if (not_covered == grid.sample_count() && grid.cells[2] > 1)
+    throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+  if (!std::isfinite(plan.reference_range))
+    plan.reference_range = [&] {  // a one-row scan covers only the plane z = 0, between samples
+      const auto [low, high] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
+      return static_cast<double>(*high) - static_cast<double>(*low);
+    }();
   set_epsilon(plan, tolerance);
   report(progress, "plan", 0.3);
 
@@ -218,30 +258,47 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.bounds = global_bounds(filtered, sups, grid);
   report(progress, "plan", 0.6);
 
-  // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at all.
+  // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
+  // all.
   const auto all = candidates(rates);
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
     // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
     const double step = filtered.geometry.pitch_u / r.upsampling;
-    if (r.u_filter == "linear" && &r != &all.back() && 2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs) continue;
+    if (r.u_filter == "linear" && &r != &all.back() &&
+        2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs)
+      continue;
     const Trial t = try_rates(state, filtered, upsampler, sups, plan.base, r, plan.epsilon_abs);
-    plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter, r.upsampling, t.projection, true});
-    plan.bounds.push_back({"gold", "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling), r.gold, t.gold, true});
+    plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter,
+                           r.upsampling, t.projection, true});
+    plan.bounds.push_back(
+        {"gold",
+         "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling),
+         r.gold, t.gold, true});
     if (!finest || t.slack < finest->second.slack) finest = {r, t};
     if (1.1 * t.slack + 4 * t.arithmetic <= share * plan.epsilon_abs) {
       chosen = {r, t};
       break;
     }
+    // A finer gold costs eight times as much: put up with a larger share before that.
+    const bool last_of_gold = &r == &all.back() || (&r + 1)->gold > r.gold;
+    if (last_of_gold &&
+        1.1 * finest->second.slack + 4 * finest->second.arithmetic <= patient_share * plan.epsilon_abs) {
+      chosen = finest;
+      break;
+    }
     report(progress, "plan", 0.7);
   }
-  if (!chosen && 1.2 * finest->second.slack + 6 * finest->second.arithmetic <= plan.epsilon_abs) chosen = finest;
+  if (!chosen && 1.2 * finest->second.slack + 6 * finest->second.arithmetic <= plan.epsilon_abs)
+    chosen = finest;
   if (!chosen) {
     const Trial& t = finest->second;
-    throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: at upsampling {} {}, gold {}, {} may err by {:.4g} and rounding by {:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
-                                     plan.epsilon_abs, finest->first.upsampling, finest->first.u_filter, finest->first.gold,
-                                     t.projection > t.gold ? "interpolating the projections" : "interpolating gold", t.slack, t.arithmetic,
-                                     1.2 * t.slack + 6 * t.arithmetic, 100 * (1.2 * t.slack + 6 * t.arithmetic) / plan.reference_range));
+    throw ToleranceError(fmt::format(
+        "epsilon {:.4g} is out of reach: at upsampling {} {}, gold {}, {} may err by {:.4g} and rounding by "
+        "{:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
+        plan.epsilon_abs, finest->first.upsampling, finest->first.u_filter, finest->first.gold,
+        t.projection > t.gold ? "interpolating the projections" : "interpolating gold", t.slack, t.arithmetic,
+        1.2 * t.slack + 6 * t.arithmetic, 100 * (1.2 * t.slack + 6 * t.arithmetic) / plan.reference_range));
   }
   const auto& [r, t] = *chosen;
   plan.upsampling_u = r.upsampling;
@@ -253,10 +310,12 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.budget.grid = {plan.epsilon_abs - t.slack - t.arithmetic, "what is left"};
   plan.gold_samples = static_cast<std::uint64_t>(t.gold_samples);
   // Two passes (classify, verify) over the covered part of the grid.
-  plan.seconds = 2 * t.gold_samples * (1 - plan.not_covered_fraction) * static_cast<double>(used.views()) * t.seconds_per_update;
+  plan.seconds = 2 * t.gold_samples * (1 - plan.not_covered_fraction) * static_cast<double>(used.views()) *
+                 t.seconds_per_update;
   plan.samples_ratio = t.samples_ratio;
   plan.memory_bytes = state.memory.peak();
-  if (r.upsampling != 8 || r.u_filter != "cubic") plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
+  if (r.upsampling != 8 || r.u_filter != "cubic")
+    plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
   report(progress, "plan", 1.0);
   return plan;
 }

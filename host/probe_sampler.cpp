@@ -152,7 +152,8 @@ double measure_constants(opencl::State& state, double delta) {
     for (const float v : tile) magnitude = std::max(magnitude, static_cast<double>(std::abs(v)));
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto [truth, difference] = trilinear(tile, points[i]);
-      const double beyond = (std::abs(static_cast<double>(values[i]) - truth) - delta * difference) / magnitude;
+      const double beyond =
+          (std::abs(static_cast<double>(values[i]) - truth) - delta * difference) / magnitude;
       if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
     }
   }

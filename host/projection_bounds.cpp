@@ -1,4 +1,5 @@
-// Launchers of the projection half of kernels/gold_bounds.cl, and the closed-form bounds (docs/error-bounds.md).
+// Launchers of the projection half of kernels/gold_bounds.cl, and the closed-form bounds
+// (docs/error-bounds.md).
 #include "host/projection_bounds.hpp"
 
 #include <algorithm>
@@ -19,7 +20,8 @@ constexpr double unit_roundoff = 0x1p-24;
 cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
 std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
-// How much a run-wise sum of n products errs, in units of u times the sum of magnitudes (kernels/batched_product.cl).
+// How much a run-wise sum of n products errs, in units of u times the sum of magnitudes
+// (kernels/batched_product.cl).
 double product_error(std::int64_t n) { return 34 + static_cast<double>(n) / 32; }
 
 // Views per chunk so that derivative slabs stay near 64 MiB.
@@ -30,45 +32,51 @@ std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
-// The worst error of linear interpolation of cos(k x) per cell phase kappa = k d: 1 - cos(kappa / 2) up to the grid's Nyquist
-// frequency; beyond it the wave aliases and only |f - Pf| <= 2 is left.
+// The worst error of linear interpolation of cos(k x) per cell phase kappa = k d: 1 - cos(kappa / 2) up to
+// the grid's Nyquist frequency; beyond it the wave aliases and only |f - Pf| <= 2 is left.
 double axis_error(double kappa) { return std::abs(kappa) <= pi ? 1 - std::cos(kappa / 2) : 2.0; }
 
 // The largest |d| of every view of a slab of derivatives.
 std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d) {
   RowSup row_sup(state, "gold_bounds", "row_sup");
   opencl::DeviceArray<float> sup(state, count(d.views * d.rows_padded), "row maxima");
-  row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(d.views), to_int(d.columns.count),
-          to_int(d.rows_padded));
+  row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(),
+          to_int(d.views), to_int(d.columns.count), to_int(d.rows_padded));
   const auto host = sup.to_host();
   std::vector<double> out(static_cast<std::size_t>(d.views));
   for (std::size_t k = 0; k < out.size(); ++k)
     for (std::int64_t z = 0; z < d.rows; ++z)
-      out[k] = std::max(out[k], static_cast<double>(host[k * static_cast<std::size_t>(d.rows_padded) + static_cast<std::size_t>(z)]));
+      out[k] = std::max(out[k],
+                        static_cast<double>(
+                            host[k * static_cast<std::size_t>(d.rows_padded) + static_cast<std::size_t>(z)]));
   return out;
 }
 
-// fp32 error of an upsampled derivative of one view: the samples' own error and two products, each relative to the matrices' gain.
-double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns, int order, double view_max) {
+// fp32 error of an upsampled derivative of one view: the samples' own error and two products, each relative
+// to the matrices' gain.
+double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+                           int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
-  return unit_roundoff * (product_error(g.columns) + product_error(g.rows) + 2) * upsampler.gain_u(columns, order) *
-         lebesgue_constant(g.rows) * view_max;
+  return unit_roundoff * (product_error(g.columns) + product_error(g.rows) + 2) *
+         upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max;
 }
 
 }  // namespace
 
 double lebesgue_constant(std::int64_t n) {
-  // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev Polynomials, section 1.4).
+  // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
+  // Polynomials, section 1.4).
   return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5;
 }
 
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
   const ParallelGeometry& g = scan.geometry;
   constexpr int dense = 4;
-  // A signal sampled L times denser than Nyquist rises above its samples by at most 1 / cos(pi / (2 L)), per axis (Ehlich and
-  // Zeller 1964). A single row does not vary along v.
+  // A signal sampled L times denser than Nyquist rises above its samples by at most 1 / cos(pi / (2 L)), per
+  // axis (Ehlich and Zeller 1964). A single row does not vary along v.
   const double rise = 1 / std::cos(pi / (2.0 * dense)), rise_v = g.rows > 1 ? rise : 1.0;
-  const UpsampledColumns columns = upsampled_columns(g.columns, dense, 0), own = upsampled_columns(g.columns, 1, 0);
+  const UpsampledColumns columns = upsampled_columns(g.columns, dense, 0),
+                         own = upsampled_columns(g.columns, 1, 0);
   std::vector<double> rows, own_rows;
   for (std::int64_t j = 0; j <= dense * g.rows; ++j) rows.push_back(-0.5 + static_cast<double>(j) / dense);
   for (std::int64_t j = 0; j < g.rows; ++j) own_rows.push_back(static_cast<double>(j));
@@ -95,7 +103,8 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
     sups.value += derivative_rounding(upsampler, scan, columns, 0, m);
     sups.second_u += derivative_rounding(upsampler, scan, columns, 2, m);
     // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
-    sups.second_v += g.rows > 1 ? derivative_rounding(upsampler, scan, columns, 0, m) * std::pow(pi / g.pitch_v, 2) : 0.0;
+    sups.second_v +=
+        g.rows > 1 ? derivative_rounding(upsampler, scan, columns, 0, m) * std::pow(pi / g.pitch_v, 2) : 0.0;
   }
   return sups;
 }
@@ -105,35 +114,42 @@ double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Gri
   const double h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;
   const double wu = std::pow(pi / g.pitch_u, 2), wv = g.rows > 1 ? std::pow(pi / g.pitch_v, 2) : 0.0;
   const double mixed = std::min(wv * sups.second_u, wu * sups.second_v);
-  // (1/8) sum_j h_j^2 [ h_j^2/12 sup|F_jjjj| + sum_i h_i^2/8 sup|F_jjii| ], the x and y parts together (docs, section 5).
+  // (1/8) sum_j h_j^2 [ h_j^2/12 sup|F_jjjj| + sum_i h_i^2/8 sup|F_jjii| ], the x and y parts together (docs,
+  // section 5).
   return 0.125 * (std::pow(h, 4) * (5.0 / 24) * wu * sups.second_u + 2 * h * h * hz * hz / 8 * mixed +
                   std::pow(hz, 4) * (5.0 / 24) * wv * sups.second_v);
 }
 
-double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups, const UpsampledColumns& columns,
-                        const ColumnBlocks& blocks, const std::string& u_filter) {
+double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
+                        const UpsampledColumns& columns, const ColumnBlocks& blocks,
+                        const std::string& u_filter) {
   const ParallelGeometry& g = scan.geometry;
-  // Row sums of the matrix are samples of a function of the position; between columns it rises by no more than this (Ehlich, Zeller).
-  const double gain_u = upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate)), gain_v = lebesgue_constant(g.rows);
+  // Row sums of the matrix are samples of a function of the position; between columns it rises by no more
+  // than this (Ehlich, Zeller).
+  const double gain_u = upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate)),
+               gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
   const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
   const double filtering = scan.ramp_error * gain_u * gain_v;
-  // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the result round).
-  const double upsampling =
-      unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples + (product_error(g.columns) + 2) * gain_u * sups.value);
+  // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
+  // result round).
+  const double upsampling = unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples +
+                                             (product_error(g.columns) + 2) * gain_u * sups.value);
   // One rounding per multiply-add from the view that a term enters at, and the weights' own.
   const double per_view = u_filter == "cubic" ? 4 : 2;
-  const double summation = unit_roundoff * (per_view * static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
-  // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's; that is bounded by Bernstein and by
-  // Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
+  const double summation =
+      unit_roundoff * (per_view * static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
+  // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's; that is bounded
+  // by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
   const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * 1.5 * slope;
   return weight_gain * (filtering + upsampling) + summation + position;
 }
 
-BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns, int upsampling,
-                       const std::string& u_filter, const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z) {
+BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                       const UpsampledColumns& columns, int upsampling, const std::string& u_filter,
+                       const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z) {
   const ParallelGeometry& g = scan.geometry;
   const bool cubic = u_filter == "cubic";
   const int order = cubic ? 4 : 2;
@@ -141,47 +157,60 @@ BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const Filtere
   BoundTable table;
   table.columns = columns;
   table.cells_z = cells_z;
-  // Linear: d^2/8 |q_uu|. Cubic on four points: (3/128) d^4 |q_uuuu|. Summation of the maxima in fp32 rounds up to K + 8 times.
-  table.factor = (cubic ? 3.0 / 128 * std::pow(step, 4) : step * step / 8) * (1 + (static_cast<double>(g.views()) + 8) * 0x1p-23);
+  // Linear: d^2/8 |q_uu|. Cubic on four points: (3/128) d^4 |q_uuuu|. Summation of the maxima in fp32 rounds
+  // up to K + 8 times.
+  table.factor = (cubic ? 3.0 / 128 * std::pow(step, 4) : step * step / 8) *
+                 (1 + (static_cast<double>(g.views()) + 8) * 0x1p-23);
   const std::int64_t entries = cells_z * g.views() * columns.count;
   opencl::DeviceArray<cl_float2> maxima(state, count(entries), "projection maxima");
 
   std::vector<float> rounding;
-  for (const double m : scan.view_max) rounding.push_back(static_cast<float>(derivative_rounding(upsampler, scan, columns, order, m) * (1 + 0x1p-20)));
-  const opencl::DeviceArray<float> device_rounding(state, std::span<const float>(rounding), "derivative rounding");
-  // Between columns a derivative rises by at most step^2/8 of its own second derivative, (pi / pitch)^2 of its row's sup, which
-  // its samples reach but for the factor 1 / cos(pi / (2 rate)).
+  for (const double m : scan.view_max)
+    rounding.push_back(
+        static_cast<float>(derivative_rounding(upsampler, scan, columns, order, m) * (1 + 0x1p-20)));
+  const opencl::DeviceArray<float> device_rounding(state, std::span<const float>(rounding),
+                                                   "derivative rounding");
+  // Between columns a derivative rises by at most step^2/8 of its own second derivative, (pi / pitch)^2 of
+  // its row's sup, which its samples reach but for the factor 1 / cos(pi / (2 rate)).
   const double remainder = std::pow(pi / columns.rate, 2) / 8 / std::cos(dense) * (1 + 0x1p-20);
   RowSup row_sup(state, "gold_bounds", "row_sup");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
       fill(state, "gold_bounds", "bound_table");
   const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
     const UpsampledSlab d = upsampler(columns, rows, order, 0, 0, first, n);
     opencl::DeviceArray<float> sup(state, count(n * d.rows_padded), "row maxima");
-    row_sup({{count(d.rows_padded), count(n), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(n), to_int(columns.count), to_int(d.rows_padded));
-    fill({{count(columns.count), count(n), count(cells_z)}, {64, 1, 1}}, maxima.buffer(), d.values.buffer(), sup.buffer(),
-         device_rounding.buffer(), to_int(first), to_int(n), to_int(g.views()), to_int(columns.count), to_int(d.rows_padded), to_int(d.rows),
-         rate, to_int(cells_z), cubic ? 1 : 0, cubic ? 2 : 1, static_cast<cl_float>(remainder));
+    row_sup({{count(d.rows_padded), count(n), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(n),
+            to_int(columns.count), to_int(d.rows_padded));
+    fill({{count(columns.count), count(n), count(cells_z)}, {64, 1, 1}}, maxima.buffer(), d.values.buffer(),
+         sup.buffer(), device_rounding.buffer(), to_int(first), to_int(n), to_int(g.views()),
+         to_int(columns.count), to_int(d.rows_padded), to_int(d.rows), rate, to_int(cells_z), cubic ? 1 : 0,
+         cubic ? 2 : 1, static_cast<cl_float>(remainder));
   }
 
   std::vector<cl_int> reach;
   for (const double theta : g.theta_rad) {
-    // Half a base cell's shadow, one gold step beyond it, one column for the floor of its centre and one for fp32.
-    const double half = (0.5 + 1.0 / rate) * (grid.spacing[0] * std::abs(std::cos(theta)) + grid.spacing[1] * std::abs(std::sin(theta)));
+    // Half a base cell's shadow, one gold step beyond it, one column for the floor of its centre and one for
+    // fp32.
+    const double half = (0.5 + 1.0 / rate) * (grid.spacing[0] * std::abs(std::cos(theta)) +
+                                              grid.spacing[1] * std::abs(std::sin(theta)));
     reach.push_back(static_cast<cl_int>(std::ceil(half * columns.rate / g.pitch_u)) + 1);
   }
   const opencl::DeviceArray<cl_int> device_reach(state, std::span<const cl_int>(reach), "cell shadows");
   table.values = opencl::DeviceArray<cl_float2>(state, count(entries), "projection bounds");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(state, "gold_bounds", "dilate_table");
-  dilate({{count(columns.count), count(cells_z * g.views()), 1}, {64, 1, 1}}, table.values.buffer(), maxima.buffer(), device_reach.buffer(),
-         to_int(g.views()), to_int(columns.count), to_int(cells_z * g.views()));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(state, "gold_bounds",
+                                                                                    "dilate_table");
+  dilate({{count(columns.count), count(cells_z * g.views()), 1}, {64, 1, 1}}, table.values.buffer(),
+         maxima.buffer(), device_reach.buffer(), to_int(g.views()), to_int(columns.count),
+         to_int(cells_z * g.views()));
   return table;
 }
 
-void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table, const ColumnBlocks& blocks, std::int64_t cells_x,
-                   std::int64_t cells_y, int rate, opencl::DeviceArray<float>& p) {
+void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table,
+                   const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int rate,
+                   opencl::DeviceArray<float>& p) {
   const ParallelGeometry& g = scan.geometry;
   const std::size_t views = static_cast<std::size_t>(g.views());
   const double scale = table.columns.rate / g.pitch_u;
@@ -194,11 +223,13 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
       steps[b * views + k] = {{static_cast<float>(cell_x * c * scale), static_cast<float>(cell_y * s * scale),
                                static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), 0.0f}};
     }
-  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "cell positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float> kernel(
-      state, "gold_bounds", "project_bound");
-  kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}}, p.buffer(), table.values.buffer(),
-         device_steps.buffer(), to_int(g.views()), to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
+  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps),
+                                                    "cell positions");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+      kernel(state, "gold_bounds", "project_bound");
+  kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}},
+         p.buffer(), table.values.buffer(), device_steps.buffer(), to_int(g.views()),
+         to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
          to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
 }
 
@@ -214,7 +245,8 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
     std::vector<double> a(at(U * V)), b(at(U * V));  // [m][v], then [m][l]
     for (std::int64_t m = 0; m < U; ++m)
       for (std::int64_t u = 0; u < U; ++u)
-        for (std::int64_t v = 0; v < V; ++v) a[at(m * V + v)] += du[at(m * U + u)] * static_cast<double>(q[u * V + v]);
+        for (std::int64_t v = 0; v < V; ++v)
+          a[at(m * V + v)] += du[at(m * U + u)] * static_cast<double>(q[u * V + v]);
     for (std::int64_t m = 0; m < U; ++m)
       for (std::int64_t l = 0; l < V; ++l)
         for (std::int64_t v = 0; v < V; ++v) b[at(m * V + l)] += dv[at(l * V + v)] * a[at(m * V + v)];
@@ -224,7 +256,8 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
       for (std::int64_t m = 0; m < U; ++m) {
         const double wu = pi * static_cast<double>(m) / static_cast<double>(U) / g.pitch_u;
         const double eu = 1 - std::cos(wu * g.pitch_u / rates[r] / 2);
-        const double plane = axis_error(wu * c * grid.spacing[0] / rates[r]) + axis_error(wu * s * grid.spacing[1] / rates[r]);
+        const double plane =
+            axis_error(wu * c * grid.spacing[0] / rates[r]) + axis_error(wu * s * grid.spacing[1] / rates[r]);
         for (std::int64_t l = 0; l < V; ++l) {
           const double wv = pi * static_cast<double>(l) / static_cast<double>(V) / g.pitch_v;
           const double magnitude = std::abs(b[at(m * V + l)]);

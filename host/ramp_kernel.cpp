@@ -1,4 +1,5 @@
-// Ramp kernels in double precision: closed form for Ram-Lak, Gauss-Legendre quadrature of the windowed ramp otherwise.
+// Ramp kernels in double precision: closed form for Ram-Lak, Gauss-Legendre quadrature of the windowed ramp
+// otherwise.
 #include "host/ramp_kernel.hpp"
 
 #include <fmt/format.h>
@@ -18,18 +19,23 @@ constexpr double pi = std::numbers::pi;
 // The window at a fraction r of the cutoff frequency, 0 <= r <= 1.
 std::function<double(double)> window(const std::string& filter) {
   if (filter == "ram-lak") return [](double) { return 1.0; };
-  if (filter == "shepp-logan") return [](double r) { return r == 0 ? 1.0 : std::sin(pi * r / 2) / (pi * r / 2); };
+  if (filter == "shepp-logan")
+    return [](double r) { return r == 0 ? 1.0 : std::sin(pi * r / 2) / (pi * r / 2); };
   if (filter == "cosine") return [](double r) { return std::cos(pi * r / 2); };
   if (filter == "hamming") return [](double r) { return 0.54 + 0.46 * std::cos(pi * r); };
   if (filter == "hann") return [](double r) { return 0.5 + 0.5 * std::cos(pi * r); };
-  throw InputError(fmt::format("--filter '{}' is unknown; choose ram-lak, shepp-logan, cosine, hamming or hann", filter));
+  throw InputError(
+      fmt::format("--filter '{}' is unknown; choose ram-lak, shepp-logan, cosine, hamming or hann", filter));
 }
 
 // Nodes and weights of the 8-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4).
-constexpr std::array<double, 4> gauss_node{0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
-constexpr std::array<double, 4> gauss_weight{0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
+constexpr std::array<double, 4> gauss_node{0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
+                                           0.9602898564975363};
+constexpr std::array<double, 4> gauss_weight{0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
+                                             0.1012285362903763};
 
-// (1 / (2 pi^2)) integral over [0, cutoff pi] of w W(w / (cutoff pi)) cos(n w) dw, panels shorter than half an oscillation.
+// (1 / (2 pi^2)) integral over [0, cutoff pi] of w W(w / (cutoff pi)) cos(n w) dw, panels shorter than half
+// an oscillation.
 double windowed(std::int64_t n, double cutoff, const std::function<double(double)>& w) {
   const double end = cutoff * pi;
   const auto panels = static_cast<std::int64_t>(std::ceil(static_cast<double>(n) * cutoff)) + 4;

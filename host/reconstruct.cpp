@@ -1,4 +1,5 @@
-// Uniform FBP in slabs of rows and blocks of columns. Called by the command line and by plan.cpp (the 1x base volume).
+// Uniform FBP in slabs of rows and blocks of columns. Called by the command line and by plan.cpp (the 1x base
+// volume).
 #include "vdvr/reconstruct.hpp"
 
 #include <fmt/format.h>
@@ -37,7 +38,8 @@ class StageWatch {
 
 }  // namespace
 
-std::vector<double> detector_rows(const ParallelGeometry& g, double first_z, double step, std::int64_t count) {
+std::vector<double> detector_rows(const ParallelGeometry& g, double first_z, double step,
+                                  std::int64_t count) {
   std::vector<double> rows(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] = (first_z + static_cast<double>(i) * step) / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1);
@@ -54,8 +56,9 @@ UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int up
   return upsampled_columns(g.columns, upsampling, (kept_margin(grid, 1) + grid.spacing[0]) / g.pitch_u);
 }
 
-Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler, const Grid& grid, int upsampling,
-                         const std::string& u_filter, const Progress& progress, StageSeconds* seconds) {
+Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
+                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Progress& progress, StageSeconds* seconds) {
   StageWatch watch(seconds);
   const ParallelGeometry& g = filtered.geometry;
   const Coverage coverage(g);
@@ -67,10 +70,13 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   std::int64_t rows = std::min<std::int64_t>(n[2], 256);
   while (rows > 16 && upsampler.slab_bytes(columns, rows) > budget) rows = (rows + 1) / 2;
   if (upsampler.slab_bytes(columns, rows) > std::min(budget, state.info.max_allocation)) {
-    throw ResourceError(fmt::format("{} views of {} upsampled columns need {} MiB per slab of {} rows; raise --max-memory or lower --upsampling",
-                                    g.views(), columns.count, upsampler.slab_bytes(columns, rows) >> 20, rows));
+    throw ResourceError(
+        fmt::format("{} views of {} upsampled columns need {} MiB per slab of {} rows; raise --max-memory or "
+                    "lower --upsampling",
+                    g.views(), columns.count, upsampler.slab_bytes(columns, rows) >> 20, rows));
   }
-  const std::int64_t wanted = static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
+  const std::int64_t wanted =
+      static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
   Volume volume{grid, std::vector<float>(static_cast<std::size_t>(grid.sample_count()))};
@@ -84,15 +90,23 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   std::vector<float> columns_host;
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
     const std::int64_t nz = std::min(rows, n[2] - z0);
-    const auto positions = detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz);
+    const auto positions =
+        detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz);
     const UpsampledSlab slab = upsampler(columns, positions);
     watch.lap(state, "upsample");
-    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * column_stride(nz)), "reconstructed columns");
+    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * column_stride(nz)),
+                                   "reconstructed columns");
     columns_host.resize(out.size());
     for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
-      report(progress, "reconstruct", (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) / static_cast<double>(n[2]));
-      ColumnBlocks blocks{n[0], std::min(band, n[1] - y0), grid.spacing[0], grid.spacing[1],
-                          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}}, {}};
+      report(progress, "reconstruct",
+             (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) /
+                 static_cast<double>(n[2]));
+      ColumnBlocks blocks{n[0],
+                          std::min(band, n[1] - y0),
+                          grid.spacing[0],
+                          grid.spacing[1],
+                          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}},
+                          {}};
       back_project(state, g, slab, blocks, u_filter, out);
       watch.lap(state, "back-project");
       out.read(columns_host);
@@ -104,7 +118,8 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
         for (std::int64_t first = 0; first < nz; first += 16)
           for (std::int64_t x = 0; x < n[0]; ++x)
             for (std::int64_t z = first; keep[x] && z < std::min(first + 16, nz); ++z)
-              volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] = row[x * stride + z];
+              volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] =
+                  row[x * stride + z];
       });
       watch.lap(state, "read back");
     }
@@ -112,17 +127,19 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   return volume;
 }
 
-Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid, const ReconstructOptions& options, const Progress& progress,
-                   StageSeconds* seconds) {
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
+                   const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
   StageWatch watch(seconds);
-  if (options.upsampling < 1 || options.upsampling > 64 || (options.upsampling & (options.upsampling - 1)) != 0)
+  if (options.upsampling < 1 || options.upsampling > 64 ||
+      (options.upsampling & (options.upsampling - 1)) != 0)
     throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
   if (options.u_filter != "linear" && options.u_filter != "cubic")
     throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
   const FilteredScan filtered = filter_projections(device.state(), scan, options.field, progress);
   watch.lap(device.state(), "filter");
   Upsampler upsampler(device.state(), filtered);
-  return reconstruct_field(device.state(), filtered, upsampler, grid, options.upsampling, options.u_filter, progress, seconds);
+  return reconstruct_field(device.state(), filtered, upsampler, grid, options.upsampling, options.u_filter,
+                           progress, seconds);
 }
 
 }  // namespace vdvr

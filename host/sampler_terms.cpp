@@ -24,12 +24,14 @@ FieldSlopes field_slopes(const MixedVolume& v) {
       const VdvrBrick r = brick_record(v, offsets, bx, by, bz);
       const LevelTriple level = v.level[static_cast<std::size_t>((bz * bricks[1] + by) * bricks[0] + bx)];
       const bool base = level == LevelTriple{0, 0, 0};
-      const float* s = base ? v.base.data() + r.offset : v.tiles.at(level).data() + (r.offset - offsets.at(level));
+      const float* s =
+          base ? v.base.data() + r.offset : v.tiles.at(level).data() + (r.offset - offsets.at(level));
       const std::array<std::uint32_t, 3> levels{r.level_x, r.level_y, r.level_z};
       const std::array<std::int64_t, 3> stride{1, r.stride_y, r.stride_z}, brick{bx, by, bz};
       std::array<std::int64_t, 3> end{};
       for (std::size_t a = 0; a < 3; ++a)
-        end[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity) << levels[a];
+        end[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity)
+                 << levels[a];
       std::array<float, 3> largest{0, 0, 0};
       float magnitude = 0;
       for (std::int64_t z = 0; z <= end[2]; ++z)
@@ -45,7 +47,8 @@ FieldSlopes field_slopes(const MixedVolume& v) {
       local.magnitude = std::max(local.magnitude, static_cast<double>(magnitude));
       for (std::size_t a = 0; a < 3; ++a) {
         local.per_sample[a] = std::max(local.per_sample[a], static_cast<double>(largest[a]));
-        local.per_cell[a] = std::max(local.per_cell[a], static_cast<double>(largest[a]) * std::exp2(levels[a]));
+        local.per_cell[a] =
+            std::max(local.per_cell[a], static_cast<double>(largest[a]) * std::exp2(levels[a]));
       }
     }
     const std::lock_guard guard(lock);
@@ -58,13 +61,16 @@ FieldSlopes field_slopes(const MixedVolume& v) {
   return out;
 }
 
-SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe, std::int64_t atlas_length) {
+SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
+                           std::int64_t atlas_length) {
   constexpr double u = 0x1p-24;
   SamplerTerms terms;
-  // Seven lerps of two rounded products and one rounded sum each, on three levels: 14 u of the largest sample covers them. A cell
-  // coordinate rounds by at most 2 u of its size, and a wrong position costs its share of the slope per cell.
+  // Seven lerps of two rounded products and one rounded sum each, on three levels: 14 u of the largest sample
+  // covers them. A cell coordinate rounds by at most 2 u of its size, and a wrong position costs its share of
+  // the slope per cell.
   double buffer = 14 * u * slopes.magnitude;
-  for (std::size_t a = 0; a < 3; ++a) buffer += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
+  for (std::size_t a = 0; a < 3; ++a)
+    buffer += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
   terms.buffer = {buffer, "rounding: 14 u of the largest sample, 2 n u of the largest slope per cell"};
   if (probe.image3d) {
     double image = probe.constant_error * slopes.magnitude;
@@ -73,13 +79,16 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
       image += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
     }
     image += 14 * u * slopes.magnitude;
-    terms.image3d = ErrorTerm{image, fmt::format("device probe: weights err by {:.3g}, products by {:.3g} of the sample", probe.delta, probe.constant_error)};
+    terms.image3d =
+        ErrorTerm{image, fmt::format("device probe: weights err by {:.3g}, products by {:.3g} of the sample",
+                                     probe.delta, probe.constant_error)};
   }
   return terms;
 }
 
 std::int64_t longest_atlas(const DeviceInfo& device) {
-  return static_cast<std::int64_t>(std::max({device.image3d_max[0], device.image3d_max[1], device.image3d_max[2]}));
+  return static_cast<std::int64_t>(
+      std::max({device.image3d_max[0], device.image3d_max[1], device.image3d_max[2]}));
 }
 
 }  // namespace vdvr

@@ -10,7 +10,8 @@
 
 namespace vdvr {
 
-/// Largest neighbour differences of the stored samples per axis x, y, z: inside any brick at its own spacing, and per base cell.
+/// Largest neighbour differences of the stored samples per axis x, y, z: inside any brick at its own spacing,
+/// and per base cell.
 struct FieldSlopes {
   std::array<double, 3> per_sample{0, 0, 0};
   std::array<double, 3> per_cell{0, 0, 0};
@@ -19,9 +20,10 @@ struct FieldSlopes {
 /// Cost: one pass over all samples that a brick can interpolate, over all cores.
 FieldSlopes field_slopes(const MixedVolume& volume);
 
-/// buffer: fp32 rounding of the coordinate and of seven interpolations. image3d: the texture unit's weights and products, as
-/// probed; absent where the device has no such sampler.
-SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe, std::int64_t atlas_length);
+/// buffer: fp32 rounding of the coordinate and of seven interpolations. image3d: the texture unit's weights
+/// and products, as probed; absent where the device has no such sampler.
+SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
+                           std::int64_t atlas_length);
 
 /// The longest side of the image atlas that a volume may be packed into.
 std::int64_t longest_atlas(const DeviceInfo& device);

@@ -44,7 +44,8 @@ ViewWeights view_weights(const std::vector<double>& theta_rad) {
   std::transform(theta_rad.begin(), theta_rad.end(), angle.begin(), folded);
   std::vector<std::size_t> order(n);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return angle[a] < angle[b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return angle[a] < angle[b]; });
   std::vector<double> sorted(n);
   for (std::size_t i = 0; i < n; ++i) sorted[i] = angle[order[i]];
 

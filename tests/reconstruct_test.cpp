@@ -31,7 +31,8 @@ double worst_error(const ProjectionSet& scan, const Grid& grid, const Reconstruc
         const Vec3 p = grid.position({x, y, z});
         if (!exact.covered(p)) continue;
         points.push_back(p);
-        computed.push_back(static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]));
+        computed.push_back(
+            static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]));
       }
   const auto truth = exact.at(points);
   double worst = 0;
@@ -65,7 +66,8 @@ BOOST_AUTO_TEST_CASE(cubic_at_high_rate_reaches_the_exact_field) {
 BOOST_AUTO_TEST_CASE(linear_error_falls_by_four_per_doubling) {
   const ProjectionSet scan = noise_scan(19, 5, 33);
   const Grid grid = make_grid(scan.geometry, {});
-  const double at8 = worst_error(scan, grid, {{}, 8, "linear"}), at16 = worst_error(scan, grid, {{}, 16, "linear"});
+  const double at8 = worst_error(scan, grid, {{}, 8, "linear"}),
+               at16 = worst_error(scan, grid, {{}, 16, "linear"});
   BOOST_TEST(at16 < at8 / 3);
   BOOST_TEST(at16 > at8 / 5);
 }
@@ -122,7 +124,8 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_the_same_volume) {
   Device large, small("", std::uint64_t{24} << 20);
   const Volume a = reconstruct(large, scan, grid, {}), b = reconstruct(small, scan, grid, {});
   double worst = 0;
-  for (std::size_t i = 0; i < a.samples.size(); ++i) worst = std::max(worst, std::abs(static_cast<double>(a.samples[i]) - static_cast<double>(b.samples[i])));
+  for (std::size_t i = 0; i < a.samples.size(); ++i)
+    worst = std::max(worst, std::abs(static_cast<double>(a.samples[i]) - static_cast<double>(b.samples[i])));
   BOOST_TEST(worst <= tolerance::fp32_sum(200, field_scale(scan, {})));
   BOOST_TEST(small.peak_memory() <= (std::uint64_t{24} << 20));
 }
@@ -147,7 +150,8 @@ BOOST_AUTO_TEST_CASE(sphere_keeps_its_density_inside_and_nothing_outside_at_any_
         for (std::int64_t x = 0; x < n[0]; ++x) {
           const Vec3 p = grid.position({x, y, z});
           const double radius = std::hypot(p[0], p[1], p[2]) / pitch;
-          const double value = static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]);
+          const double value =
+              static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]);
           if (radius <= 16) {
             inside += value;
             ++inside_count;

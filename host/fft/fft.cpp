@@ -17,10 +17,11 @@
 namespace vdvr::fft {
 namespace {
 
-void check(clfftStatus status, const char* call, std::int64_t length, std::int64_t batch, const opencl::State& state) {
+void check(clfftStatus status, const char* call, std::int64_t length, std::int64_t batch,
+           const opencl::State& state) {
   if (status != CLFFT_SUCCESS) {
-    throw DeviceError(fmt::format("{} for {} rows of length {} on '{}': {}", call, batch, length, state.info.name,
-                                  opencl::code_name(static_cast<int>(status))));
+    throw DeviceError(fmt::format("{} for {} rows of length {} on '{}': {}", call, batch, length,
+                                  state.info.name, opencl::code_name(static_cast<int>(status))));
   }
 }
 
@@ -76,13 +77,13 @@ Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bo
   return plans.emplace(key, std::move(plan)).first->second;
 }
 
-void transform(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward, const cl::Buffer& in,
-               const cl::Buffer& out) {
+void transform(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward,
+               const cl::Buffer& in, const cl::Buffer& out) {
   const std::lock_guard guard(bake_lock());
   const Plan& plan = plan_for(state, length, batch, forward);
   cl_mem source = in(), target = out();
-  check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0, nullptr, nullptr,
-                              &source, &target, plan.scratch()),
+  check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0,
+                              nullptr, nullptr, &source, &target, plan.scratch()),
         "clfftEnqueueTransform", length, batch, state);
 }
 
@@ -98,11 +99,13 @@ std::int64_t good_length(std::int64_t n) {
   return best;
 }
 
-void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in, const cl::Buffer& out) {
+void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
+                  const cl::Buffer& out) {
   transform(state, length, batch, true, in, out);
 }
 
-void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in, const cl::Buffer& out) {
+void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
+                  const cl::Buffer& out) {
   transform(state, length, batch, false, in, out);
 }
 

@@ -1,5 +1,6 @@
 // The only includer of clFFT is fft.cpp: library lifetime, a plan cache, good lengths, errors with sizes.
-// clfftBakePlan is not thread-safe and takes 1 to 3 s cold on a CPU; plans are baked under a lock and kept per device.
+// clfftBakePlan is not thread-safe and takes 1 to 3 s cold on a CPU; plans are baked under a lock and kept
+// per device.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +12,13 @@ namespace vdvr::fft {
 /// The smallest length >= n that clFFT takes and runs fast: 2^a, 3 * 2^a or 5 * 2^a.
 std::int64_t good_length(std::int64_t n);
 
-/// Real to Hermitian along contiguous rows: float in[batch][length] -> float2 out[batch][length/2 + 1]. Enqueues only.
-void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in, const cl::Buffer& out);
+/// Real to Hermitian along contiguous rows: float in[batch][length] -> float2 out[batch][length/2 + 1].
+/// Enqueues only.
+void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
+                  const cl::Buffer& out);
 
 /// Hermitian to real, scaled by 1/length. `in` may be overwritten. Enqueues only.
-void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in, const cl::Buffer& out);
+void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
+                  const cl::Buffer& out);
 
 }  // namespace vdvr::fft

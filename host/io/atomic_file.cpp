@@ -55,7 +55,8 @@ void AtomicFile::commit() {
   sync_path(temporary_, O_RDONLY);
   std::error_code error;
   std::filesystem::rename(temporary_, target_, error);
-  if (error) throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
+  if (error)
+    throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
   committed_ = true;
   sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
 }

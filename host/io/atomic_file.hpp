@@ -1,4 +1,5 @@
-// An output file that appears only whole: written under a temporary name in the same folder, flushed, renamed.
+// An output file that appears only whole: written under a temporary name in the same folder, flushed,
+// renamed.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// A typed device buffer, counted against the memory account. Reads wait; writes and fills do not (in-order queue),
-// except that a write copies the host data before it returns.
+// A typed device buffer, counted against the memory account. Reads wait; writes and fills do not (in-order
+// queue), except that a write copies the host data before it returns.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,8 +19,10 @@ class DeviceArray {
  public:
   DeviceArray() = default;
   /// Throws ResourceError or DeviceError before anything is allocated when it cannot fit.
-  DeviceArray(State& state, std::uint64_t count, const std::string& what) : state_(&state), count_(count), what_(what) {
-    if (count > UINT64_MAX / sizeof(T)) throw ResourceError(fmt::format("{}: {} elements pass 2^64 bytes", what, count));
+  DeviceArray(State& state, std::uint64_t count, const std::string& what)
+      : state_(&state), count_(count), what_(what) {
+    if (count > UINT64_MAX / sizeof(T))
+      throw ResourceError(fmt::format("{}: {} elements pass 2^64 bytes", what, count));
     try {
       buffer_ = state.allocate(size_bytes(), what);
     } catch (...) {
@@ -28,14 +30,17 @@ class DeviceArray {
       throw;
     }
   }
-  DeviceArray(State& state, std::span<const T> values, const std::string& what) : DeviceArray(state, values.size(), what) {
+  DeviceArray(State& state, std::span<const T> values, const std::string& what)
+      : DeviceArray(state, values.size(), what) {
     write(values);
   }
   ~DeviceArray() {
     if (state_) state_->release(size_bytes(), std::move(buffer_));
   }
   DeviceArray(DeviceArray&& o) noexcept
-      : state_(std::exchange(o.state_, nullptr)), count_(std::exchange(o.count_, 0)), what_(std::move(o.what_)),
+      : state_(std::exchange(o.state_, nullptr)),
+        count_(std::exchange(o.count_, 0)),
+        what_(std::move(o.what_)),
         buffer_(std::move(o.buffer_)) {}
   DeviceArray& operator=(DeviceArray&& o) noexcept {
     if (this != &o) {
@@ -57,14 +62,16 @@ class DeviceArray {
     if (values.empty()) return;
     check(first, values.size());
     guard("write", [&] {
-      state_->queue.enqueueWriteBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(), values.data());
+      state_->queue.enqueueWriteBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
+                                       values.data());
     });
   }
   void read(std::span<T> values, std::uint64_t first = 0) const {
     if (values.empty()) return;
     check(first, values.size());
     guard("read", [&] {
-      state_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(), values.data());
+      state_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
+                                      values.data());
     });
   }
   [[nodiscard]] std::vector<T> to_host() const {
@@ -88,7 +95,8 @@ class DeviceArray {
     try {
       f();
     } catch (const cl::Error& e) {
-      throw DeviceError(fmt::format("{} of {} ({} elements) on '{}': {}", call, what_, count_, state_->info.name, code_name(e.err())));
+      throw DeviceError(fmt::format("{} of {} ({} elements) on '{}': {}", call, what_, count_,
+                                    state_->info.name, code_name(e.err())));
     }
   }
 

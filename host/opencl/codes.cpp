@@ -5,7 +5,8 @@ namespace vdvr::opencl {
 
 std::string code_name(int code) {
 #define VDVR_CODE(name) \
-  case name: return #name " (" + std::to_string(code) + ")"
+  case name:            \
+    return #name " (" + std::to_string(code) + ")"
   switch (code) {
     VDVR_CODE(CL_SUCCESS);
     VDVR_CODE(CL_DEVICE_NOT_FOUND);
@@ -43,8 +44,10 @@ std::string code_name(int code) {
     VDVR_CODE(CL_INVALID_OPERATION);
     VDVR_CODE(CL_INVALID_BUFFER_SIZE);
     VDVR_CODE(CL_INVALID_GLOBAL_WORK_SIZE);
-    case -1001: return "CL_PLATFORM_NOT_FOUND_KHR (-1001)";
-    default: return "OpenCL code " + std::to_string(code);
+    case -1001:
+      return "CL_PLATFORM_NOT_FOUND_KHR (-1001)";
+    default:
+      return "OpenCL code " + std::to_string(code);
   }
 #undef VDVR_CODE
 }

@@ -14,10 +14,11 @@ namespace opencl {
 
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
-    throw ResourceError(fmt::format(
-        "{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or choose a smaller --size", what,
-        static_cast<double>(bytes) / (1 << 20), static_cast<double>(left()) / (1 << 20),
-        static_cast<double>(limit_) / (1 << 20)));
+    throw ResourceError(
+        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or "
+                    "choose a smaller --size",
+                    what, static_cast<double>(bytes) / (1 << 20), static_cast<double>(left()) / (1 << 20),
+                    static_cast<double>(limit_) / (1 << 20)));
   }
   used_ += bytes;
   peak_ = std::max(peak_, used_ + kept);
@@ -47,8 +48,9 @@ void BufferPool::clear() {
 
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
-    throw ResourceError(fmt::format("{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device", what, bytes,
-                                    info.name, info.max_allocation));
+    throw ResourceError(fmt::format(
+        "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device", what,
+        bytes, info.name, info.max_allocation));
   }
   cl::Buffer buffer = pool.take(bytes);
   // What the pool keeps is in use as well: it goes first when room is short.
@@ -59,7 +61,8 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
     return cl::Buffer(context, CL_MEM_READ_WRITE, bytes);
   } catch (const cl::Error& e) {
     memory.give(bytes);
-    throw ResourceError(fmt::format("{}: '{}' refused {} bytes: {}", what, info.name, bytes, code_name(e.err())));
+    throw ResourceError(
+        fmt::format("{}: '{}' refused {} bytes: {}", what, info.name, bytes, code_name(e.err())));
   }
 }
 
@@ -141,14 +144,16 @@ Found enumerate() {
 }
 
 std::string lower(std::string s) {
-  std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(s.begin(), s.end(), s.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return s;
 }
 
 bool matches(const DeviceInfo& d, const std::string& selector) {
   if (selector == "cpu") return d.is_cpu;
   if (selector == "gpu") return d.is_gpu;
-  if (!selector.empty() && std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c); }))
+  if (!selector.empty() &&
+      std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c); }))
     return selector == std::to_string(d.index);
   return lower(d.name).find(lower(selector)) != std::string::npos ||
          lower(d.platform).find(lower(selector)) != std::string::npos;
@@ -162,7 +167,8 @@ std::vector<DeviceInfo> Device::list() {
   return infos;
 }
 
-Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) : state_(std::make_unique<opencl::State>()) {
+Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
+    : state_(std::make_unique<opencl::State>()) {
   const Found found = enumerate();
   if (found.empty()) {
     throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
@@ -172,11 +178,13 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) : st
     chosen = std::find_if(found.begin(), found.end(), [](const auto& f) { return f.second.is_gpu; });
     if (chosen == found.end()) chosen = found.begin();
   } else {
-    chosen = std::find_if(found.begin(), found.end(), [&](const auto& f) { return matches(f.second, selector); });
+    chosen =
+        std::find_if(found.begin(), found.end(), [&](const auto& f) { return matches(f.second, selector); });
   }
   if (chosen == found.end()) {
     std::string names;
-    for (const auto& [device, info] : found) names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
+    for (const auto& [device, info] : found)
+      names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
     throw DeviceError(fmt::format("no device matches --device '{}'; there are:{}", selector, names));
   }
   try {
@@ -185,7 +193,8 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) : st
     state_->context = cl::Context(state_->device);
     state_->queue = cl::CommandQueue(state_->context, state_->device);
   } catch (const cl::Error& e) {
-    throw DeviceError(fmt::format("cannot open '{}': {} {}", chosen->second.name, e.what(), opencl::code_name(e.err())));
+    throw DeviceError(
+        fmt::format("cannot open '{}': {} {}", chosen->second.name, e.what(), opencl::code_name(e.err())));
   }
   const std::uint64_t device_memory = state_->info.global_memory;
   state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));

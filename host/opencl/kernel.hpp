@@ -1,5 +1,5 @@
-// Typed kernel launches: argument order and types are checked by the C++ compiler against the functor's list, sizes
-// against the device before launch, and a failing call is reported with kernel, ranges and code.
+// Typed kernel launches: argument order and types are checked by the C++ compiler against the functor's list,
+// sizes against the device before launch, and a failing call is reported with kernel, ranges and code.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 
 namespace vdvr::opencl {
 
-/// Global and local work sizes; `global` is rounded up to a multiple of `local` here and nowhere else, so every kernel
-/// guards its range by arguments.
+/// Global and local work sizes; `global` is rounded up to a multiple of `local` here and nowhere else, so
+/// every kernel guards its range by arguments.
 struct Range {
   std::array<std::uint64_t, 3> global{1, 1, 1};
   std::array<std::uint64_t, 3> local{1, 1, 1};
@@ -23,16 +23,19 @@ struct Range {
 template <class... Args>
 class Kernel {
  public:
-  Kernel(State& state, const std::string& program_name, const std::string& kernel_name, const Defines& defines = {})
+  Kernel(State& state, const std::string& program_name, const std::string& kernel_name,
+         const Defines& defines = {})
       : state_(&state), name_(kernel_name) {
     const cl::Program& p = program(state, program_name, defines);
     try {
       kernel_ = cl::Kernel(p, kernel_name.c_str());
       max_group_ = kernel_.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(state.device);
       if (const auto n = kernel_.getInfo<CL_KERNEL_NUM_ARGS>(); n != sizeof...(Args))
-        throw DeviceError(fmt::format("kernel {} takes {} arguments, its launcher passes {}", kernel_name, n, sizeof...(Args)));
+        throw DeviceError(fmt::format("kernel {} takes {} arguments, its launcher passes {}", kernel_name, n,
+                                      sizeof...(Args)));
     } catch (const cl::Error& e) {
-      throw DeviceError(fmt::format("kernel {} of program {}: {} {}", kernel_name, program_name, e.what(), code_name(e.err())));
+      throw DeviceError(fmt::format("kernel {} of program {}: {} {}", kernel_name, program_name, e.what(),
+                                    code_name(e.err())));
     }
   }
 
@@ -52,8 +55,9 @@ class Kernel {
       state_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(g(0), g(1), g(2)),
                                          cl::NDRange(local[0], local[1], local[2]));
     } catch (const cl::Error& e) {
-      throw DeviceError(fmt::format("kernel {} on '{}', global {}x{}x{}, local {}x{}x{}: {} {}", name_, state_->info.name, g(0),
-                                    g(1), g(2), local[0], local[1], local[2], e.what(), code_name(e.err())));
+      throw DeviceError(fmt::format("kernel {} on '{}', global {}x{}x{}, local {}x{}x{}: {} {}", name_,
+                                    state_->info.name, g(0), g(1), g(2), local[0], local[1], local[2],
+                                    e.what(), code_name(e.err())));
     }
   }
 

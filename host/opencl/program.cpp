@@ -1,6 +1,7 @@
 // Builds embedded kernel programs, once per set of defines.
 //
-// Flags: -cl-std=CL1.2 only. No relaxed arithmetic: what a certificate covers must round as the bound assumes.
+// Flags: -cl-std=CL1.2 only. No relaxed arithmetic: what a certificate covers must round as the bound
+// assumes.
 #include <fmt/format.h>
 
 #include <set>
@@ -57,8 +58,8 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
     } catch (const cl::Error&) {
       log = "(no log)";
     }
-    throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}", name,
-                                 state.info.name, options, e.what(), code_name(e.err()), log));
+    throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
+                                 name, state.info.name, options, e.what(), code_name(e.err()), log));
   }
   return state.programs.emplace(cache_key, std::move(built)).first->second;
 }

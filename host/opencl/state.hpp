@@ -28,7 +28,8 @@ class MemoryAccount {
   std::uint64_t limit_ = 0, used_ = 0, peak_ = 0;
 };
 
-/// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that fill them.
+/// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that
+/// fill them.
 class BufferPool {
  public:
   /// A kept buffer of exactly this size, or an empty one.
@@ -51,7 +52,8 @@ struct State {
   MemoryAccount memory;
   BufferPool pool;
 
-  /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is allocated.
+  /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is
+  /// allocated.
   cl::Buffer allocate(std::uint64_t bytes, const std::string& what);
   void release(std::uint64_t bytes, cl::Buffer buffer) noexcept;
 };
@@ -59,11 +61,13 @@ struct State {
 /// "CL_OUT_OF_RESOURCES (-5)".
 std::string code_name(int code);
 
-/// A define passed to the kernel compiler: meaning (no default in the kernel) or tuning (default in the kernel).
+/// A define passed to the kernel compiler: meaning (no default in the kernel) or tuning (default in the
+/// kernel).
 using Defines = std::vector<std::pair<std::string, std::string>>;
 
-/// Builds kernels/<name>.cl for the state's device, or returns the cached program. `#include "shared/x.h"` is resolved
-/// from the embedded sources with #line directives. Throws BuildError with device, options and the compiler's log.
+/// Builds kernels/<name>.cl for the state's device, or returns the cached program. `#include "shared/x.h"` is
+/// resolved from the embedded sources with #line directives. Throws BuildError with device, options and the
+/// compiler's log.
 const cl::Program& program(State& state, const std::string& name, const Defines& defines = {});
 
 /// Full source text after resolving includes; what the compiler sees.

@@ -1,4 +1,5 @@
-// The certified volume from a scan: gold stream, classification, closing, packing, verification on the packed field.
+// The certified volume from a scan: gold stream, classification, closing, packing, verification on the packed
+// field.
 #pragma once
 
 #include <array>
@@ -13,8 +14,8 @@ namespace vdvr {
 
 struct BuildOptions {
   int granularity = 4;
-  std::optional<std::array<double, 6>> roi;             ///< x0,y0,z0,x1,y1,z1: certify and count only bricks inside
-  std::optional<std::pair<double, double>> window;      ///< test only gold cells whose range meets [lo, hi]
+  std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify and count only bricks inside
+  std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
 };
 
 struct BuildResult {

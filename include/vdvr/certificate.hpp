@@ -1,4 +1,5 @@
-// What is promised about a volume, and by which argument. An error is a value with its method, never a loose float.
+// What is promised about a volume, and by which argument. An error is a value with its method, never a loose
+// float.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +19,9 @@ struct ErrorTerm {
 
 /// The field options that define F (docs/geometry.md); stored in the certificate, taken from it by `verify`.
 struct FieldOptions {
-  std::string filter = "ram-lak";   ///< ram-lak | shepp-logan | cosine | hamming | hann
-  double cutoff = 1.0;              ///< fraction of the detector's Nyquist frequency
-  std::optional<double> center;     ///< overrides the scan's
+  std::string filter = "ram-lak";  ///< ram-lak | shepp-logan | cosine | hamming | hann
+  double cutoff = 1.0;             ///< fraction of the detector's Nyquist frequency
+  std::optional<double> center;    ///< overrides the scan's
 };
 
 struct SamplerTerms {

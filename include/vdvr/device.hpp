@@ -16,7 +16,7 @@ struct DeviceInfo {
   int index = 0;  ///< what `--device INDEX` takes
   std::string platform, name, vendor, version, driver;
   bool is_gpu = false, is_cpu = false;
-  bool images = false;            ///< 3D images at all
+  bool images = false;              ///< 3D images at all
   bool linear_float_image = false;  ///< CL_R / CL_FLOAT 3D image readable with the linear filter
   std::uint64_t global_memory = 0, max_allocation = 0, local_memory = 0;
   std::uint32_t compute_units = 0, max_work_group = 0;
@@ -29,9 +29,9 @@ class Device {
   /// All devices of all platforms, in a stable order. Empty where no OpenCL platform is installed.
   static std::vector<DeviceInfo> list();
 
-  /// `selector`: "" (a GPU if there is one, else the first device), "cpu", "gpu", an index of list(), or part of a name.
-  /// `max_memory_bytes` limits our host and device allocations together; 0: no limit but the device's.
-  /// Throws DeviceError when nothing matches, listing what exists.
+  /// `selector`: "" (a GPU if there is one, else the first device), "cpu", "gpu", an index of list(), or part
+  /// of a name. `max_memory_bytes` limits our host and device allocations together; 0: no limit but the
+  /// device's. Throws DeviceError when nothing matches, listing what exists.
   explicit Device(const std::string& selector = "", std::uint64_t max_memory_bytes = 0);
   ~Device();
   Device(Device&&) noexcept;

@@ -1,5 +1,5 @@
-// Exceptions of the library. Each carries the exit code a command line should end with; stages add one line of
-// context on the way up with `add_context`. Library code never prints and never exits.
+// Exceptions of the library. Each carries the exit code a command line should end with; stages add one line
+// of context on the way up with `add_context`. Library code never prints and never exits.
 #pragma once
 
 #include <stdexcept>
@@ -25,7 +25,8 @@ class Error : public std::exception {
 struct InputError : Error {
   explicit InputError(std::string message) : Error(2, std::move(message)) {}
 };
-/// A file that is missing, truncated, of the wrong type, or fails a checksum. Message: path, dataset, value, remedy.
+/// A file that is missing, truncated, of the wrong type, or fails a checksum. Message: path, dataset, value,
+/// remedy.
 struct FileError : Error {
   explicit FileError(std::string message) : Error(2, std::move(message)) {}
 };

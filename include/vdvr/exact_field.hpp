@@ -1,4 +1,5 @@
-// F itself, in double precision on the host, with no FFT and no device: the definition written out (docs/geometry.md).
+// F itself, in double precision on the host, with no FFT and no device: the definition written out
+// (docs/geometry.md).
 #pragma once
 
 #include <span>

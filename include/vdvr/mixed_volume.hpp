@@ -1,8 +1,9 @@
 // The certified volume: base samples, an index of bricks, and tiles per level triple (docs/file-format.md).
 //
-// A brick is granularity^3 base cells. Its level triple (lz, ly, lx) sets the spacing spacing / 2^l per axis. A brick of
-// level (0,0,0) reads `base`; any other reads tile number `tile` of its triple: float tile[g*2^lz+1][g*2^ly+1][g*2^lx+1],
-// on the brick's closed box. Beyond the grid a tile repeats its last plane, which is never read.
+// A brick is granularity^3 base cells. Its level triple (lz, ly, lx) sets the spacing spacing / 2^l per axis.
+// A brick of level (0,0,0) reads `base`; any other reads tile number `tile` of its triple: float
+// tile[g*2^lz+1][g*2^ly+1][g*2^lx+1], on the brick's closed box. Beyond the grid a tile repeats its last
+// plane, which is never read.
 #pragma once
 
 #include <array>
@@ -20,10 +21,10 @@ using LevelTriple = std::array<std::uint8_t, 3>;
 struct MixedVolume {
   Grid grid;
   int granularity = 4;
-  int rate = 1;                          ///< gold rate: no level is finer than log2(rate)
-  std::vector<float> base;               ///< [nz+1][ny+1][nx+1]
-  std::vector<LevelTriple> level;        ///< [bz][by][bx]
-  std::vector<std::uint32_t> tile;       ///< [bz][by][bx]
+  int rate = 1;                                     ///< gold rate: no level is finer than log2(rate)
+  std::vector<float> base;                          ///< [nz+1][ny+1][nx+1]
+  std::vector<LevelTriple> level;                   ///< [bz][by][bx]
+  std::vector<std::uint32_t> tile;                  ///< [bz][by][bx]
   std::map<LevelTriple, std::vector<float>> tiles;  ///< per triple: [count][sz][sy][sx]
 
   /// ceil(cells / granularity) per axis x, y, z.
@@ -55,14 +56,16 @@ MixedVolume as_mixed(const Volume& volume, int granularity = 4);
 /// The brick (x, y, z) a world point belongs to, by the same header; the point is clamped to the grid's box.
 Index3 brick_at(const MixedVolume& volume, const Vec3& point);
 
-/// The value of the certified field at a world point, by the sampler of kernels/shared/mixed_sampler.h on the host
-/// (`buffer` arithmetic, the same bits as the device). The point must lie in the grid's box; it is clamped to it.
+/// The value of the certified field at a world point, by the sampler of kernels/shared/mixed_sampler.h on the
+/// host
+/// (`buffer` arithmetic, the same bits as the device). The point must lie in the grid's box; it is clamped to
+/// it.
 float sample_at(const MixedVolume& volume, const Vec3& point);
 
 /// Storage, as defined in docs/file-format.md.
 struct Storage {
-  double samples_ratio = 1;   ///< (base + index + tile samples) / base samples
-  double bytes_ratio = 1;     ///< device-resident bytes / bytes of the float32 base volume
+  double samples_ratio = 1;  ///< (base + index + tile samples) / base samples
+  double bytes_ratio = 1;    ///< device-resident bytes / bytes of the float32 base volume
   std::uint64_t device_bytes = 0;
   std::uint64_t file_bytes = 0;
 };

@@ -17,9 +17,9 @@ struct Tolerance {
 };
 
 struct RateOptions {
-  std::optional<int> upsampling;    ///< none: auto
-  std::string u_filter = "auto";    ///< auto | linear | cubic
-  std::optional<int> gold;          ///< none: auto
+  std::optional<int> upsampling;  ///< none: auto
+  std::string u_filter = "auto";  ///< auto | linear | cubic
+  std::optional<int> gold;        ///< none: auto
 };
 
 struct Plan {
@@ -29,15 +29,15 @@ struct Plan {
   int upsampling_u = 8;
   std::string u_filter = "linear";
   int gold_rate = 8;
-  std::vector<Bound> bounds;    ///< all that were computed
-  ErrorBudget budget;           ///< foreseen shares at the chosen rates; grid: what is left for it
-  std::uint64_t gold_samples = 0;      ///< to be back-projected, per pass
-  std::uint64_t memory_bytes = 0;      ///< peak of our allocations foreseen
-  double seconds = 0;                  ///< foreseen for build, from a measured back-projection rate
-  double samples_ratio = 0;            ///< storage foreseen, from a sample of bricks
+  std::vector<Bound> bounds;       ///< all that were computed
+  ErrorBudget budget;              ///< foreseen shares at the chosen rates; grid: what is left for it
+  std::uint64_t gold_samples = 0;  ///< to be back-projected, per pass
+  std::uint64_t memory_bytes = 0;  ///< peak of our allocations foreseen
+  double seconds = 0;              ///< foreseen for build, from a measured back-projection rate
+  double samples_ratio = 0;        ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
-  Volume base;                         ///< the 1x reconstruction it rests on
+  Volume base;  ///< the 1x reconstruction it rests on
   std::vector<std::string> notes;
 };
 

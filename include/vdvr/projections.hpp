@@ -1,7 +1,7 @@
 // A scan: parallel-beam projections with their geometry (docs/geometry.md).
 //
-// Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column `center`.
-// u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
+// Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column
+// `center`. u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
 #pragma once
 
 #include <cstdint>
@@ -28,14 +28,14 @@ using Geometry = std::variant<ParallelGeometry>;
 
 /// What reading and pre-processing did, reported to the user and stored with the certificate.
 struct InputReport {
-  std::string name;                  ///< file or folder name as given, without its directory
-  std::string sha256;                ///< of the file, or of a folder's sorted lines "sha256 name"
-  std::string format;                ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
-  std::int64_t dead_pixels = 0;      ///< samples replaced by the median of their neighbours
-  double transmission_floor = 0;     ///< the floor under -log
-  std::string center_source;         ///< "file", "option", "found", "default"
-  bool air_background = false;       ///< a linear air background was fitted and taken off
-  std::vector<std::string> notes;    ///< one line each, shown to the user
+  std::string name;                ///< file or folder name as given, without its directory
+  std::string sha256;              ///< of the file, or of a folder's sorted lines "sha256 name"
+  std::string format;              ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
+  std::int64_t dead_pixels = 0;    ///< samples replaced by the median of their neighbours
+  double transmission_floor = 0;   ///< the floor under -log
+  std::string center_source;       ///< "file", "option", "found", "default"
+  bool air_background = false;     ///< a linear air background was fitted and taken off
+  std::vector<std::string> notes;  ///< one line each, shown to the user
 };
 
 /// Line integrals, float data[view][row v][column u].

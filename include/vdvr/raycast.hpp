@@ -37,8 +37,8 @@ struct Camera {
   double view_angle_deg = 30;  ///< vertical, perspective
 };
 /// Azimuth 0 looks along -y with +x to the right, view-up -z (docs/geometry.md); the azimuth turns about z.
-/// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits the grid's
-/// bounding sphere; another divides the tangent of the half view angle. Throws InputError.
+/// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits
+/// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError.
 Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
 
 enum class RenderMode { dvr, iso, mip, slice, error };
@@ -49,14 +49,14 @@ struct RenderOptions {
   std::int64_t width = 512, height = 512;
   Camera camera;
   TransferFunction transfer;
-  double step = 1;                   ///< base cells (of the smallest spacing); opacities are corrected for it
+  double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it
   double iso = 0;
-  int slice_axis = 2;                ///< 0 x, 1 y, 2 z
-  std::optional<double> slice_position;  ///< world; default the middle
+  int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
+  std::optional<double> slice_position;                  ///< world; default the middle
   std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
   bool shading = true;
-  double termination = 0.99;         ///< early ray termination: opacity at which a ray stops
-  bool skip_empty = true;            ///< brick min/max skipping; the picture is the same to the bit without it
+  double termination = 0.99;  ///< early ray termination: opacity at which a ray stops
+  bool skip_empty = true;     ///< brick min/max skipping; the picture is the same to the bit without it
   SamplerKind sampler = SamplerKind::automatic;
   /// Behind the volume, display values, top and bottom row.
   std::array<double, 3> background_top{0.13, 0.14, 0.16}, background_bottom{0.03, 0.03, 0.04};
@@ -65,16 +65,16 @@ struct RenderOptions {
 struct RenderResult {
   Image image;
   SamplerKind sampler = SamplerKind::buffer;
-  std::string sampler_reason;        ///< why this sampler: measured rates, or what the device lacks
-  std::int64_t samples = 0;          ///< taken along rays
-  double seconds = 0;                ///< kernel and read-back
+  std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
+  std::int64_t samples = 0;    ///< taken along rays
+  double seconds = 0;          ///< kernel and read-back
 };
 
 struct ImageLimits;  // host/resident_volume.hpp
 
-/// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max, and the image3d atlas
-/// where the device has one that fits (built when a frame first needs it). Must not outlive the device.
-/// Throws ResourceError (memory) and InputError (sizes that do not match, an axis beyond 8192 cells).
+/// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max, and the
+/// image3d atlas where the device has one that fits (built when a frame first needs it). Must not outlive the
+/// device. Throws ResourceError (memory) and InputError (sizes that do not match, an axis beyond 8192 cells).
 class ResidentVolume {
  public:
   ResidentVolume(Device& device, const MixedVolume& volume);
@@ -97,21 +97,23 @@ class ResidentVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One picture. Colours are display values (sRGB), composited as such. Cost: 16 bytes per pixel on the device and on the host.
-/// Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws InputError for options out
-/// of range; ResourceError when `image3d` is asked for and cannot be had. Mode `error` throws InputError: error slices need
-/// the projections (`run`, `render --projections`).
+/// One picture. Colours are display values (sRGB), composited as such. Cost: 16 bytes per pixel on the device
+/// and on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x.
+/// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
+/// Mode `error` throws InputError: error slices need the projections (`run`, `render --projections`).
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
 
-/// What the device's image3d sampler does to weights and constants (docs/error-bounds.md, section on samplers).
+/// What the device's image3d sampler does to weights and constants (docs/error-bounds.md, section on
+/// samplers).
 struct SamplerProbe {
-  bool image3d = false;          ///< the device has a linear CL_R/CL_FLOAT 3D image sampler
-  double weight_error = 0;       ///< largest measured error of an interpolation weight
-  double delta = 0;              ///< charged: 2^-22 fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, else 1.5 measured; never below weight_error
-  double constant_error = 0;     ///< rho: largest relative error on constant and affine tiles, beyond delta
+  bool image3d = false;     ///< the device has a linear CL_R/CL_FLOAT 3D image sampler
+  double weight_error = 0;  ///< largest measured error of an interpolation weight
+  double delta = 0;  ///< charged: 2^-22 fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, else 1.5 measured;
+                     ///< never below weight_error
+  double constant_error = 0;  ///< rho: largest relative error on constant and affine tiles, beyond delta
   double buffer_rate = 0, image3d_rate = 0;  ///< samples per second, measured
-  std::string chosen;            ///< "buffer" or "image3d": what `auto` takes, by those rates
-  std::string note;              ///< the class that delta was charged for, or why there is no image3d sampler
+  std::string chosen;                        ///< "buffer" or "image3d": what `auto` takes, by those rates
+  std::string note;  ///< the class that delta was charged for, or why there is no image3d sampler
 };
 /// Measured once per device and process (about a second), then remembered.
 SamplerProbe probe_sampler(Device& device);

@@ -1,5 +1,5 @@
-// Scans from files: Data Exchange and NXtomo HDF5, a folder with scan.json, an MHA/NRRD stack with an angles file; and
-// projections written as Data Exchange (docs/inputs.md).
+// Scans from files: Data Exchange and NXtomo HDF5, a folder with scan.json, an MHA/NRRD stack with an angles
+// file; and projections written as Data Exchange (docs/inputs.md).
 #pragma once
 
 #include <filesystem>
@@ -16,13 +16,15 @@ struct ScanOptions {
   std::uint64_t max_memory_bytes = 0;                ///< 0: no limit
 };
 
-/// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours' median and
-/// counted, optional air background taken off. Centre: option, else file, else found from opposite views, else (U-1)/2.
-/// Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated files, ...).
-ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {}, const Progress& progress = {});
+/// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'
+/// median and counted, optional air background taken off. Centre: option, else file, else found from opposite
+/// views, else (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated
+/// files, ...).
+ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
+                        const Progress& progress = {});
 
-/// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit; theta in
-/// degrees. Written whole or not at all.
+/// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
+/// theta in degrees. Written whole or not at all.
 void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
 
 }  // namespace vdvr

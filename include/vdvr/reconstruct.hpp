@@ -14,7 +14,8 @@
 namespace vdvr {
 
 struct GridOptions {
-  std::optional<Index3> size;     ///< cells x, y, z; default: the smallest box of cells around the covered cylinder
+  std::optional<Index3>
+      size;  ///< cells x, y, z; default: the smallest box of cells around the covered cylinder
   std::optional<double> spacing;  ///< default: the detector pitch (pitch_u in x and y, pitch_v in z)
   std::optional<Vec3> origin;     ///< first sample; default centred on the axis and on the middle row
 };
@@ -22,8 +23,8 @@ struct GridOptions {
 /// Throws InputError for an empty, non-finite or overflowing grid, or a scan with no covered region.
 Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options);
 
-/// How far inside (positive) or outside (negative) the covered region a point lies, in world units; a lower bound of the
-/// distance to the region's boundary outside it. Covered: margin >= 0.
+/// How far inside (positive) or outside (negative) the covered region a point lies, in world units; a lower
+/// bound of the distance to the region's boundary outside it. Covered: margin >= 0.
 double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point);
 inline bool is_covered(const ParallelGeometry& geometry, double center, const Vec3& point) {
   return coverage_margin(geometry, center, point) >= 0;
@@ -37,11 +38,13 @@ struct ReconstructOptions {
   std::string u_filter = "linear";  ///< linear | cubic
 };
 
-/// F on the samples of `grid` by FBP on the device; samples farther than a cell's diagonal outside the covered region are 0.
-/// Cost: views * samples updates. Memory: views * (columns * upsampling) * rows of one slab, sized by --max-memory.
-/// With `seconds` the stages (filter, upsample, back-project, read back) wait for each other and are timed.
-Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid, const ReconstructOptions& options,
-                   const Progress& progress = {}, StageSeconds* seconds = nullptr);
+/// F on the samples of `grid` by FBP on the device; samples farther than a cell's diagonal outside the
+/// covered region are 0. Cost: views * samples updates. Memory: views * (columns * upsampling) * rows of one
+/// slab, sized by --max-memory. With `seconds` the stages (filter, upsample, back-project, read back) wait
+/// for each other and are timed.
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
+                   const ReconstructOptions& options, const Progress& progress = {},
+                   StageSeconds* seconds = nullptr);
 
 /// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
 /// Returns notes for the user: limited angle, grouped views.

@@ -10,8 +10,8 @@
 namespace vdvr {
 
 struct VerifyOptions {
-  bool exhaustive = false;   ///< every gold node; otherwise a stratified sample of bricks and the worst ones
-  double fraction = 0.05;    ///< of the bricks, when not exhaustive
+  bool exhaustive = false;  ///< every gold node; otherwise a stratified sample of bricks and the worst ones
+  double fraction = 0.05;   ///< of the bricks, when not exhaustive
   unsigned seed = 1;
 };
 
@@ -24,9 +24,10 @@ struct VerifyResult {
   std::string failure;  ///< one line: what does not match, and where; empty when it holds
 };
 
-/// Recomputes gold and P and T from `scan` with the rates and field options of `stored`, samples `volume` with the shared
-/// sampler, and compares. Does not check hashes: the caller does, from the file.
-VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume, const Certificate& stored,
-                    const VerifyOptions& options = {}, const Progress& progress = {});
+/// Recomputes gold and P and T from `scan` with the rates and field options of `stored`, samples `volume`
+/// with the shared sampler, and compares. Does not check hashes: the caller does, from the file.
+VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                    const Certificate& stored, const VerifyOptions& options = {},
+                    const Progress& progress = {});
 
 }  // namespace vdvr

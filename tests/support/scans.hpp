@@ -10,19 +10,22 @@
 
 namespace vdvr::testing {
 
-inline ProjectionSet empty_scan(std::int64_t views, std::int64_t rows, std::int64_t columns, double arc_deg = 180) {
+inline ProjectionSet empty_scan(std::int64_t views, std::int64_t rows, std::int64_t columns,
+                                double arc_deg = 180) {
   ProjectionSet scan;
   scan.geometry.columns = columns;
   scan.geometry.rows = rows;
   scan.geometry.center = 0.5 * static_cast<double>(columns - 1);
   for (std::int64_t k = 0; k < views; ++k)
-    scan.geometry.theta_rad.push_back(arc_deg * std::numbers::pi / 180 * static_cast<double>(k) / static_cast<double>(views));
+    scan.geometry.theta_rad.push_back(arc_deg * std::numbers::pi / 180 * static_cast<double>(k) /
+                                      static_cast<double>(views));
   scan.data.assign(static_cast<std::size_t>(scan.size()), 0.0f);
   return scan;
 }
 
 /// White noise: the hardest band-limited field.
-inline ProjectionSet noise_scan(std::int64_t views, std::int64_t rows, std::int64_t columns, unsigned seed = 1, double arc_deg = 180) {
+inline ProjectionSet noise_scan(std::int64_t views, std::int64_t rows, std::int64_t columns,
+                                unsigned seed = 1, double arc_deg = 180) {
   ProjectionSet scan = empty_scan(views, rows, columns, arc_deg);
   std::mt19937 random(seed);
   for (float& p : scan.data) p = static_cast<float>(random()) / 4294967296.0f - 0.5f;

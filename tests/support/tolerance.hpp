@@ -18,7 +18,8 @@ inline double fp32_sum(std::int64_t n, double magnitude) {
   return nu / (1 - nu) * magnitude;
 }
 
-/// An fp32 FFT of length n, in the 2-norm: log2(n) eta |x|_2, eta = u + gamma_4 (sqrt 2 + u) (Higham, theorem 24.2).
+/// An fp32 FFT of length n, in the 2-norm: log2(n) eta |x|_2, eta = u + gamma_4 (sqrt 2 + u) (Higham,
+/// theorem 24.2).
 inline double fft(std::int64_t n, double norm2) {
   const double gamma4 = 4 * unit_roundoff / (1 - 4 * unit_roundoff);
   const double eta = unit_roundoff + gamma4 * (std::sqrt(2.0) + unit_roundoff);
@@ -26,7 +27,9 @@ inline double fft(std::int64_t n, double norm2) {
 }
 
 /// A double-precision computation of n terms of the given magnitude.
-inline double fp64_sum(std::int64_t n, double magnitude) { return static_cast<double>(n) * 0x1p-53 * magnitude; }
+inline double fp64_sum(std::int64_t n, double magnitude) {
+  return static_cast<double>(n) * 0x1p-53 * magnitude;
+}
 
 /// What a certificate promises is the tolerance itself: no slack.
 inline double bound(double b) { return b; }
