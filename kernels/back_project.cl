@@ -1,11 +1,11 @@
-// Back-projection onto columns of z samples: out[block][y][x][z] = sum_k q_k(t_k(x, y), z), the paper's Eq. 2 with the
-// view weights folded into q.
-// Layouts: float filtered[z / 16][view][column n][16], so that neighbouring columns are neighbouring cache lines and no
-// power-of-two stride maps them onto one cache set; float out[block][y][x][out_stride];
-// per block and view a float4 {step of s along x, along y, s at the block's first sample less an integer, that integer}.
-// One work-item carries VDVR_LANES samples of z for a tile of neighbours in x and y: position, index and weights are shared by
-// the whole column, and the loads are contiguous. Positions are relative to the block, so fp32 holds them (docs/error-bounds.md).
-// rows int2[block][y]: the first and last column of that row (and of the tile's rows above it) that anyone wants.
+// Back-projection onto columns of z samples: out[block][y][x][z] = sum_k q_k(t_k(x, y), z), the paper's Eq. 2
+// with the view weights folded into q. Layouts: float filtered[z / 16][view][column n][16], so that
+// neighbouring columns are neighbouring cache lines and no power-of-two stride maps them onto one cache set;
+// float out[block][y][x][out_stride]; per block and view a float4 {step of s along x, along y, s at the
+// block's first sample less an integer, that integer}. One work-item carries VDVR_LANES samples of z for a
+// tile of neighbours in x and y: position, index and weights are shared by the whole column, and the loads
+// are contiguous. Positions are relative to the block, so fp32 holds them (docs/error-bounds.md). rows
+// int2[block][y]: the first and last column of that row (and of the tile's rows above it) that anyone wants.
 // Called by host/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
@@ -48,8 +48,10 @@
 #define TILE_Y 2
 #define OFFSET_X (float8)(0, 1, 2, 3, 0, 1, 2, 3)
 #define OFFSET_Y (float8)(0, 0, 0, 0, 1, 1, 1, 1)
-#define FOR_TILE(M) M(a0, s0, 0, 0) M(a1, s1, 1, 0) M(a2, s2, 2, 0) M(a3, s3, 3, 0) \
-                    M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) M(b3, s7, 3, 1)
+#define FOR_TILE(M)                                                                               \
+  M(a0, s0, 0, 0)                                                                                 \
+  M(a1, s1, 1, 0) M(a2, s2, 2, 0) M(a3, s3, 3, 0) M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) \
+      M(b3, s7, 3, 1)
 #define LANE(v, i) v.i
 #elif VDVR_TILE == 1
 #define TILE float
@@ -67,20 +69,20 @@
 #endif
 
 #if VDVR_CUBIC
-#define ADD(sum, i, c, r)                                        \
-  {                                                              \
-    __global const float* q = plane + LANE(at, i);               \
-    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);                 \
-    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum);            \
-    sum = fma((VEC)(LANE(w2, i)), LOAD(q + 32), sum);            \
-    sum = fma((VEC)(LANE(w3, i)), LOAD(q + 48), sum);            \
+#define ADD(sum, i, c, r)                             \
+  {                                                   \
+    __global const float* q = plane + LANE(at, i);    \
+    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);      \
+    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum); \
+    sum = fma((VEC)(LANE(w2, i)), LOAD(q + 32), sum); \
+    sum = fma((VEC)(LANE(w3, i)), LOAD(q + 48), sum); \
   }
 #else
-#define ADD(sum, i, c, r)                                        \
-  {                                                              \
-    __global const float* q = plane + LANE(at, i);               \
-    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);                 \
-    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum);            \
+#define ADD(sum, i, c, r)                             \
+  {                                                   \
+    __global const float* q = plane + LANE(at, i);    \
+    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);      \
+    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum); \
   }
 #endif
 // Named sums, not an array: compilers keep these in registers.
@@ -89,7 +91,8 @@
   if (x + c < nx && y + r < ny) STORE(sum, target + (size_t)(r * nx + c) * out_stride);
 
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
-                           __global const int2* rows, int views, int columns, int z_padded, int out_stride, int nx, int ny, int blocks) {
+                           __global const int2* rows, int views, int columns, int z_padded, int out_stride,
+                           int nx, int ny, int blocks) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
   const int x = (int)get_global_id(1) * TILE_X;
   const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
@@ -106,8 +109,8 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
   __global const float4* view = steps + (size_t)block * views;
   for (int k = 0; k < views; ++k, plane += columns * 16) {
     const float4 step = view[k];
-    // s >= 0 inside the block (the host chooses its integer part so), so that truncation is floor: CPUs have one
-    // instruction for that and none for a scalar floor.
+    // s >= 0 inside the block (the host chooses its integer part so), so that truncation is floor: CPUs have
+    // one instruction for that and none for a scalar floor.
     const TILE s = fma((TILE)(step.x), tile_x, fma((TILE)(step.y), tile_y, (TILE)(step.z)));
     const ITILE below = TO_ITILE(s);
     const TILE f = s - TO_TILE(below), g = 1.0f - f;

@@ -1,14 +1,14 @@
-// The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of chosen tiles.
-// Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l samples every (rate >> l)-th gold node.
-// Called by host/gold_stream.cpp.
+// The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
+// chosen tiles. Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l samples every
+// (rate >> l)-th gold node. Called by host/gold_stream.cpp.
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
 // Gold at every `spacing`-th column, interpolated linearly along z from its every `spacing`-th node:
 // along[block][y / spacing][x / spacing][stride]. One work-item fills one column.
-__kernel void interpolate_columns(__global float* along, __global const float* gold, int nx, int ny, int nz, int gold_stride,
-                                  int stride, int spacing, int blocks) {
+__kernel void interpolate_columns(__global float* along, __global const float* gold, int nx, int ny, int nz,
+                                  int gold_stride, int stride, int spacing, int blocks) {
   const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), block = (int)get_global_id(2);
   if (x >= cx || y >= cy || block >= blocks) return;
@@ -28,10 +28,10 @@ __kernel void interpolate_columns(__global float* along, __global const float* g
 }
 
 // The level's interpolant at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                                     \
-  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + stride + (z))) +         \
-        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + stride + (z))) -                  \
-        vload16(0, gold_column + (z))) +                                                                \
+#define ERROR_AT(z)                                                                             \
+  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + stride + (z))) + \
+        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + stride + (z))) -          \
+        vload16(0, gold_column + (z))) +                                                        \
    vload16(0, slack_column + (z)))
 
 inline float largest_of(float16 v) {
@@ -41,14 +41,15 @@ inline float largest_of(float16 v) {
   return fmax(c.x, c.y);
 }
 
-// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's closed nodes. It
-// starts negative and stays so where no node of a brick is tested. Bricks that `before` (the errors of the level below) found
-// within `tolerance` are left out. Positive floats order as their bits do. One work-item does one column of one brick layer;
-// its last node is also the next layer's first.
-__kernel void level_error(volatile __global int* error, __global const int* before, __global const float* along,
-                          __global const float* gold, __global const float* slack, __global const float* margin, float lowest,
-                          int nx, int ny, int nz, int gold_stride, int stride, int spacing, int bricks_x, int bricks_y,
-                          int bricks_z, int blocks, float tolerance) {
+// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's
+// closed nodes. It starts negative and stays so where no node of a brick is tested. Bricks that `before` (the
+// errors of the level below) found within `tolerance` are left out. Positive floats order as their bits do.
+// One work-item does one column of one brick layer; its last node is also the next layer's first.
+__kernel void level_error(volatile __global int* error, __global const int* before,
+                          __global const float* along, __global const float* gold,
+                          __global const float* slack, __global const float* margin, float lowest, int nx,
+                          int ny, int nz, int gold_stride, int stride, int spacing, int bricks_x,
+                          int bricks_y, int bricks_z, int blocks, float tolerance) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
   if (x >= nx || y >= ny || block >= blocks) return;
@@ -67,11 +68,13 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   if (!wanted) return;
   const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
   const int ix = min(x / spacing, cx - 2), iy = min(y / spacing, cy - 2);
-  const float fx = (float)(x - ix * spacing) / (float)spacing, fy = (float)(y - iy * spacing) / (float)spacing;
+  const float fx = (float)(x - ix * spacing) / (float)spacing,
+              fy = (float)(y - iy * spacing) / (float)spacing;
   const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
   __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * stride + first;
   __global const float* b = a + (size_t)cx * stride;
-  __global const float* gold_column = gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + first + 1;
+  __global const float* gold_column =
+      gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + first + 1;
   __global const float* slack_column = slack + column * stride + first;
 
   // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
@@ -79,7 +82,8 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   int z = 0;
   for (; z + 16 <= last - first + 1; z += 16) largest = fmax(largest, largest_of(ERROR_AT(z)));
   for (; z <= last - first; ++z) {
-    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[stride + z]) + fy * ((1.0f - fx) * b[z] + fx * b[stride + z]);
+    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[stride + z]) +
+                    fy * ((1.0f - fx) * b[z] + fx * b[stride + z]);
     largest = fmax(largest, fabs(v - gold_column[z]) + slack_column[z]);
   }
   if (largest < 0.0f) return;
@@ -89,16 +93,17 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
 
 // Copies the samples of tiles out of gold: request i writes tile samples float[sz][sy][sx] at `offset`.
 typedef struct {
-  int block, node_x, node_y, node_z;      // of the brick's first node in its block
-  int spacing_x, spacing_y, spacing_z;    // in gold nodes
-  int side_x, side_y, side_z;             // samples
-  int last_x, last_y, last_z;             // last node of the grid inside the block: beyond it planes repeat
+  int block, node_x, node_y, node_z;    // of the brick's first node in its block
+  int spacing_x, spacing_y, spacing_z;  // in gold nodes
+  int side_x, side_y, side_z;           // samples
+  int last_x, last_y, last_z;           // last node of the grid inside the block: beyond it planes repeat
   int pad;
   ulong offset;
 } TileRequest;
 
 __kernel void extract_tiles(__global float* out, __global const float* gold, __global const float* margin,
-                            __global const TileRequest* requests, int count, int nx, int ny, int gold_stride, float kept) {
+                            __global const TileRequest* requests, int count, int nx, int ny, int gold_stride,
+                            float kept) {
   const int i = (int)get_global_id(0), request = (int)get_global_id(1);
   if (request >= count) return;
   const TileRequest r = requests[request];
@@ -107,5 +112,6 @@ __kernel void extract_tiles(__global float* out, __global const float* gold, __g
   const int x = min(r.node_x + ix * r.spacing_x, r.last_x), y = min(r.node_y + iy * r.spacing_y, r.last_y);
   const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
   const bool keep = margin[((size_t)r.block * ny + y) * nx + x] >= kept;
-  out[r.offset + i] = keep ? gold[(((size_t)r.block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + z + 1] : 0.0f;
+  out[r.offset + i] =
+      keep ? gold[(((size_t)r.block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + z + 1] : 0.0f;
 }

@@ -1,9 +1,10 @@
-// Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered projections, T from
-// second differences of gold, and the node slack that the node test adds to |V - gold|.
-// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[base cell z][view][n] = sup of the positive and
-// of the negative part over the rows of a base cell and the stencil of column cell n; p float[block][base cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one
-// node of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack float[block][y][x][stride], node z at z.
-// Called by host/gold_stream.cpp and host/projection_bounds.cpp.
+// Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered
+// projections, T from second differences of gold, and the node slack that the node test adds to |V - gold|.
+// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[base cell z][view][n] = sup of
+// the positive and of the negative part over the rows of a base cell and the stencil of column cell n; p
+// float[block][base cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one node
+// of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack
+// float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/projection_bounds.cpp.
 
 #define UNTESTED (-1e30f)
 
@@ -17,11 +18,13 @@ __kernel void row_sup(__global float* sup, __global const float* d, int views, i
   sup[(size_t)k * z_padded + z] = largest;
 }
 
-// `below`, `above`: the stencil of interpolation in column cell n is n - below .. n + above. `remainder` times the row's sup is
-// how far a derivative can rise between columns; `rounding` what its fp32 evaluation can err.
+// `below`, `above`: the stencil of interpolation in column cell n is n - below .. n + above. `remainder`
+// times the row's sup is how far a derivative can rise between columns; `rounding` what its fp32 evaluation
+// can err.
 __kernel void bound_table(__global float2* table, __global const float* d, __global const float* sup,
-                          __global const float* rounding, int first_view, int chunk_views, int all_views, int columns,
-                          int z_padded, int rows, int rate, int cells_z, int below, int above, float remainder) {
+                          __global const float* rounding, int first_view, int chunk_views, int all_views,
+                          int columns, int z_padded, int rows, int rate, int cells_z, int below, int above,
+                          float remainder) {
   const int n = (int)get_global_id(0), k = (int)get_global_id(1), c = (int)get_global_id(2);
   if (n >= columns || k >= chunk_views || c >= cells_z) return;
   // Rows one gold step beyond the cell: second differences at its nodes reach there.
@@ -29,7 +32,8 @@ __kernel void bound_table(__global float2* table, __global const float* d, __glo
   float plus = 0.0f, minus = 0.0f;
   for (int z = first; z <= last; ++z) {
     __global const float* p = d + ((size_t)(z / 16) * chunk_views + k) * columns * 16 + z % 16;
-    const float rounds = rounding[first_view + k], rise = remainder * (sup[(size_t)k * z_padded + z] + rounds) + rounds;
+    const float rounds = rounding[first_view + k],
+                rise = remainder * (sup[(size_t)k * z_padded + z] + rounds) + rounds;
     for (int m = max(n - below, 0); m <= min(n + above, columns - 1); ++m) {
       const float v = p[(size_t)m * 16];
       plus = fmax(plus, v + rise);
@@ -39,10 +43,10 @@ __kernel void bound_table(__global float2* table, __global const float* d, __glo
   table[((size_t)c * all_views + first_view + k) * columns + n] = (float2)(plus, minus);
 }
 
-// Running maximum: out[.][n] = max of table[.][n - reach .. n + reach], reach by view. A base cell's shadow on the columns has
-// the same width wherever the cell lies.
-__kernel void dilate_table(__global float2* out, __global const float2* table, __global const int* reach, int views,
-                           int columns, int rows) {
+// Running maximum: out[.][n] = max of table[.][n - reach .. n + reach], reach by view. A base cell's shadow
+// on the columns has the same width wherever the cell lies.
+__kernel void dilate_table(__global float2* out, __global const float2* table, __global const int* reach,
+                           int views, int columns, int rows) {
   const int n = (int)get_global_id(0), r = (int)get_global_id(1);
   if (n >= columns || r >= rows) return;
   const int width = reach[r % views];
@@ -54,8 +58,9 @@ __kernel void dilate_table(__global float2* out, __global const float2* table, _
 
 // P per base cell: for each view the dilated table's entry under the cell's centre.
 // steps: per block and view {s per base cell along x, along y, s at the first cell's centre, 0}.
-__kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps, int views,
-                            int columns, int cells_x, int cells_y, int cells_z, int blocks, float factor) {
+__kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps,
+                            int views, int columns, int cells_x, int cells_y, int cells_z, int blocks,
+                            float factor) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cells_z, z = (int)get_global_id(2) - block * cells_z;
   if (x >= cells_x || y >= cells_y || block >= blocks) return;
@@ -69,8 +74,8 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
 }
 
 // P of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
-__kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y, int cells_z, int rate,
-                           int stride, int blocks) {
+__kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
+                           int cells_z, int rate, int stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cells_y, y = (int)get_global_id(2) - block * cells_y;
   if (z >= stride || x >= cells_x || block >= blocks) return;
@@ -87,33 +92,42 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
     const float16 dx = vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) - twice; \
     const float16 dy = vload16(0, centre - row) + vload16(0, centre + row) - twice;                 \
     const float16 dz = vload16(0, centre - 1) + vload16(0, centre + 1) - twice;                     \
-    px = fmax(px, dx); mx = fmin(mx, dx);                                                           \
-    py = fmax(py, dy); my = fmin(my, dy);                                                           \
-    pz = fmax(pz, dz); mz = fmin(mz, dz);                                                           \
+    px = fmax(px, dx);                                                                              \
+    mx = fmin(mx, dx);                                                                              \
+    py = fmax(py, dy);                                                                              \
+    my = fmin(my, dy);                                                                              \
+    pz = fmax(pz, dz);                                                                              \
+    mz = fmin(mz, dz);                                                                              \
   }
-#define RANGE(node)                                                                             \
-  {                                                                                             \
-    const float16 v = vload16(0, node);                                                         \
-    low = fmin(low, v); high = fmax(high, v);                                                   \
+#define RANGE(node)                     \
+  {                                     \
+    const float16 v = vload16(0, node); \
+    low = fmin(low, v);                 \
+    high = fmax(high, v);               \
   }
-#define CORNERS(M)                                                                              \
-  M(at) M(at + 1) M(at + gold_stride) M(at + gold_stride + 1)                                   \
-  M(at + row) M(at + row + 1) M(at + row + gold_stride) M(at + row + gold_stride + 1)
+#define CORNERS(M)                                                                  \
+  M(at)                                                                             \
+  M(at + 1) M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) \
+      M(at + row + gold_stride) M(at + row + gold_stride + 1)
 
-// Slack of each gold cell: T + P, T = (larger signed sum of the largest second differences at the cell's corners) / 8 +
-// t_constant + 1.5 P. Cells beyond the block, and with `windowed` those whose range misses the window, are UNTESTED.
-// The host pads gold and the strides so that no 16-lane access leaves its column's room.
-__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* p, int nx, int ny, int nz,
-                         int gold_stride, int stride, int rate, int cells_x, int cells_y, int blocks, float t_constant,
-                         int windowed, float window_low, float window_high) {
+// Slack of each gold cell: T + P, T = (larger signed sum of the largest second differences at the cell's
+// corners) / 8 + t_constant + 1.5 P. Cells beyond the block, and with `windowed` those whose range misses the
+// window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
+// room.
+__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* p, int nx,
+                         int ny, int nz, int gold_stride, int stride, int rate, int cells_x, int cells_y,
+                         int blocks, float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
-  if (z >= nz || x >= nx - 1 || block >= blocks) return;  // one cell more than there is: it must be marked UNTESTED
+  if (z >= nz || x >= nx - 1 || block >= blocks)
+    return;  // one cell more than there is: it must be marked UNTESTED
   const int row = (nx + 2) * gold_stride;
-  __global const float* at = gold + ((size_t)block * (ny + 2) + y + 1) * row + (size_t)(x + 1) * gold_stride + z + 1;
+  __global const float* at =
+      gold + ((size_t)block * (ny + 2) + y + 1) * row + (size_t)(x + 1) * gold_stride + z + 1;
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
-  const float16 bound = vload16(0, p + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
+  const float16 bound =
+      vload16(0, p + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
   float16 slack = fmax(px + py + pz, -(mx + my + mz)) * 0.125f + t_constant + 2.5f * bound;
   if (windowed) {
     float16 low = vload16(0, at), high = low;
@@ -128,12 +142,12 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
   if (z == 0) target[0] = UNTESTED;
 }
 
-// Slack of each node: the largest of the cells around it, UNTESTED where no such cell meets the covered region.
-// margin: per block and column the coverage margin across z; nodes with less than `lowest` are untested, as are those outside
-// [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
+// Slack of each node: the largest of the cells around it, UNTESTED where no such cell meets the covered
+// region. margin: per block and column the coverage margin across z; nodes with less than `lowest` are
+// untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
 __kernel void node_slack(__global float* slack, __global const float* cells, __global const float* margin,
-                         __global const int2* last, int nx, int ny, int nz, int stride, int blocks, float lowest, int z_first,
-                         int z_last) {
+                         __global const int2* last, int nx, int ny, int nz, int stride, int blocks,
+                         float lowest, int z_first, int z_last) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
   if (z >= nz || x >= nx || block >= blocks) return;

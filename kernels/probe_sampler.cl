@@ -14,15 +14,18 @@ __kernel void read_points(__read_only image3d_t image, __global const float4* re
 }
 #endif
 
-// The walk of one work-item in a cube of `side` samples: `steps` positions along x from its own row, as a ray would.
+// The walk of one work-item in a cube of `side` samples: `steps` positions along x from its own row, as a ray
+// would.
 VDVR_INLINE float3 walk_at(uint i, uint k, uint side, uint steps) {
   const float cells = (float)(side - 1);
-  const float y = (float)(i % side) * (cells - 1.0f) / (float)side, z = (float)(i / side % side) * (cells - 1.0f) / (float)side;
+  const float y = (float)(i % side) * (cells - 1.0f) / (float)side,
+              z = (float)(i / side % side) * (cells - 1.0f) / (float)side;
   return (float3)((float)k * (cells - 1.0f) / (float)steps, y + 0.37f, z + 0.41f);
 }
 
 #ifdef __IMAGE_SUPPORT__
-__kernel void rate_image(__read_only image3d_t image, uint side, uint count, uint steps, __global float* restrict sums) {
+__kernel void rate_image(__read_only image3d_t image, uint side, uint count, uint steps,
+                         __global float* restrict sums) {
   const sampler_t linear = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_LINEAR;
   const uint i = (uint)get_global_id(0);
   if (i >= count) return;

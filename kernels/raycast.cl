@@ -1,13 +1,14 @@
-// Ray-casting of the mixed-resolution field: emission-absorption (dvr), first iso-surface (iso), maximum (mip), slice.
-// One source for both samplers: VDVR_SAMPLER_BUFFER reads the field by mixed_sampler.h, VDVR_SAMPLER_IMAGE3D by mixed_image.h.
+// Ray-casting of the mixed-resolution field: emission-absorption (dvr), first iso-surface (iso), maximum
+// (mip), slice. One source for both samplers: VDVR_SAMPLER_BUFFER reads the field by mixed_sampler.h,
+// VDVR_SAMPLER_IMAGE3D by mixed_image.h.
 //
-// Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, and each belongs to the brick that vdvr_brick_of
-// names; bricks decide what is skipped and which record is open, never where a sample lies. So the picture does not depend
-// on skipping, to the bit.
+// Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, and each belongs to the brick that
+// vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. So
+// the picture does not depend on skipping, to the bit.
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one worth sampling, at most 255),
-// ranges[bz][by][bx], table[table_size] (rgb, opacity of one step), picture[y][x] (r, g, b, alpha | depth | maximum).
-// Called by: raycast() in host/raycast.cpp. Calls: mixed_sampler.h, mixed_image.h.
+// ranges[bz][by][bx], table[table_size] (rgb, opacity of one step), picture[y][x] (r, g, b, alpha | depth |
+// maximum). Called by: raycast() in host/raycast.cpp. Calls: mixed_sampler.h, mixed_image.h.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
@@ -21,8 +22,8 @@
 #ifndef VDVR_GROUP_Y
 #define VDVR_GROUP_Y 8
 #endif
-// Tuning: the six samples of a gradient as one vector of eight lanes. Pays where a work-item is a scalar thread (CPUs); same
-// operations in the same order, so the same bits. Needs the buffer sampler.
+// Tuning: the six samples of a gradient as one vector of eight lanes. Pays where a work-item is a scalar
+// thread (CPUs); same operations in the same order, so the same bits. Needs the buffer sampler.
 #ifndef VDVR_WIDE_GRADIENT
 #define VDVR_WIDE_GRADIENT 0
 #endif
@@ -50,16 +51,18 @@
 #define LEAST(a, b) ((a) < (b) ? (a) : (b))
 #define MOST(a, b) ((a) > (b) ? (a) : (b))
 
-// How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a grid of 8192
-// cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration often.
+// How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a
+// grid of 8192 cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration
+// often.
 #define LEAP_MARGIN 0.00390625f
-// Central differences reach half a base cell to each side, at every level: one gradient operator for the whole volume, so
-// that shading has no seam where levels meet.
+// Central differences reach half a base cell to each side, at every level: one gradient operator for the
+// whole volume, so that shading has no seam where levels meet.
 #define GRADIENT_REACH 0.5f
 // Bisections of an iso interval: the hit is known to 2^-13 of a step.
 #define BISECTIONS 12
 
-// A sample that adds less than this per length to the picture, half a step of 8 bits, is not worth six more for shading.
+// A sample that adds less than this per length to the picture, half a step of 8 bits, is not worth six more
+// for shading.
 #define SHADED_WEIGHT 0.001953125f
 
 // A ray clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
@@ -102,7 +105,8 @@ RAY_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c)
 }
 
 RAY_INLINE int3 brick_at(VdvrGrid grid, float3 c) {
-  return (int3)(vdvr_brick_of(c.x, grid.granularity, grid.bricks_x), vdvr_brick_of(c.y, grid.granularity, grid.bricks_y),
+  return (int3)(vdvr_brick_of(c.x, grid.granularity, grid.bricks_x),
+                vdvr_brick_of(c.y, grid.granularity, grid.bricks_y),
                 vdvr_brick_of(c.z, grid.granularity, grid.bricks_z));
 }
 
@@ -114,7 +118,8 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
   o.record = bricks[brick_index(grid, b.x, b.y, b.z)];
   o.low = convert_float3(b * grid.granularity);
   o.high = o.low + (float)grid.granularity;
-  // The last brick of an axis is closed, and wider than the grid where the cells do not divide by the granularity.
+  // The last brick of an axis is closed, and wider than the grid where the cells do not divide by the
+  // granularity.
   if (b.x == grid.bricks_x - 1) o.high.x = INFINITY;
   if (b.y == grid.bricks_y - 1) o.high.y = INFINITY;
   if (b.z == grid.bricks_z - 1) o.high.z = INFINITY;
@@ -122,7 +127,8 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
 }
 
 RAY_INLINE int is_inside(const OpenBrick* b, float3 c) {
-  return c.x >= b->low.x && c.x < b->high.x && c.y >= b->low.y && c.y < b->high.y && c.z >= b->low.z && c.z < b->high.z;
+  return c.x >= b->low.x && c.x < b->high.x && c.y >= b->low.y && c.y < b->high.y && c.z >= b->low.z &&
+         c.z < b->high.z;
 }
 
 // The field anywhere: vdvr_sample, or its image form.
@@ -158,10 +164,10 @@ RAY_INLINE float8 load6(__global const float* s, int8 i) {
 
 RAY_INLINE float8 lerp8(float8 a, float8 b, float8 t) { return (1.0f - t) * a + t * b; }
 
-// vdvr_trilinear at six points (lanes 0 to 5) of one region: an open brick, or, where the bricks around read the base too,
-// the whole base, whose cells give the same bits in global coordinates as in the brick's.
-RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, const OpenBrick* b, float8 x, float8 y,
-                          float8 z) {
+// vdvr_trilinear at six points (lanes 0 to 5) of one region: an open brick, or, where the bricks around read
+// the base too, the whole base, whose cells give the same bits in global coordinates as in the brick's.
+RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, const OpenBrick* b, float8 x,
+                          float8 y, float8 z) {
   const int base = (int)b->record.base_around;
   const int fx = base ? 0 : b->x * grid.granularity, fy = base ? 0 : b->y * grid.granularity;
   const int fz = base ? 0 : b->z * grid.granularity;
@@ -175,8 +181,10 @@ RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, c
   const int8 i = iz * sz + iy * sy + ix;
   __global const float* s = field + (base ? 0 : b->record.offset);
   __global const float* t = s + sz;
-  const float8 p = lerp8(lerp8(load6(s, i), load6(s + 1, i), tx), lerp8(load6(s + sy, i), load6(s + sy + 1, i), tx), ty);
-  const float8 q = lerp8(lerp8(load6(t, i), load6(t + 1, i), tx), lerp8(load6(t + sy, i), load6(t + sy + 1, i), tx), ty);
+  const float8 p =
+      lerp8(lerp8(load6(s, i), load6(s + 1, i), tx), lerp8(load6(s + sy, i), load6(s + sy + 1, i), tx), ty);
+  const float8 q =
+      lerp8(lerp8(load6(t, i), load6(t + 1, i), tx), lerp8(load6(t + sy, i), load6(t + sy + 1, i), tx), ty);
   return lerp8(p, q, tz);
 }
 #else
@@ -184,7 +192,8 @@ RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, c
 #endif
 
 // Density per length along the world axes; one-sided at the box's faces, where the reach is cut.
-RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c, float3 cells_per_length) {
+RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c,
+                              float3 cells_per_length) {
   const float3 lo = MOST(c - GRADIENT_REACH, (float3)(0.0f));
   const float3 hi = LEAST(c + GRADIENT_REACH, grid_cells(grid));
 #if GRADIENT_IS_WIDE
@@ -204,10 +213,12 @@ RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, 
   return (after - before) / (hi - lo) * cells_per_length;
 }
 
-// Phong with a light at the eye, two-sided. Where the gradient is weak its direction is noise: shading fades out there.
+// Phong with a light at the eye, two-sided. Where the gradient is weak its direction is noise: shading fades
+// out there.
 RAY_INLINE float3 shade(float3 rgb, float3 gradient, float3 view, float gradient_full) {
   const float magnitude = sqrt(dot(gradient, gradient));
-  const float strength = gradient_full > 0.0f ? LEAST(magnitude / gradient_full, 1.0f) : (magnitude > 0.0f ? 1.0f : 0.0f);
+  const float strength =
+      gradient_full > 0.0f ? LEAST(magnitude / gradient_full, 1.0f) : (magnitude > 0.0f ? 1.0f : 0.0f);
   const float facing = magnitude > 0.0f ? LEAST(fabs(dot(gradient, view)) / magnitude, 1.0f) : 1.0f;
   const float f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
   const float lit = 0.25f + 0.75f * facing;
@@ -219,12 +230,14 @@ RAY_INLINE int cast_ray(const VdvrRaycast* p, VdvrGrid grid, int px, int py, Ray
   const float across = (2.0f * ((float)px + 0.5f)) / (float)p->width - 1.0f;
   const float above = 1.0f - (2.0f * ((float)py + 0.5f)) / (float)p->height;
   const float3 world = (float3)(p->forward_x, p->forward_y, p->forward_z) +
-                       across * (float3)(p->right_x, p->right_y, p->right_z) + above * (float3)(p->up_x, p->up_y, p->up_z);
+                       across * (float3)(p->right_x, p->right_y, p->right_z) +
+                       above * (float3)(p->up_x, p->up_y, p->up_z);
   ray->world = world / sqrt(dot(world, world));
   const float3 eye = (float3)(p->eye_x, p->eye_y, p->eye_z);
   float3 d = ray->world * (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
   ray->direction = d;
-  // A component of 1e-12 stands for 0 in the divisions: the slab test then decides by the sign alone, without 0/0.
+  // A component of 1e-12 stands for 0 in the divisions: the slab test then decides by the sign alone, without
+  // 0/0.
   const float3 tiny = (float3)(1e-12f);
   d = select(d, copysign(tiny, d), fabs(d) < tiny);
   ray->inverse = 1.0f / d;
@@ -270,8 +283,8 @@ RAY_INLINE float3 background(const VdvrRaycast* p, int py) {
 
 // Emission and absorption, front to back; opacity in `table` is that of one step.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
-                                    __global const float4* restrict table, VdvrRaycast p, __global float4* restrict picture,
-                                    __global uint* restrict row_samples) {
+                                    __global const float4* restrict table, VdvrRaycast p,
+                                    __global float4* restrict picture, __global uint* restrict row_samples) {
   const int px = (int)get_global_id(0), py = (int)get_global_id(1);
   if (px >= p.width || py >= p.height) return;
   grid.granularity = VDVR_GRANULARITY;
@@ -299,7 +312,8 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
           float3 rgb = e.xyz;
           const float weight = (1.0f - alpha) * e.w;
           if (p.shading && weight > SHADED_WEIGHT * p.step)
-            rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world, p.gradient_full);
+            rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world,
+                        p.gradient_full);
           colour += weight * rgb;
           alpha += weight;
         }
@@ -308,15 +322,17 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
       } while (k < end && alpha < p.termination && is_inside(&brick, c));
     }
   }
-  picture[(ulong)py * (ulong)p.width + (ulong)px] = (float4)(colour + (1.0f - alpha) * background(&p, py), alpha);
+  picture[(ulong)py * (ulong)p.width + (ulong)px] =
+      (float4)(colour + (1.0f - alpha) * background(&p, py), alpha);
   if (samples) atomic_add(&row_samples[py], samples);
 }
 
-// The first crossing of `iso`: an interval test between successive samples t_k = k step (the last at the box's exit), then
-// bisection. Only bricks wholly below iso are leapt over, so the side of a sample that was not taken is known.
+// The first crossing of `iso`: an interval test between successive samples t_k = k step (the last at the
+// box's exit), then bisection. Only bricks wholly below iso are leapt over, so the side of a sample that was
+// not taken is known.
 __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
-                                    __global const float4* restrict table, VdvrRaycast p, __global float4* restrict picture,
-                                    __global uint* restrict row_samples) {
+                                    __global const float4* restrict table, VdvrRaycast p,
+                                    __global float4* restrict picture, __global uint* restrict row_samples) {
   const int px = (int)get_global_id(0), py = (int)get_global_id(1);
   if (px >= p.width || py >= p.height) return;
   grid.granularity = VDVR_GRANULARITY;
@@ -368,7 +384,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
     rgb = look_up(table, &p, p.iso).xyz;
     if (p.shading) {
       const OpenBrick brick = open_brick(bricks, grid, brick_at(grid, c));
-      const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
+      const float3 cells_per_length =
+          (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
       rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world, 0.0f);
     }
     depth = (ray.first + t) * p.length_unit;
@@ -379,8 +396,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
 
 // The largest sample along the ray; a brick that cannot raise it is leapt over.
 __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const float2* restrict ranges,
-                                    __global const float4* restrict table, VdvrRaycast p, __global float4* restrict picture,
-                                    __global uint* restrict row_samples) {
+                                    __global const float4* restrict table, VdvrRaycast p,
+                                    __global float4* restrict picture, __global uint* restrict row_samples) {
   const int px = (int)get_global_id(0), py = (int)get_global_id(1);
   if (px >= p.width || py >= p.height) return;
   grid.granularity = VDVR_GRANULARITY;
@@ -421,8 +438,8 @@ __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice s, __globa
   c[s.across] += (float)px * s.step_across;
   c[s.down] += (float)py * s.step_down;
   float4 e = (float4)(0.02f, 0.02f, 0.02f, 0.0f);
-  if (c[0] >= 0.0f && c[0] <= (float)grid.cells_x && c[1] >= 0.0f && c[1] <= (float)grid.cells_y && c[2] >= 0.0f &&
-      c[2] <= (float)grid.cells_z) {
+  if (c[0] >= 0.0f && c[0] <= (float)grid.cells_x && c[1] >= 0.0f && c[1] <= (float)grid.cells_y &&
+      c[2] >= 0.0f && c[2] <= (float)grid.cells_z) {
     const float value = sample_anywhere(field, bricks, grid, (float3)(c[0], c[1], c[2]));
     const float grey = clamp((value - s.window_lo) * s.window_scale, 0.0f, 1.0f);
     e = (float4)(grey, grey, grey, value);

@@ -1,6 +1,6 @@
-// Measures the stored field V against gold at every tested node of a block, through the sampler that renders it
-// (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, the largest T + P, and
-// which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
+// Measures the stored field V against gold at every tested node of a block, through the sampler that renders
+// it (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, the
+// largest T + P, and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
 // Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
 // Called by host/gold_stream.cpp.
 #include "shared/mixed_sampler.h"
@@ -8,7 +8,8 @@
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
 inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
-// Positive floats order as their bits do. Most columns do not raise the maximum: a plain read spares them the atomic.
+// Positive floats order as their bits do. Most columns do not raise the maximum: a plain read spares them the
+// atomic.
 inline void raise(volatile __global int* target, float v) {
   if (as_int(v) > *target) atomic_max(target, as_int(v));
 }
@@ -19,11 +20,14 @@ inline float largest_of(float8 v) {
   return fmax(b.x, b.y);
 }
 
-__kernel void verify_nodes(volatile __global int* total, volatile __global int* error, volatile __global int* slack_max,
-                           volatile __global int* violated, __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
-                           __global const float* gold, __global const float* slack, __global const float* margin,
-                           __global const int4* first_brick, __global const uchar* selected, float lowest, int nx, int ny, int gold_stride, int stride, int rate,
-                           int bricks_x, int bricks_y, int bricks_z, int blocks, float tolerance) {
+__kernel void verify_nodes(volatile __global int* total, volatile __global int* error,
+                           volatile __global int* slack_max, volatile __global int* violated,
+                           __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
+                           __global const float* gold, __global const float* slack,
+                           __global const float* margin, __global const int4* first_brick,
+                           __global const uchar* selected, float lowest, int nx, int ny, int gold_stride,
+                           int stride, int rate, int bricks_x, int bricks_y, int bricks_z, int blocks,
+                           float tolerance) {
   const int g = grid.granularity, side = g * rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
   const int iy = (int)get_global_id(1) % side, brick_y = (int)get_global_id(1) / side;
@@ -39,7 +43,10 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
   __global const float* gold_start =
-      gold + (((size_t)block * (ny + 2) + brick_y * g * rate + iy + 1) * (nx + 2) + brick_x * g * rate + ix + 1) * gold_stride + 1;
+      gold +
+      (((size_t)block * (ny + 2) + brick_y * g * rate + iy + 1) * (nx + 2) + brick_x * g * rate + ix + 1) *
+          gold_stride +
+      1;
   __global const float* slack_start = slack + column * stride;
 
   for (int brick_z = 0; brick_z < bricks_z; ++brick_z) {
@@ -48,27 +55,33 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
     if (bz >= grid.bricks_z || !selected[brick]) continue;
     const int last_z = min(g, grid.cells_z - bz * g) * rate;
     const VdvrBrick b = bricks[brick];
-    const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x), y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
+    const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x),
+                    y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
     __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
     __global const float* gold_column = gold_start + brick_z * g * rate;
     __global const float* slack_column = slack_start + brick_z * g * rate;
     const float interval = (float)(1 << b.level_z) / (float)rate;
     float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
     int parts = 0;
-    // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node between them, and
-    // the nodes' fractions are the dyadic ones vdvr_local gives.
+    // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node
+    // between them, and the nodes' fractions are the dyadic ones vdvr_local gives.
     const int per_interval = rate >> b.level_z;
     for (int index = 0; index * per_interval < last_z; ++index) {
-      const float low = vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
-      const float high = vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
-      const int first_node = index * per_interval, nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
+      const float low =
+          vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      const float high =
+          vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      const int first_node = index * per_interval,
+                nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
       int i = 0;
       for (; i + 8 <= nodes; i += 8) {
         const float8 t = ((float)i + (float8)(0, 1, 2, 3, 4, 5, 6, 7)) * interval;
         const float8 s = vload8(0, slack_column + first_node + i);
-        const float8 e = fabs(((1.0f - t) * low + t * high) - vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
+        const float8 e = fabs(((1.0f - t) * low + t * high) -
+                              vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
         const float8 both = e + s;
-        // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the comparison.
+        // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the
+        // comparison.
         if (any((s >= 0.0f) & !(both <= tolerance))) break;
         largest_total = fmax(largest_total, largest_of(both));
         largest_slack = fmax(largest_slack, largest_of(s));
@@ -82,7 +95,8 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
         largest_total = fmax(largest_total, e + s);
         largest_slack = fmax(largest_slack, s);
         largest_error = fmax(largest_error, e);
-        if (!(e + s <= tolerance)) parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
+        if (!(e + s <= tolerance))
+          parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
       }
     }
     if (largest_slack < 0.0f) continue;

@@ -1,11 +1,13 @@
-// The definition of the mixed-resolution field, compiled by the OpenCL compiler and by the host compiler alike: what the
-// verifier certifies, the ray-caster renders and sample_at returns is this text (contract: docs/file-format.md).
+// The definition of the mixed-resolution field, compiled by the OpenCL compiler and by the host compiler
+// alike: what the verifier certifies, the ray-caster renders and sample_at returns is this text (contract:
+// docs/file-format.md).
 //
-// The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, conversion to int and
-// comparisons only, contraction off on both sides, so that both give the same bits.
+// The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, conversion
+// to int and comparisons only, contraction off on both sides, so that both give the same bits.
 //
-// Coordinates are in cells: c = (p - origin) / spacing, 0 <= c <= cells. A point belongs to the brick floor(c / g)
-// (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^level is exact in fp32.
+// Coordinates are in cells: c = (p - origin) / spacing, 0 <= c <= cells. A point belongs to the brick floor(c
+// / g) (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^level is exact in
+// fp32.
 #ifndef VDVR_MIXED_SAMPLER_H
 #define VDVR_MIXED_SAMPLER_H
 
@@ -29,12 +31,12 @@ typedef std::int32_t vdvr_i32;
 
 // Where a brick's samples lie. 48 bytes; host/resident_volume.cpp fills it and checks the layout.
 typedef struct {
-  vdvr_u64 offset;   // of its first sample in the sample buffer, in floats
-  vdvr_u32 stride_y; // in floats; stride_x is 1
+  vdvr_u64 offset;    // of its first sample in the sample buffer, in floats
+  vdvr_u32 stride_y;  // in floats; stride_x is 1
   vdvr_u32 stride_z;
   vdvr_u32 level_x, level_y, level_z;
-  vdvr_u32 base_around; // 1: this brick and those across its faces read the base (for raycast.cl; else 0)
-  float texel_x, texel_y, texel_z; // of its first sample in the image3d atlas, at the texel's centre
+  vdvr_u32 base_around;  // 1: this brick and those across its faces read the base (for raycast.cl; else 0)
+  float texel_x, texel_y, texel_z;  // of its first sample in the image3d atlas, at the texel's centre
   float pad1;
 } VdvrBrick;
 
@@ -57,8 +59,8 @@ VDVR_INLINE float vdvr_lerp(float a, float b, float t) { return (1.0f - t) * a +
 
 // The brick along one axis that a cell coordinate belongs to.
 VDVR_INLINE vdvr_i32 vdvr_brick_of(float c, vdvr_i32 granularity, vdvr_i32 bricks) {
-  // Truncation stands for floor: they differ below 0 only, where the clamp gives 0 either way. A floor is a dozen
-  // instructions on some devices.
+  // Truncation stands for floor: they differ below 0 only, where the clamp gives 0 either way. A floor is a
+  // dozen instructions on some devices.
   vdvr_i32 b = (vdvr_i32)c / granularity;
   return b < 0 ? 0 : (b > bricks - 1 ? bricks - 1 : b);
 }
@@ -82,26 +84,28 @@ VDVR_INLINE float vdvr_bilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, f
 }
 
 // Trilinear interpolation in that cell: x first, then y, then z.
-VDVR_INLINE float vdvr_trilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, vdvr_u32 stride_z, float fx, float fy,
-                                 float fz) {
+VDVR_INLINE float vdvr_trilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, vdvr_u32 stride_z, float fx,
+                                 float fy, float fz) {
   return vdvr_lerp(vdvr_bilinear(s, stride_y, fx, fy), vdvr_bilinear(s + stride_z, stride_y, fx, fy), fz);
 }
 
 // The field at a cell coordinate of a known brick; `first` is the brick's first sample.
 VDVR_INLINE float vdvr_sample_in_brick(VDVR_GLOBAL const float* first, vdvr_u32 stride_y, vdvr_u32 stride_z,
                                        VdvrLocal x, VdvrLocal y, VdvrLocal z) {
-  return vdvr_trilinear(first + (vdvr_u64)z.index * stride_z + (vdvr_u64)y.index * stride_y + (vdvr_u64)x.index,
-                        stride_y, stride_z, x.fraction, y.fraction, z.fraction);
+  return vdvr_trilinear(
+      first + (vdvr_u64)z.index * stride_z + (vdvr_u64)y.index * stride_y + (vdvr_u64)x.index, stride_y,
+      stride_z, x.fraction, y.fraction, z.fraction);
 }
 
 // The field at a cell coordinate: finds the brick, then samples it.
-VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const float* samples, VDVR_GLOBAL const VdvrBrick* bricks, VdvrGrid grid,
-                              float cx, float cy, float cz) {
+VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const float* samples, VDVR_GLOBAL const VdvrBrick* bricks,
+                              VdvrGrid grid, float cx, float cy, float cz) {
   const vdvr_i32 bx = vdvr_brick_of(cx, grid.granularity, grid.bricks_x);
   const vdvr_i32 by = vdvr_brick_of(cy, grid.granularity, grid.bricks_y);
   const vdvr_i32 bz = vdvr_brick_of(cz, grid.granularity, grid.bricks_z);
-  const VdvrBrick b = bricks[((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x +
-                             (vdvr_u64)bx];
+  const VdvrBrick b =
+      bricks[((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x +
+             (vdvr_u64)bx];
   return vdvr_sample_in_brick(samples + b.offset, b.stride_y, b.stride_z,
                               vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x),
                               vdvr_local(cy, by, b.level_y, grid.granularity, grid.cells_y),

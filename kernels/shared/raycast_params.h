@@ -1,5 +1,6 @@
-// What one frame's kernels need besides the field. Filled by host/raycast.cpp, read by raycast.cl; compiled by both sides.
-// "cells" are base-cell coordinates per axis; "lengths" are multiples of the smallest base spacing.
+// What one frame's kernels need besides the field. Filled by host/raycast.cpp, read by raycast.cl; compiled
+// by both sides. "cells" are base-cell coordinates per axis; "lengths" are multiples of the smallest base
+// spacing.
 #ifndef VDVR_RAYCAST_PARAMS_H
 #define VDVR_RAYCAST_PARAMS_H
 
@@ -7,8 +8,9 @@
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
-  float right_x, right_y, right_z;        // world axes, times the tangent of the half view angle and the aspect ratio
-  float up_x, up_y, up_z;                 // world axes, times the tangent of the half view angle
+  float right_x, right_y,
+      right_z;             // world axes, times the tangent of the half view angle and the aspect ratio
+  float up_x, up_y, up_z;  // world axes, times the tangent of the half view angle
   float cells_per_length_x, cells_per_length_y, cells_per_length_z;
   float step, inverse_step;  // lengths
   float length_unit;         // world units per length
@@ -25,7 +27,8 @@ typedef struct {
   int pad[5];
 } VdvrRaycast;
 
-// A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis `down`.
+// A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis
+// `down`.
 typedef struct {
   float first[3];  // cells, of pixel (0, 0)
   float step_across, step_down;
