@@ -41,9 +41,27 @@ UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixel
   return c;
 }
 
+// The derivative of a series is a series of the same kind: its values at the samples, then these resampled.
+// Closed form but for n^2 entries, where the sum at every position would cost n for each.
+static std::vector<double> derivatives_anywhere(std::int64_t n, std::span<const double> positions, int order,
+                                                double pitch) {
+  const auto width = static_cast<std::size_t>(n);
+  std::vector<double> samples(width);
+  for (std::size_t i = 0; i < width; ++i) samples[i] = static_cast<double>(i);
+  const auto at_samples = resampling_matrix(n, samples, order, pitch, 1),
+             values = resampling_matrix(n, positions, 0, pitch, 0);
+  std::vector<double> matrix(positions.size() * width, 0.0);
+  for (std::size_t p = 0; p < positions.size(); ++p)
+    for (std::size_t j = 0; j < width; ++j)
+      for (std::size_t i = 0; i < width; ++i)
+        matrix[p * width + i] += values[p * width + j] * at_samples[j * width + i];
+  return matrix;
+}
+
 std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order,
                                       double pitch, int lattice) {
   const auto width = static_cast<std::size_t>(n);
+  if (order > 0 && lattice == 0) return derivatives_anywhere(n, positions, order, pitch);
   std::vector<double> table;  // g on the lattice over one period
   const std::int64_t period = 2 * n * lattice;
   if (order > 0 && lattice > 0) {
@@ -55,7 +73,6 @@ std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> po
   }
   const auto g = [&](double d) {
     if (order == 0) return dirichlet(n, d);
-    if (lattice == 0) return derivative(n, d, order, pitch);
     const auto j = static_cast<std::int64_t>(std::llround(d * lattice));
     return table[static_cast<std::size_t>(((j % period) + period) % period)];
   };

@@ -52,6 +52,7 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
     : state_(state),
       scan_(scan),
       upsampler_(upsampler),
+      sups_(sups),
       settings_(settings),
       coverage_(scan.geometry),
       columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)) {
@@ -79,9 +80,10 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   const ColumnBlocks largest{
       side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}, {}};
   cell_p_.assign(at(settings.grid.cells[0] * settings.grid.cells[1] * settings.grid.cells[2]), -1.0f);
+  cell_addend_ = cell_p_;
   arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.u_filter);
-  // The second differences of computed gold err by 4 times its error per axis: (1/8) * 3 * 4.
-  t_constant_ = gold_remainder(scan, sups, settings.grid, settings.rate) + 1.5 * arithmetic_;
+  rounding_ = arithmetic_ - filter_error_bound(upsampler, scan, columns_);
+  remainder_ = gold_remainder(scan, sups, settings.grid, settings.rate);
 }
 
 GoldStream::~GoldStream() = default;
@@ -183,8 +185,8 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
   const std::int64_t nx = cells_x * rate + 1, ny = cells_y * rate + 1, nz = cells_z * rate + 1;
   const auto rows = detector_rows(scan_.geometry, z_first - hz, hz, nz + 2);
   const UpsampledSlab slab = upsampler_(columns_, rows);
-  // P of a base cell is computed once: later passes over it read it from here.
-  std::optional<BoundTable> table;
+  // P of a base cell, and what a gold cell's slack adds for it, are computed once: later passes read them.
+  std::optional<BoundTable> projection, remainder;
   const auto known = [&](const std::array<std::int64_t, 2>& first) {
     for (std::int64_t z = 0; z < cells_z; ++z)
       for (std::int64_t y = first[1] * g; y < std::min(grid.cells[1], first[1] * g + cells_y); ++y)
@@ -215,9 +217,11 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
   batch.margin_ = opencl::DeviceArray<float>(state_, count(together * nx * ny), "coverage margins");
   batch.p_ = opencl::DeviceArray<float>(state_, count(together * cells_x * cells_y * cells_z),
                                         "projection bounds of cells");
+  opencl::DeviceArray<float> addend(state_, batch.p_.size(), "slack of cells"),
+      cell_remainder(state_, batch.p_.size(), "remainders of cells");
   opencl::DeviceArray<float> cells(state_, count(together * nx * ny * stride), "cell slack");
   opencl::DeviceArray<float> p_rows(state_, count(together * cells_x * cells_y * stride),
-                                    "projection bounds of gold cells");
+                                    "slack by base cell of gold cells");
   opencl::DeviceArray<cl_int2> last(state_, count(together), "block ends");
   // Columns that nobody wants keep what the buffer held: let that be finite.
   batch.gold_.fill(0.0f);
@@ -300,7 +304,7 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
 
     back_project(state_, scan_.geometry, slab, gold_columns, settings_.u_filter, batch.gold_);
     updates_ += static_cast<double>(n) * static_cast<double>((nx + 2) * (ny + 2) * (nz + 2) * slab.views);
-    std::vector<float> p(n * at(cells_x * cells_y * cells_z), 0.0f);
+    std::vector<float> p(n * at(cells_x * cells_y * cells_z), 0.0f), r(p.size(), 0.0f);
     const auto each_cell =
         [&](auto&& visit) {  // (index in p, index in cell_p_) of every cell inside the grid
           for (std::size_t b = 0; b < n; ++b) {
@@ -312,21 +316,35 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
                         at(((cell_z + z) * grid.cells[1] + by * g + y) * grid.cells[0] + bx * g + x));
           }
         };
-    if (all_known) {
-      each_cell([&](std::size_t i, std::size_t cell) { p[i] = cell_p_[cell]; });
-      batch.p_.write(p);
-    } else {
-      if (!table)
-        table = bound_table(state_, upsampler_, scan_,
-                            columns_for(scan_.geometry, grid, std::min(8, settings_.upsampling)),
-                            settings_.upsampling, settings_.u_filter, rows, grid, settings_.rate, cells_z);
-      project_bound(state_, scan_, *table, node_columns, cells_x, cells_y, settings_.rate, batch.p_);
+    if (!all_known) {
+      if (!projection) {
+        projection = projection_table(state_, upsampler_, scan_,
+                                      columns_for(scan_.geometry, grid, std::min(8, settings_.upsampling)),
+                                      settings_.upsampling, settings_.u_filter,
+                                      base_cells(scan_.geometry, grid, settings_.rate, z_first, cells_z));
+        remainder = remainder_table(state_, upsampler_, scan_, sups_, grid, settings_.rate, z_first, cells_z);
+      }
+      const double centre = 0.5 * static_cast<double>(rate);
+      project_bound(state_, scan_, *projection, node_columns, cells_x, cells_y, settings_.rate, centre,
+                    batch.p_);
+      project_bound(state_, scan_, *remainder, node_columns, cells_x, cells_y, settings_.rate, centre,
+                    cell_remainder);
       batch.p_.read(std::span<float>(p));
-      each_cell([&](std::size_t i, std::size_t cell) { cell_p_[cell] = p[i]; });
+      cell_remainder.read(std::span<float>(r));
+      each_cell([&](std::size_t i, std::size_t cell) {
+        cell_p_[cell] = p[i];
+        cell_addend_[cell] = (2.5f * p[i] + std::min(r[i], static_cast<float>(remainder_))) * (1 + 0x1p-22f);
+      });
     }
+    each_cell([&](std::size_t i, std::size_t cell) {
+      p[i] = cell_p_[cell];
+      r[i] = cell_addend_[cell];
+    });
+    batch.p_.write(p);
+    addend.write(r);
     expand({{count(stride), count(cells_x), count(cells_y) * n}, {16, 1, 1}}, p_rows.buffer(),
-           batch.p_.buffer(), to_int(cells_x), to_int(cells_y), to_int(cells_z), settings_.rate,
-           to_int(stride), count_n);
+           addend.buffer(), to_int(cells_x), to_int(cells_y), to_int(cells_z), settings_.rate, to_int(stride),
+           count_n);
     auto window = settings_.window.value_or(std::pair{0.0, 0.0});
     window.first -= arithmetic_;
     window.second += arithmetic_;
@@ -334,7 +352,7 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
     cell_slack({{count((nz + 15) / 16), count(nx - 1), count(ny - 1) * n}, local}, cells.buffer(),
                batch.gold_.buffer(), p_rows.buffer(), to_int(nx), to_int(ny), to_int(nz), to_int(gold_stride),
                to_int(stride), settings_.rate, to_int(cells_x), to_int(cells_y), count_n,
-               static_cast<cl_float>(t_constant_), settings_.window ? 1 : 0,
+               static_cast<cl_float>(1.5 * rounding_), settings_.window ? 1 : 0,
                static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
     node_slack({{count((nz + 15) / 16), count(nx), count(ny) * n}, local}, batch.slack_.buffer(),
                cells.buffer(), batch.margin_.buffer(), last.buffer(), to_int(nx), to_int(ny), to_int(nz),

@@ -17,6 +17,7 @@
 #include "host/back_project.hpp"
 #include "host/brick_layout.hpp"
 #include "host/coverage.hpp"
+#include "host/bound_table.hpp"
 #include "host/projection_bounds.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -77,6 +78,8 @@ class GoldStream {
 
   /// fp32 error bound of any gold sample.
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
+  /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
+  [[nodiscard]] double rounding_in_slack() const { return 1.5 * rounding_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Sample updates of back-projection so far.
   [[nodiscard]] double updates() const { return updates_; }
@@ -91,12 +94,16 @@ class GoldStream {
   opencl::State& state_;
   const FilteredScan& scan_;
   Upsampler& upsampler_;
+  FieldSups sups_;
   GoldSettings settings_;
   Coverage coverage_;
   UpsampledColumns columns_;
-  std::vector<float> cell_p_;  // P per base cell once computed, [z][y][x]; negative: not yet
+  std::vector<float> cell_p_;       // P per base cell once computed, [z][y][x]; negative: not yet
+  std::vector<float> cell_addend_;  // 2.5 P and the remainder of T, alike
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
-  double arithmetic_ = 0, t_constant_ = 0, updates_ = 0;
+  double arithmetic_ = 0, updates_ = 0;
+  double rounding_ = 0;   // the part of it that differs from sample to sample
+  double remainder_ = 0;  // of T, anywhere in the field
 };
 
 class GoldStream::Batch {

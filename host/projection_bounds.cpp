@@ -22,13 +22,7 @@ std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 // How much a run-wise sum of n products errs, in units of u times the sum of magnitudes
 // (kernels/batched_product.cl).
-double product_error(std::int64_t n) { return 34 + static_cast<double>(n) / 32; }
-
-// Views per chunk so that derivative slabs stay near 64 MiB.
-std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
-  const std::int64_t per_view = columns * (rows + 16) * 4;
-  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
-}
+double product_error(std::int64_t n) { return 18 + static_cast<double>(n) / 16; }
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
@@ -52,8 +46,14 @@ std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d) {
   return out;
 }
 
-// fp32 error of an upsampled derivative of one view: the samples' own error and two products, each relative
-// to the matrices' gain.
+}  // namespace
+
+double lebesgue_constant(std::int64_t n) {
+  // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
+  // Polynomials, section 1.4).
+  return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5;
+}
+
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
@@ -61,12 +61,9 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
          upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max;
 }
 
-}  // namespace
-
-double lebesgue_constant(std::int64_t n) {
-  // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
-  // Polynomials, section 1.4).
-  return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5;
+std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
+  const std::int64_t per_view = columns * (rows + 16) * 4;
+  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
 }
 
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
@@ -91,21 +88,26 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
     sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n)));
-    sups.second_u += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n)));
+    for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n)))
+      sups.view_second_u.push_back(rise * rise_v * m);
     sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n)));
     if (g.rows > 1) {
-      sups.second_v += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n)));
+      for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n)))
+        sups.view_second_v.push_back(rise * rise_v * m);
       sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n)));
     }
   }
+  sups.view_second_v.resize(sups.view_second_u.size(), 0.0);  // a single row does not vary along v
   // Rounding of the evaluation, relative to the sums of magnitudes it adds up.
-  for (const double m : scan.view_max) {
-    sups.value += derivative_rounding(upsampler, scan, columns, 0, m);
-    sups.second_u += derivative_rounding(upsampler, scan, columns, 2, m);
+  for (std::size_t k = 0; k < scan.view_max.size(); ++k) {
+    const double value = derivative_rounding(upsampler, scan, columns, 0, scan.view_max[k]);
+    sups.value += value;
+    sups.view_second_u[k] += derivative_rounding(upsampler, scan, columns, 2, scan.view_max[k]);
     // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
-    sups.second_v +=
-        g.rows > 1 ? derivative_rounding(upsampler, scan, columns, 0, m) * std::pow(pi / g.pitch_v, 2) : 0.0;
+    if (g.rows > 1) sups.view_second_v[k] += value * std::pow(pi / g.pitch_v, 2);
   }
+  sups.second_u = sum(sups.view_second_u);
+  sups.second_v = sum(sups.view_second_v);
   return sups;
 }
 
@@ -120,18 +122,28 @@ double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Gri
                   std::pow(hz, 4) * (5.0 / 24) * wv * sups.second_v);
 }
 
+namespace {
+
+// Row sums of the matrix are samples of a function of the position; between columns it rises by no more than
+// this (Ehlich, Zeller).
+double gain_anywhere(Upsampler& upsampler, const UpsampledColumns& columns) {
+  return upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate));
+}
+
+}  // namespace
+
+double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns) {
+  return scan.ramp_error * gain_anywhere(upsampler, columns) * lebesgue_constant(scan.geometry.rows);
+}
+
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         const std::string& u_filter) {
   const ParallelGeometry& g = scan.geometry;
-  // Row sums of the matrix are samples of a function of the position; between columns it rises by no more
-  // than this (Ehlich, Zeller).
-  const double gain_u = upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate)),
-               gain_v = lebesgue_constant(g.rows);
+  const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
   const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
-  const double filtering = scan.ramp_error * gain_u * gain_v;
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
   const double upsampling = unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples +
@@ -144,93 +156,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
   const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * 1.5 * slope;
-  return weight_gain * (filtering + upsampling) + summation + position;
-}
-
-BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                       const UpsampledColumns& columns, int upsampling, const std::string& u_filter,
-                       const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z) {
-  const ParallelGeometry& g = scan.geometry;
-  const bool cubic = u_filter == "cubic";
-  const int order = cubic ? 4 : 2;
-  const double step = g.pitch_u / upsampling, dense = pi / (2.0 * columns.rate);
-  BoundTable table;
-  table.columns = columns;
-  table.cells_z = cells_z;
-  // Linear: d^2/8 |q_uu|. Cubic on four points: (3/128) d^4 |q_uuuu|. Summation of the maxima in fp32 rounds
-  // up to K + 8 times.
-  table.factor = (cubic ? 3.0 / 128 * std::pow(step, 4) : step * step / 8) *
-                 (1 + (static_cast<double>(g.views()) + 8) * 0x1p-23);
-  const std::int64_t entries = cells_z * g.views() * columns.count;
-  opencl::DeviceArray<cl_float2> maxima(state, count(entries), "projection maxima");
-
-  std::vector<float> rounding;
-  for (const double m : scan.view_max)
-    rounding.push_back(
-        static_cast<float>(derivative_rounding(upsampler, scan, columns, order, m) * (1 + 0x1p-20)));
-  const opencl::DeviceArray<float> device_rounding(state, std::span<const float>(rounding),
-                                                   "derivative rounding");
-  // Between columns a derivative rises by at most step^2/8 of its own second derivative, (pi / pitch)^2 of
-  // its row's sup, which its samples reach but for the factor 1 / cos(pi / (2 rate)).
-  const double remainder = std::pow(pi / columns.rate, 2) / 8 / std::cos(dense) * (1 + 0x1p-20);
-  RowSup row_sup(state, "gold_bounds", "row_sup");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
-      fill(state, "gold_bounds", "bound_table");
-  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
-  for (std::int64_t first = 0; first < g.views(); first += chunk) {
-    const std::int64_t n = std::min(chunk, g.views() - first);
-    const UpsampledSlab d = upsampler(columns, rows, order, 0, 0, first, n);
-    opencl::DeviceArray<float> sup(state, count(n * d.rows_padded), "row maxima");
-    row_sup({{count(d.rows_padded), count(n), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(n),
-            to_int(columns.count), to_int(d.rows_padded));
-    fill({{count(columns.count), count(n), count(cells_z)}, {64, 1, 1}}, maxima.buffer(), d.values.buffer(),
-         sup.buffer(), device_rounding.buffer(), to_int(first), to_int(n), to_int(g.views()),
-         to_int(columns.count), to_int(d.rows_padded), to_int(d.rows), rate, to_int(cells_z), cubic ? 1 : 0,
-         cubic ? 2 : 1, static_cast<cl_float>(remainder));
-  }
-
-  std::vector<cl_int> reach;
-  for (const double theta : g.theta_rad) {
-    // Half a base cell's shadow, one gold step beyond it, one column for the floor of its centre and one for
-    // fp32.
-    const double half = (0.5 + 1.0 / rate) * (grid.spacing[0] * std::abs(std::cos(theta)) +
-                                              grid.spacing[1] * std::abs(std::sin(theta)));
-    reach.push_back(static_cast<cl_int>(std::ceil(half * columns.rate / g.pitch_u)) + 1);
-  }
-  const opencl::DeviceArray<cl_int> device_reach(state, std::span<const cl_int>(reach), "cell shadows");
-  table.values = opencl::DeviceArray<cl_float2>(state, count(entries), "projection bounds");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(state, "gold_bounds",
-                                                                                    "dilate_table");
-  dilate({{count(columns.count), count(cells_z * g.views()), 1}, {64, 1, 1}}, table.values.buffer(),
-         maxima.buffer(), device_reach.buffer(), to_int(g.views()), to_int(columns.count),
-         to_int(cells_z * g.views()));
-  return table;
-}
-
-void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table,
-                   const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int rate,
-                   opencl::DeviceArray<float>& p) {
-  const ParallelGeometry& g = scan.geometry;
-  const std::size_t views = static_cast<std::size_t>(g.views());
-  const double scale = table.columns.rate / g.pitch_u;
-  const double cell_x = blocks.step_x * rate, cell_y = blocks.step_y * rate;
-  std::vector<cl_float4> steps(blocks.first.size() * views);
-  for (std::size_t b = 0; b < blocks.first.size(); ++b)
-    for (std::size_t k = 0; k < views; ++k) {
-      const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]);
-      const double t = (blocks.first[b][0] + cell_x / 2) * c + (blocks.first[b][1] + cell_y / 2) * s;
-      steps[b * views + k] = {{static_cast<float>(cell_x * c * scale), static_cast<float>(cell_y * s * scale),
-                               static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), 0.0f}};
-    }
-  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps),
-                                                    "cell positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
-      kernel(state, "gold_bounds", "project_bound");
-  kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}},
-         p.buffer(), table.values.buffer(), device_steps.buffer(), to_int(g.views()),
-         to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
-         to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
+  return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position;
 }
 
 AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {

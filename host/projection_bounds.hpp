@@ -1,5 +1,5 @@
-// Bounds that rest on the filtered projections: sups per view, P per base cell, the constant part of T,
-// amplitude bounds (docs/error-bounds.md). Called by plan.cpp and gold_stream.cpp.
+// Global bounds that rest on the filtered projections: sups per view, the constant part of T, rounding,
+// amplitude bounds (docs/error-bounds.md). Called by plan.cpp, gold_stream.cpp and bound_table.cpp.
 #pragma once
 
 #include <string>
@@ -14,13 +14,23 @@ namespace vdvr {
 
 /// What a scan allows to be said before any gold sample exists; sums over the views, weights included.
 struct FieldSups {
-  double value = 0;     ///< sum over views of sup |q|
-  double second_u = 0;  ///< of sup |q_uu|
-  double second_v = 0;  ///< of sup |q_vv|
+  double value = 0;                                  ///< sum over views of sup |q|
+  double second_u = 0;                               ///< of sup |q_uu|
+  double second_v = 0;                               ///< of sup |q_vv|
+  std::vector<double> view_second_u, view_second_v;  ///< by view
   double sampled_second_u =
       0;  ///< of the largest |q_uu| at the detector's own samples: what the paper's Eq. 7 takes
   double sampled_second_v = 0;
 };
+
+/// fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
+/// samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
+/// more.
+double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+                           int order, double view_max);
+
+/// Views per chunk so that slabs of derivatives stay near 64 MiB.
+std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows);
 
 /// Cost: three derivatives on a grid 4 times denser than the detector both ways.
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
@@ -29,34 +39,19 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
 /// mirror extension).
 double lebesgue_constant(std::int64_t n);
 
-/// T's part that does not come from second differences of gold: their distance from the second derivatives,
-/// and how far those rise inside a gold cell.
+/// T's part that does not come from second differences of gold, anywhere in the field: their distance from
+/// the second derivatives, and how far those rise inside a gold cell. remainder_table (bound_table.hpp) is
+/// sharper.
 double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Grid& grid, int rate);
+
+/// How far the field of the computed filtered samples lies from F, anywhere: part of arithmetic_bound. It is
+/// a band-limited field itself, so bounds of curvature made from those samples need not pay for it again.
+double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns);
 
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         const std::string& u_filter);
-
-/// Derivative maxima under the shadow of a base cell centred on each column, for the slab whose rows are the
-/// gold rows -1 .. cells_z * rate + 1 of its base cells.
-struct BoundTable {
-  opencl::DeviceArray<cl_float2> values;  ///< [base cell z][view][column]
-  UpsampledColumns columns;
-  std::int64_t cells_z = 0;
-  double factor = 0;  ///< times the summed maxima: the error of interpolating in u
-};
-/// `columns` is where derivatives are evaluated, at most as dense as the `upsampling` whose interpolation is
-/// bounded.
-BoundTable bound_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                       const UpsampledColumns& columns, int upsampling, const std::string& u_filter,
-                       const std::vector<double>& rows, const Grid& grid, int rate, std::int64_t cells_z);
-
-/// P of every base cell of blocks of cells_x x cells_y: float p[block][z][y][x]. `blocks.first` and
-/// `blocks.step_*` are gold nodes. Enqueues; does not wait.
-void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table,
-                   const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int rate,
-                   opencl::DeviceArray<float>& p);
 
 /// Amplitude bounds: sum of |A| e, e = sum over the axes of 1 - cos(k d / 2), over the spectrum of the mirror
 /// extension, for interpolation in u at each rate and for gold at each rate. Cost: views * rows * columns per

@@ -2,8 +2,8 @@
 // grid's z positions, columns to the upsampled positions in u, and their derivatives; docs/geometry.md).
 // z-vectors are stored in chunks of 16: element (i, z) of batch b of a matrix lies at b * batch + (z / 16) *
 // chunk + 16 i + z % 16. a_batch or v_batch is 0 where all batches share the matrix; `out_first` is where the
-// first batch begins. Sums run in runs of 32 terms that are then added, so that the rounding error grows with
-// 32 + terms / 32 instead of terms. Called by host/filter_projections.cpp.
+// first batch begins. Sums run in runs of 16 terms that are then added, so that the rounding error grows with
+// 16 + terms / 16 instead of terms. Called by host/filter_projections.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #ifndef VDVR_LANES
@@ -44,8 +44,8 @@ __kernel void batched_product(__global float* out, __global const float* a, __gl
   if (z >= z_padded || i >= rows || b >= batches) return;
   __global const float* column = v + (size_t)b * v_batch + (size_t)(z / 16) * v_chunk + z % 16;
   FOR_ROWS(ROW)
-  for (int first = 0; first < terms; first += 32) {
-    const int last = min(first + 32, terms);
+  for (int first = 0; first < terms; first += 16) {
+    const int last = min(first + 16, terms);
     FOR_ROWS(CLEAR)
     for (int j = first; j < last; ++j) {
       const VEC x = LOAD(column + (size_t)j * 16);

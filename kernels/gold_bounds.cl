@@ -1,10 +1,10 @@
 // Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered
 // projections, T from second differences of gold, and the node slack that the node test adds to |V - gold|.
-// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[base cell z][view][n] = sup of
-// the positive and of the negative part over the rows of a base cell and the stencil of column cell n; p
-// float[block][base cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one node
+// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted sup of
+// the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
+// float[block][cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one node
 // of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack
-// float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/projection_bounds.cpp.
+// float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
 
 #define UNTESTED (-1e30f)
 
@@ -18,33 +18,35 @@ __kernel void row_sup(__global float* sup, __global const float* d, int views, i
   sup[(size_t)k * z_padded + z] = largest;
 }
 
-// `below`, `above`: the stencil of interpolation in column cell n is n - below .. n + above. `remainder`
-// times the row's sup is how far a derivative can rise between columns; `rounding` what its fp32 evaluation
-// can err.
+// Adds `weight` times the sup of the positive and of the negative part of a derivative, per column cell n and
+// cell c, to the table (or writes it, with `begin`). The stencil of column cell n is n - below .. n + above;
+// cell c has the rows c * row_step .. c * row_step + row_count - 1. `remainder` times the row's sup, and
+// `view_rise`, are how far the derivative can rise above its computed samples between columns and rows.
 __kernel void bound_table(__global float2* table, __global const float* d, __global const float* sup,
-                          __global const float* rounding, int first_view, int chunk_views, int all_views,
-                          int columns, int z_padded, int rows, int rate, int cells_z, int below, int above,
-                          float remainder) {
+                          __global const float* view_rise, int first_view, int chunk_views, int all_views,
+                          int columns, int z_padded, int rows, int row_step, int row_count, int cells_z,
+                          int below, int above, float remainder, float weight, int begin) {
   const int n = (int)get_global_id(0), k = (int)get_global_id(1), c = (int)get_global_id(2);
   if (n >= columns || k >= chunk_views || c >= cells_z) return;
-  // Rows one gold step beyond the cell: second differences at its nodes reach there.
-  const int first = c * rate, last = min(c * rate + rate + 2, rows - 1);
+  const int first = c * row_step, last = min(first + row_count, rows) - 1;
   float plus = 0.0f, minus = 0.0f;
   for (int z = first; z <= last; ++z) {
     __global const float* p = d + ((size_t)(z / 16) * chunk_views + k) * columns * 16 + z % 16;
-    const float rounds = rounding[first_view + k],
-                rise = remainder * (sup[(size_t)k * z_padded + z] + rounds) + rounds;
+    const float also = view_rise[first_view + k],
+                rise = remainder * (sup[(size_t)k * z_padded + z] + also) + also;
     for (int m = max(n - below, 0); m <= min(n + above, columns - 1); ++m) {
       const float v = p[(size_t)m * 16];
       plus = fmax(plus, v + rise);
       minus = fmax(minus, rise - v);
     }
   }
-  table[((size_t)c * all_views + first_view + k) * columns + n] = (float2)(plus, minus);
+  __global float2* entry = table + ((size_t)c * all_views + first_view + k) * columns + n;
+  const float2 term = weight * (float2)(plus, minus);
+  *entry = begin ? term : *entry + term;
 }
 
-// Running maximum: out[.][n] = max of table[.][n - reach .. n + reach], reach by view. A base cell's shadow
-// on the columns has the same width wherever the cell lies.
+// Running maximum: out[.][n] = max of table[.][n - reach .. n + reach], reach by view. A cell's shadow on the
+// columns has the same width wherever the cell lies.
 __kernel void dilate_table(__global float2* out, __global const float2* table, __global const int* reach,
                            int views, int columns, int rows) {
   const int n = (int)get_global_id(0), r = (int)get_global_id(1);
@@ -56,8 +58,8 @@ __kernel void dilate_table(__global float2* out, __global const float2* table, _
   out[(size_t)r * columns + n] = largest;
 }
 
-// P per base cell: for each view the dilated table's entry under the cell's centre.
-// steps: per block and view {s per base cell along x, along y, s at the first cell's centre, 0}.
+// The bound of each cell: for each view the dilated table's entry under the cell's centre.
+// steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}.
 __kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps,
                             int views, int columns, int cells_x, int cells_y, int cells_z, int blocks,
                             float factor) {
@@ -73,7 +75,7 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
   p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
 }
 
-// P of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
+// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
 __kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
                            int cells_z, int rate, int stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
@@ -110,11 +112,11 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
   M(at + 1) M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) \
       M(at + row + gold_stride) M(at + row + gold_stride + 1)
 
-// Slack of each gold cell: T + P, T = (larger signed sum of the largest second differences at the cell's
-// corners) / 8 + t_constant + 1.5 P. Cells beyond the block, and with `windowed` those whose range misses the
+// Slack of each gold cell: (larger signed sum of the largest second differences at the cell's corners) / 8
+// plus `addend`, which is 2.5 P + the remainder of T by base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
 // window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
 // room.
-__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* p, int nx,
+__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* addend, int nx,
                          int ny, int nz, int gold_stride, int stride, int rate, int cells_x, int cells_y,
                          int blocks, float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
@@ -127,8 +129,8 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
   const float16 bound =
-      vload16(0, p + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
-  float16 slack = fmax(px + py + pz, -(mx + my + mz)) * 0.125f + t_constant + 2.5f * bound;
+      vload16(0, addend + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
+  float16 slack = fmax(px + py + pz, -(mx + my + mz)) * 0.125f + t_constant + bound;
   if (windowed) {
     float16 low = vload16(0, at), high = low;
     CORNERS(RANGE)

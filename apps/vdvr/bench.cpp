@@ -12,6 +12,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/measure_tightness.hpp"
 #include "vdvr/simulate.hpp"
 
 namespace vdvr::cli {
@@ -219,6 +220,48 @@ int bench_render(Arguments& args) {
   return 0;
 }
 
+/// How tight the bounds are: largest bound over largest truth, which a finer gold shows.
+int bench_bounds(Arguments& args) {
+  args.positional("IN", "projections");
+  add_scan(args);
+  add_field(args);
+  add_grid(args);
+  add_rates(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  FieldOptions field = field_options(args);
+  const RateOptions rates = rate_options(args);
+  const int upsampling = rates.upsampling.value_or(8), gold = rates.gold.value_or(8);
+  const std::string u_filter = rates.u_filter == "auto" ? "linear" : rates.u_filter;
+  Device device = open_device(common);
+  ProgressLine progress("bench", common.quiet);
+  const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
+  field.center = center_of(field, scan.geometry);
+  const Grid grid = make_grid(scan.geometry, grid_options(args));
+  const auto start = Clock::now();
+  const Tightness t =
+      measure_tightness(device, scan, grid, field, upsampling, u_filter, gold, progress.callback());
+  const double seconds = since(start);
+  progress.clear();
+  const auto ratio = [](double bound, double error) { return error > 0 ? Json(bound / error) : Json(); };
+  Json line = bench_line("bounds", device, 1);
+  line["cells"] = grid.cells;
+  line["rates"] = {{"upsampling_u", upsampling}, {"u_filter", u_filter}, {"gold", gold}};
+  line["seconds"] = spread({seconds});
+  line["bricks"] = t.bricks;
+  line["gold"] = {
+      {"bound", t.gold_bound}, {"error", t.gold_error}, {"ratio", ratio(t.gold_bound, t.gold_error)}};
+  line["projection"] = {{"error", t.projection_error},
+                        {"node_wise", t.projection_nodes},
+                        {"node_wise_ratio", ratio(t.projection_nodes, t.projection_error)},
+                        {"dilated", t.projection_cells},
+                        {"dilated_ratio", ratio(t.projection_cells, t.projection_error)}};
+  line["arithmetic"] = t.arithmetic;
+  print_line(line);
+  return 0;
+}
+
 }  // namespace
 
 int bench_command(Arguments& args) {
@@ -226,14 +269,16 @@ int bench_command(Arguments& args) {
   if (name == "fbp") return bench_fbp(args);
   if (name == "build") return bench_build(args);
   if (name == "render") return bench_render(args);
+  if (name == "bounds") return bench_bounds(args);
   if (!name.empty())
-    throw InputError(fmt::format("'{}' is not a case of this version; there are fbp, build, render", name));
+    throw InputError(
+        fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds", name));
   args.group(
-          "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N]; each has its "
-          "own --help")
+          "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N] | bounds IN; "
+          "each has its own --help")
       .flag("help,h", "this text");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, build or render");
+  throw InputError("name a case: fbp, build, render or bounds");
 }
 
 }  // namespace vdvr::cli

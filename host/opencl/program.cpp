@@ -1,6 +1,7 @@
 // Builds embedded kernel programs, once per set of defines.
 //
-// Flags: -cl-std=CL1.2 only. No relaxed arithmetic: what a certificate covers must round as the bound
+// Flags: -cl-std=CL1.2, and warnings are errors: one hid an uninitialised pointer that made certificates too
+// good. No relaxed arithmetic: what a certificate covers must round as the bound
 // assumes.
 #include <fmt/format.h>
 
@@ -43,7 +44,7 @@ std::string resolve_source(const std::string& name) {
 }
 
 const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
-  std::string options = "-cl-std=CL1.2 -DVDVR_DIALECT_OPENCL";
+  std::string options = "-cl-std=CL1.2 -Werror -DVDVR_DIALECT_OPENCL";
   for (const auto& [key, value] : defines) options += fmt::format(" -D{}={}", key, value);
   const std::string cache_key = name + ' ' + options;
   if (const auto found = state.programs.find(cache_key); found != state.programs.end()) return found->second;
