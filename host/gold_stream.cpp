@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
@@ -32,6 +34,21 @@ struct TileRequest {
   cl_ulong offset;
 };
 static_assert(sizeof(TileRequest) == 64 && offsetof(TileRequest, offset) == 56);
+
+// Seconds of the device's work, not of its enqueueing.
+class Stopwatch {
+ public:
+  explicit Stopwatch(opencl::State& state) : state_(state) {}
+  double lap() {
+    state_.queue.finish();
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  opencl::State& state_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
 
 }  // namespace
 
@@ -92,29 +109,20 @@ std::uint64_t GoldStream::slab_bytes(std::int64_t cells_z) const {
   return upsampler_.slab_bytes(columns_, cells_z * settings_.rate + 3);
 }
 
-void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                     const Progress& progress, const std::string& stage) {
+double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const {
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate,
+                     nz = std::min(height * settings_.granularity, settings_.grid.cells[2]) * settings_.rate;
+  return static_cast<double>((width_x * side + 3) * (width_y * side + 3)) *
+         static_cast<double>(opencl::round_up(count(nz + 3), 16));
+}
+
+// Work by slab: as large blocks, or brick by brick where few of a block's bricks are wanted: whichever
+// computes fewer samples, halos included. Blocks at the grid's end are cut to it.
+std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8_t>& selected) const {
   const std::int64_t g = settings_.granularity;
   Index3 bricks{};
   for (std::size_t a = 0; a < 3; ++a) bricks[a] = (settings_.grid.cells[a] + g - 1) / g;
-  const auto is_selected = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-    return selected[at((z * bricks[1] + y) * bricks[0] + x)] != 0;
-  };
-
-  // Work by slab: as large blocks, or brick by brick where few of a block's bricks are wanted: whichever
-  // computes fewer samples, halos included. Blocks at the grid's end are cut to it.
-  const auto samples = [&](std::int64_t wx, std::int64_t wy, std::int64_t height) {
-    const std::int64_t side = g * settings_.rate,
-                       nz = std::min(height * g, settings_.grid.cells[2]) * settings_.rate;
-    return static_cast<double>((wx * side + 3) * (wy * side + 3)) *
-           static_cast<double>(opencl::round_up(count(nz + 3), 16));
-  };
-  struct Work {
-    std::int64_t z, height, width_x, width_y;
-    std::vector<std::array<std::int64_t, 2>> first;
-  };
   std::vector<Work> all;
-  double total = 0;
   for (std::int64_t z0 = 0; z0 < bricks[2]; z0 += slab_bricks_) {
     const std::int64_t height = std::min(slab_bricks_, bricks[2] - z0);
     std::map<std::array<std::int64_t, 2>, Work> large;
@@ -128,7 +136,7 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
         for (std::int64_t z = z0; z < z0 + height; ++z)
           for (std::int64_t y = y0; y < y0 + wy; ++y)
             for (std::int64_t x = x0; x < x0 + wx; ++x)
-              if (is_selected(x, y, z)) wanted.push_back({x, y, z});
+              if (selected[at((z * bricks[1] + y) * bricks[0] + x)]) wanted.push_back({x, y, z});
         if (wanted.empty()) continue;
         if (static_cast<double>(wanted.size()) * samples(1, 1, 1) >= samples(wx, wy, height) ||
             block_bricks_ * slab_bricks_ == 1)
@@ -140,11 +148,46 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
     for (auto& w : small)
       if (!w.first.empty()) all.push_back(std::move(w));
   }
+  return all;
+}
+
+// The share of a block's columns that may be kept, from a coarse raster: the others are not computed.
+double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& first) const {
+  const Grid& grid = settings_.grid;
+  constexpr int raster = 8;
+  int kept = 0;
+  for (int j = 0; j < raster; ++j)
+    for (int i = 0; i < raster; ++i) {
+      const double bx = static_cast<double>(first[0]) + static_cast<double>(w.width_x) * (i + 0.5) / raster,
+                   by = static_cast<double>(first[1]) + static_cast<double>(w.width_y) * (j + 0.5) / raster;
+      kept += coverage_.margin(grid.origin[0] + bx * settings_.granularity * grid.spacing[0],
+                               grid.origin[1] + by * settings_.granularity * grid.spacing[1]) >=
+                      -kept_margin(grid, 1)
+                  ? 1
+                  : 0;
+    }
+  return static_cast<double>(kept) / (raster * raster);
+}
+
+GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected) const {
+  GoldWork out;
+  for (const Work& w : partition(selected)) {
+    out.rows += static_cast<double>(
+        opencl::round_up(count(w.height * settings_.granularity * settings_.rate + 3), 16));
+    for (const auto& first : w.first)
+      out.samples += samples(w.width_x, w.width_y, w.height) * kept_share(w, first);
+  }
+  return out;
+}
+
+void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                     const Progress& progress, const std::string& stage) {
+  const std::vector<Work> all = partition(selected);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
+  double total = 0, done = 0;
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
-  double done = 0;
   for (const Work& w : all) {
-    run_slab(w.z, w.height, w.width_x, w.width_y, w.first, selected, on_batch, [&](double blocks) {
+    run_slab(w, selected, on_batch, [&](double blocks) {
       done += blocks * cost(w);
       report(progress, stage, std::min(1.0, done / total));
     });
@@ -170,10 +213,10 @@ std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
   return near;
 }
 
-void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t bricks_x,
-                          std::int64_t bricks_y, const std::vector<std::array<std::int64_t, 2>>& blocks,
-                          const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                          const std::function<void(double)>& tick) {
+void GoldStream::run_slab(const Work& work, const std::vector<std::uint8_t>& selected,
+                          const OnBatch& on_batch, const std::function<void(double)>& tick) {
+  const auto& [brick_z, bricks_z, bricks_x, bricks_y, blocks] = work;
+  Stopwatch watch(state_);
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
   const std::int64_t cell_z = brick_z * g, cells_z = std::min(bricks_z * g, grid.cells[2] - cell_z);
@@ -185,6 +228,8 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
   const std::int64_t nx = cells_x * rate + 1, ny = cells_y * rate + 1, nz = cells_z * rate + 1;
   const auto rows = detector_rows(scan_.geometry, z_first - hz, hz, nz + 2);
   const UpsampledSlab slab = upsampler_(columns_, rows);
+  spent_.work.rows += static_cast<double>(slab.rows_padded);
+  spent_.slab_seconds += watch.lap();
   // P of a base cell, and what a gold cell's slack adds for it, are computed once: later passes read them.
   std::optional<BoundTable> projection, remainder;
   const auto known = [&](const std::array<std::int64_t, 2>& first) {
@@ -303,7 +348,6 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
     batch.margin_.write(margins);
 
     back_project(state_, scan_.geometry, slab, gold_columns, settings_.u_filter, batch.gold_);
-    updates_ += static_cast<double>(n) * static_cast<double>((nx + 2) * (ny + 2) * (nz + 2) * slab.views);
     std::vector<float> p(n * at(cells_x * cells_y * cells_z), 0.0f), r(p.size(), 0.0f);
     const auto each_cell =
         [&](auto&& visit) {  // (index in p, index in cell_p_) of every cell inside the grid
@@ -318,11 +362,13 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
         };
     if (!all_known) {
       if (!projection) {
+        spent_.block_seconds += watch.lap();
         projection = projection_table(state_, upsampler_, scan_,
                                       columns_for(scan_.geometry, grid, std::min(8, settings_.upsampling)),
                                       settings_.upsampling, settings_.u_filter,
                                       base_cells(scan_.geometry, grid, settings_.rate, z_first, cells_z));
         remainder = remainder_table(state_, upsampler_, scan_, sups_, grid, settings_.rate, z_first, cells_z);
+        spent_.table_seconds += watch.lap();
       }
       const double centre = 0.5 * static_cast<double>(rate);
       project_bound(state_, scan_, *projection, node_columns, cells_x, cells_y, settings_.rate, centre,
@@ -358,8 +404,11 @@ void GoldStream::run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int6
                cells.buffer(), batch.margin_.buffer(), last.buffer(), to_int(nx), to_int(ny), to_int(nz),
                to_int(stride), count_n, batch.lowest_, to_int(z_low), to_int(z_high));
     on_batch(batch);
+    for (std::size_t b = 0; b < n; ++b)
+      spent_.work.samples += samples(bricks_x, bricks_y, bricks_z) * kept_share(work, blocks[begin + b]);
     tick(static_cast<double>(n));
   }
+  spent_.block_seconds += watch.lap();
 }
 
 std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const { return place_.at(brick); }

@@ -49,6 +49,15 @@ struct BrickClass {
   int level = 0;      ///< the lowest that passes; the top where only gold itself does
 };
 
+/// Upsampled rows over all slabs, and gold samples over all blocks, halos included.
+struct GoldWork {
+  double rows = 0, samples = 0;
+};
+struct GoldSpent {
+  GoldWork work;
+  double slab_seconds = 0, table_seconds = 0, block_seconds = 0;
+};
+
 /// A stored field on the device, for the verification kernel.
 struct DeviceField {
   DeviceField(opencl::State& state, const MixedVolume& volume);
@@ -81,14 +90,24 @@ class GoldStream {
   /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
   [[nodiscard]] double rounding_in_slack() const { return 1.5 * rounding_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
-  /// Sample updates of back-projection so far.
-  [[nodiscard]] double updates() const { return updates_; }
+  /// Bricks of a large block, x, y, z.
+  [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
+  /// What `run` would compute for these bricks.
+  [[nodiscard]] GoldWork work(const std::vector<std::uint8_t>& selected) const;
+  /// What it has computed so far, and what that took.
+  [[nodiscard]] const GoldSpent& spent() const { return spent_; }
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
-  void run_slab(std::int64_t brick_z, std::int64_t bricks_z, std::int64_t bricks_x, std::int64_t bricks_y,
-                const std::vector<std::array<std::int64_t, 2>>& blocks,
-                const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+  // Equal blocks of one slab, by their first bricks.
+  struct Work {
+    std::int64_t z, height, width_x, width_y;  // bricks
+    std::vector<std::array<std::int64_t, 2>> first;
+  };
+  [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
+  [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
+  [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
+  void run_slab(const Work& work, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                 const std::function<void(double)>& tick);
 
   opencl::State& state_;
@@ -101,7 +120,8 @@ class GoldStream {
   std::vector<float> cell_p_;       // P per base cell once computed, [z][y][x]; negative: not yet
   std::vector<float> cell_addend_;  // 2.5 P and the remainder of T, alike
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
-  double arithmetic_ = 0, updates_ = 0;
+  GoldSpent spent_;
+  double arithmetic_ = 0;
   double rounding_ = 0;   // the part of it that differs from sample to sample
   double remainder_ = 0;  // of T, anywhere in the field
 };

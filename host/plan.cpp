@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/foresee.hpp"
 #include "host/gold_stream.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
@@ -104,9 +105,6 @@ std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups
 // What a trial of some blocks at given rates shows.
 struct Trial {
   double slack = 0, projection = 0, gold = 0, arithmetic = 0;
-  double seconds_per_update = 0, samples_ratio = 0;
-  double gold_samples = 0;
-  std::uint64_t slab_bytes = 0;
 };
 
 // A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
@@ -133,45 +131,35 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   return selected;
 }
 
-Trial try_rates(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
-                const FieldSups& sups, const Volume& base, const Rates& rates, double epsilon) {
-  const Grid& grid = base.grid;
+int trial_granularity(const Grid& grid) {
   int granularity = 4;
   while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity)
     granularity /= 2;
-  GoldStream stream(state, filtered, upsampler, sups,
-                    {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
+  return granularity;
+}
+
+Trial try_rates(opencl::State& state, GoldStream& stream, const Volume& base, double epsilon) {
+  const GoldSettings& settings = stream.settings();
   Trial t;
   t.arithmetic = stream.arithmetic();
-  t.slab_bytes = stream.slab_bytes(granularity);
-  double tested = 0, tiles = 0;
-  const auto begin = std::chrono::steady_clock::now();
-  const DeviceField field(state, as_mixed(base, granularity));
-  const auto selected = trial_bricks(grid, granularity, rates.gold);
+  const DeviceField field(state, as_mixed(base, settings.granularity));
+  const auto selected = trial_bricks(settings.grid, settings.granularity, settings.rate);
   const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
                                                           "trial bricks");
   stream.run(
       selected,
       [&](GoldStream::Batch& batch) {
-        const auto classes =
-            batch.classify(field, static_cast<float>(epsilon - 3 * t.arithmetic), device_selected);
+        const auto measures = batch.measure(field, static_cast<float>(epsilon), device_selected);
         const auto p = batch.largest_p();
-        for (std::size_t i = 0; i < classes.size(); ++i) {
-          const BrickClass& c = classes[i];
-          if (c.base.total < 0) continue;
-          t.slack = std::max(t.slack, static_cast<double>(c.base.slack));
+        for (std::size_t i = 0; i < measures.size(); ++i) {
+          const BrickMeasure& m = measures[i];
+          if (m.total < 0) continue;
+          t.slack = std::max(t.slack, static_cast<double>(m.slack));
           t.projection = std::max(t.projection, static_cast<double>(p[i].first));
-          t.gold = std::max(t.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
-          tested += 1;
-          if (c.level > 0) tiles += std::pow((granularity << c.level) + 1, 3);
+          t.gold = std::max(t.gold, static_cast<double>(m.slack) - static_cast<double>(p[i].second));
         }
       },
       {}, "trial");
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  t.seconds_per_update = seconds / std::max(1.0, stream.updates());
-  t.samples_ratio = 1 + (tested > 0 ? (tiles / tested + 1) / std::pow(granularity, 3) : 0.0);
-  t.gold_samples = 1;
-  for (std::size_t a = 0; a < 3; ++a) t.gold_samples *= static_cast<double>(grid.cells[a] * rates.gold + 1);
   return t;
 }
 
@@ -232,8 +220,12 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.grid = grid;
   plan.field = field;
   report(progress, "plan", 0.0);
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
+  auto start = now();
   FilteredScan filtered = filter_projections(state, scan, field);
   measure_filter_error(filtered, scan, field);
+  double preparation = since(start);  // that build will repeat
   Upsampler upsampler(state, filtered);
   const Coverage coverage(filtered.geometry);
 
@@ -254,13 +246,19 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   set_epsilon(plan, tolerance);
   report(progress, "plan", 0.3);
 
+  start = now();
   const FieldSups sups = field_sups(state, upsampler, filtered);
+  preparation += since(start);
   plan.bounds = global_bounds(filtered, sups, grid);
   report(progress, "plan", 0.6);
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
   // all.
   const auto all = candidates(rates);
+  const auto stream_at = [&](const Rates& r) {
+    return GoldStream(state, filtered, upsampler, sups,
+                      {grid, trial_granularity(grid), r.gold, r.upsampling, r.u_filter, {}});
+  };
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
     // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
@@ -268,7 +266,8 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     if (r.u_filter == "linear" && &r != &all.back() &&
         2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs)
       continue;
-    const Trial t = try_rates(state, filtered, upsampler, sups, plan.base, r, plan.epsilon_abs);
+    GoldStream stream = stream_at(r);
+    const Trial t = try_rates(state, stream, plan.base, plan.epsilon_abs);
     plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter,
                            r.upsampling, t.projection, true});
     plan.bounds.push_back(
@@ -308,14 +307,21 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.budget.gold = {t.gold, "second differences of gold on trial blocks"};
   plan.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
   plan.budget.grid = {plan.epsilon_abs - t.slack - t.arithmetic, "what is left"};
-  plan.gold_samples = static_cast<std::uint64_t>(t.gold_samples);
-  // Two passes (classify, verify) over the covered part of the grid.
-  plan.seconds = 2 * t.gold_samples * (1 - plan.not_covered_fraction) * static_cast<double>(used.views()) *
-                 t.seconds_per_update;
-  plan.samples_ratio = t.samples_ratio;
-  plan.memory_bytes = state.memory.peak();
+  plan.gold_samples = 1;
+  for (const std::int64_t cells : grid.cells)
+    plan.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
   if (r.upsampling != 8 || r.u_filter != "cubic")
     plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
+  report(progress, "plan", 0.8);
+
+  GoldStream stream = stream_at(r);
+  const Foreseen foreseen = foresee_build(state, stream, plan.base, plan.epsilon_abs - 3 * t.arithmetic);
+  plan.samples_ratio = foreseen.samples_ratio;
+  plan.seconds = preparation + foreseen.seconds;
+  // On the device what the trial took and the stored field; on the host the scan, filtered too, the base
+  // samples twice, and the tiles before and after closing.
+  plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes +
+                      4 * (2 * static_cast<std::uint64_t>(scan.size()) + 2 * plan.base.samples.size());
   report(progress, "plan", 1.0);
   return plan;
 }
