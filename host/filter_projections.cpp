@@ -42,7 +42,11 @@ double ramp_error_of(double row_norm, double spectrum_max, std::int64_t length) 
   const double eta = unit_roundoff + gamma4 * (std::numbers::sqrt2 + unit_roundoff);
   // Radix 3 and 5 stages err less than twice what the radix 2 stages of the same length would; spectrum,
   // product, scaling and weight round once each.
-  return (4 * std::log2(static_cast<double>(length)) * eta + 5 * unit_roundoff) * spectrum_max * row_norm;
+  const double n = static_cast<double>(length), stages = std::log2(n);
+  // Below 2^-126 nothing is relative any more: about ten operations per stage and element lose that much
+  // each, and later stages sum up n of them, twice.
+  const double underflow = 20 * n * (stages + 1) * (1 + spectrum_max) * 0x1p-126;
+  return (4 * stages * eta + 5 * unit_roundoff) * spectrum_max * row_norm + underflow;
 }
 
 struct FilterKernels {
@@ -129,12 +133,14 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
       largest_norm = std::max(largest_norm, std::sqrt(norm));
     }
     out.ramp_error += weights.weight[k] * ramp_error_of(largest_norm, spectrum_max, length);
-    for (std::size_t i = 0; i < per_view; ++i)
-      out.view_max[k] =
-          std::max(out.view_max[k], std::abs(static_cast<double>(out.samples[k * per_view + i])));
+    for (std::size_t i = 0; i < per_view; ++i) {
+      const double m = std::abs(static_cast<double>(out.samples[k * per_view + i]));
+      if (!(m <= out.view_max[k])) out.view_max[k] = m;  // NaN stays
+      if (std::isnan(m)) break;
+    }
     if (!std::isfinite(out.view_max[k]) || !std::isfinite(largest_norm))
-      throw InputError(
-          fmt::format("view {} of the scan is not finite after filtering; check its line integrals", k));
+      throw InputError(fmt::format(
+          "view {} of the scan is not finite after filtering in fp32; check or scale its line integrals", k));
   }
   return out;
 }

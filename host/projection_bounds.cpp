@@ -20,6 +20,14 @@ constexpr double unit_roundoff = 0x1p-24;
 cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
 std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
+constexpr double smallest_normal = 0x1p-126;
+
+// What two products may lose below the smallest normal number: relative bounds do not cover it, and devices
+// may flush.
+double underflow(const ParallelGeometry& g, double gain_u) {
+  return 2 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
+}
+
 // How much a run-wise sum of n products errs, in units of u times the sum of magnitudes
 // (kernels/batched_product.cl).
 double product_error(std::int64_t n) { return 18 + static_cast<double>(n) / 16; }
@@ -58,7 +66,8 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
   return unit_roundoff * (product_error(g.columns) + product_error(g.rows) + 2) *
-         upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max;
+             upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max +
+         underflow(g, upsampler.gain_u(columns, order));
 }
 
 std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
@@ -156,7 +165,9 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
   const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * 1.5 * slope;
-  return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position;
+  const double views = static_cast<double>(g.views());
+  return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position +
+         views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
 }
 
 AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {
