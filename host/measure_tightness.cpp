@@ -142,7 +142,7 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
   };
   const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
   GoldStream sharp = stream_at(16, "cubic", rate), given = stream_at(upsampling, u_filter, rate),
-             truth = stream_at(32, "cubic", rate * finer);
+             truth = stream_at(16, "cubic", rate * finer);
   const BrickBounds t = brick_bounds(state, sharp, base, progress),
                     p = brick_bounds(state, given, base, progress);
 

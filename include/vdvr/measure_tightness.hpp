@@ -21,7 +21,7 @@ struct Tightness {
 };
 
 /// At gold rate `rate` and u rate `upsampling` with `u_filter`. The truth is gold at 4 times the rate from
-/// cubic u at 32x, whose own error is below 1 % of what is measured. Cost: two passes over the grid, then
+/// cubic u at 16x, whose own error is below 1 % of what is measured. Cost: two passes over the grid, then
 /// bricks at the finer rate.
 Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
                             const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
