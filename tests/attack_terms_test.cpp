@@ -3,19 +3,14 @@
 
 #include <random>
 
-#include "host/reconstruct_field.hpp"
-#include "host/sampler_terms.hpp"
 #include "host/view_weights.hpp"
-#include "tests/reference/mixed_field.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
-#include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/raycast.hpp"
+#include "vdvr/error.hpp"
 
-// The terms of the certificate one by one, each where it dominates: sups, filter, upsampling, summation,
-// position, sampler, the covered region's edge, and stored fields measured end to end. Without slack.
+// The terms before gold one by one, each where it dominates: sups, amplitudes, filter, upsampling, summation,
+// position. Without slack.
 using namespace vdvr;
 using namespace vdvr::attacks;
 
@@ -114,6 +109,34 @@ void expect(const Arithmetic& a, const std::string& what) {
   BOOST_TEST(a.error <= tolerance::bound(a.bound), what << ": error " << a.error << ", bound " << a.bound);
 }
 
+// The sum over views of the largest error of a filtered sample, against direct convolution in double
+// precision.
+double filter_error(const FilteredScan& filtered, const ProjectionSet& scan) {
+  constexpr double pi = std::numbers::pi;
+  const ParallelGeometry& g = scan.geometry;
+  const auto kernel = [&](std::size_t d) {
+    if (d == 0) return 1 / (4 * g.pitch_u);
+    return d % 2 == 1 ? -1 / (pi * pi * static_cast<double>(d * d) * g.pitch_u) : 0.0;
+  };
+  const ViewWeights weights = view_weights(g.theta_rad);
+  double total = 0;
+  for (std::size_t k = 0; k < at(g.views()); ++k) {
+    double worst = 0;
+    for (std::size_t v = 0; v < at(g.rows); ++v)
+      for (std::size_t u = 0; u < at(g.columns); ++u) {
+        double sum = 0;
+        for (std::size_t m = 0; m < at(g.columns); ++m)
+          sum += kernel(u > m ? u - m : m - u) *
+                 static_cast<double>(scan.data[(k * at(g.rows) + v) * at(g.columns) + m]);
+        const auto device = static_cast<double>(filtered.samples[(k * at(g.columns) + u) * at(g.rows) + v]);
+        const double error = std::abs(sum * weights.weight[k] - device);
+        if (!(error <= worst)) worst = error;
+      }
+    total += worst;
+  }
+  return total;
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(sups_hold_where_a_peak_lies_between_their_samples) {
@@ -143,43 +166,92 @@ BOOST_AUTO_TEST_CASE(sups_hold_where_a_peak_lies_between_their_samples) {
       }
 }
 
+// Projections not upsampled at all: linear interpolation between the detector's own columns.
+BOOST_AUTO_TEST_CASE(amplitude_bound_of_projections_holds_at_1x) {
+  double closest = 0;
+  for (std::size_t m = 0; m < 24; ++m)
+    for (const std::size_t l : {0u, 1u, 3u}) {
+      const Scan scan = wave(m, l, 2, 1);
+      const ParallelGeometry& g = scan.data.geometry;
+      const FilteredScan filtered = filter_projections(device().state(), scan.data, {});
+      const double bound = amplitude_bounds(filtered, Grid{{1, 1, 1}}, {1}).projection[0].second;
+      // The worst place of every view apart: rows at the detector's own and between, fractions of a column.
+      double sum = 0;
+      for (std::size_t k = 0; k < at(g.views()); ++k) {
+        double worst = 0;
+        for (const double row : {0.0, 0.5, 1.0, 1.5, 2.0, 3.0})
+          for (const double f : {0.25, 0.5, 0.75}) {
+            const ExactColumns q(g, {1, 0, 0, g.columns}, filtered.samples, row),
+                between(g, {1, f, 0, g.columns}, filtered.samples, row);
+            for (std::int64_t n = 0; n + 1 < g.columns; ++n)
+              worst = std::max(worst, std::abs((1 - f) * q(k, n) + f * q(k, n + 1) - between(k, n)));
+          }
+        sum += worst;
+        if (k == 2) break;  // all views hold the same wave: three of them
+      }
+      sum *= static_cast<double>(g.views()) / 3;
+      if (m > 0) closest = std::max(closest, sum / bound);
+      // The views differ by the filter's rounding.
+      BOOST_TEST(sum <= tolerance::bound(bound) + 8 * filtered.ramp_error,
+                 scan.name << ": " << sum << " > " << bound);
+    }
+  BOOST_TEST_MESSAGE("  amplitude of projections at 1x: error / bound " << closest);
+}
+
 BOOST_AUTO_TEST_CASE(filter_error_is_never_above_what_is_charged) {
   for (const Scan& scan : awkward_scans()) {
     FilteredScan filtered = filter_projections(device().state(), scan.data, {});
-    const double a_priori = filtered.ramp_error;
+    const double a_priori = filtered.ramp_error, error = filter_error(filtered, scan.data);
     measure_filter_error(filtered, scan.data, {});
-    const ParallelGeometry& g = scan.data.geometry;
-    const ExactField exact(scan.data, {});
-    // Filtered samples of all views at once, at every pixel of the axis' column: F there is their sum.
-    std::vector<double> q(at(g.views()), 0.0);
-    double total = 0;
-    const auto kernel = [&](std::size_t d) {
-      constexpr double pi = std::numbers::pi;
-      return d == 0       ? 1 / (4 * g.pitch_u)
-             : d % 2 == 1 ? -1 / (pi * pi * static_cast<double>(d * d) * g.pitch_u)
-                          : 0.0;
-    };
-    const ViewWeights weights = view_weights(g.theta_rad);
-    for (std::size_t k = 0; k < at(g.views()); ++k) {
-      double worst = 0;
-      for (std::size_t v = 0; v < at(g.rows); ++v)
-        for (std::size_t u = 0; u < at(g.columns); ++u) {
-          double sum = 0;
-          for (std::size_t m = 0; m < at(g.columns); ++m)
-            sum += kernel(u > m ? u - m : m - u) *
-                   static_cast<double>(scan.data.data[(k * at(g.rows) + v) * at(g.columns) + m]);
-          worst = std::max(
-              worst,
-              std::abs(sum * weights.weight[k] -
-                       static_cast<double>(filtered.samples[(k * at(g.columns) + u) * at(g.rows) + v])));
-        }
-      total += worst;
-    }
-    BOOST_TEST(total <= tolerance::bound(filtered.ramp_error),
-               scan.name << ", measured: " << total << " > " << filtered.ramp_error);
-    BOOST_TEST(total <= tolerance::bound(a_priori),
-               scan.name << ", a priori: " << total << " > " << a_priori);
+    BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
+               scan.name << ", measured: " << error << " > " << filtered.ramp_error);
+    // Higham's theorem knows no underflow: below 2^-126 the relative bound is none.
+    const bool normal =
+        *std::max_element(filtered.view_max.begin(), filtered.view_max.end()) > 0x1p-126 || error == 0;
+    if (normal)
+      BOOST_TEST(error <= tolerance::bound(a_priori),
+                 scan.name << ", a priori: " << error << " > " << a_priori);
   }
+}
+
+// Known violations, here without slack until they are mended: the a-priori bound leaves out underflow, and a
+// scan whose filter overflows to NaN is neither refused nor bounded.
+BOOST_AUTO_TEST_CASE(scans_beyond_the_range_of_fp32_are_refused_or_bounded,
+                     *boost::unit_test::expected_failures(2)) {
+  for (const double scale : {1e-40, 1e38}) {
+    const ProjectionSet scan = noise(geometry(11, 4, 24), 6, scale);
+    try {
+      FilteredScan filtered = filter_projections(device().state(), scan, {});
+      const double error = filter_error(filtered, scan);
+      BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
+                 "noise of " << scale << ", a priori: " << error << " > " << filtered.ramp_error);
+    } catch (const InputError&) {
+      BOOST_TEST(true);  // refused
+    }
+  }
+}
+
+// Computed gold against the same interpolation of the same filtered samples, in double precision.
+BOOST_AUTO_TEST_CASE(arithmetic_covers_gold_of_awkward_scans) {
+  double closest = 0;
+  int turn = 0;
+  for (const Scan& scan : awkward_scans()) {
+    FilteredScan filtered = filter_projections(device().state(), scan.data, {});
+    filtered.ramp_error = 0;                        // what is tested starts from the filtered samples
+    if (filtered.view_max[0] < 0x1p-100) continue;  // underflow is covered by the measured filter error alone
+    for (const char* filter : {"linear", "cubic"}) {
+      const int upsampling = 2 << (turn++ % 4);
+      const ColumnBlocks block{3, 3, 0.37, 0.41, {{scan.target[0] - 0.5, scan.target[1] - 0.4}}, {}};
+      const double row = scan.target[2] / scan.data.geometry.pitch_v +
+                         0.5 * static_cast<double>(scan.data.geometry.rows - 1);
+      const Arithmetic a = measure(filtered, filtered.samples, upsampling, filter, block, row);
+      if (a.error > 0) closest = std::max(closest, a.error / a.bound);
+      BOOST_TEST(a.error <= tolerance::bound(a.bound), scan.name << ", " << filter << " " << upsampling
+                                                                 << ": error " << a.error << ", bound "
+                                                                 << a.bound);
+    }
+  }
+  BOOST_TEST_MESSAGE("  gold of awkward scans: error / bound " << closest);
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_covers_errors_of_the_filtered_samples) {
@@ -270,160 +342,4 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
       expect(measure(f, f.samples, 2, filter, {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
              std::string("position, ") + filter + ", wave " + std::to_string(m));
     }
-}
-
-BOOST_AUTO_TEST_CASE(buffer_sampler_stays_within_its_term) {
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> unit(0, 1);
-  double closest = 0;
-  for (const std::int64_t cells : {5, 67, 1025, 4097})
-    for (const bool steep : {false, true}) {
-      Grid grid;
-      grid.cells = {cells, 3, 2};
-      grid.spacing = {0.7, 1.1, 0.9};
-      grid.origin = {-0.35 * static_cast<double>(cells), 2.2, -7.7};
-      MixedVolume v = support::random_mixed(grid, 4, 4, {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {0, 0, 2}}, 11);
-      // A comb has the largest slope there is, everywhere.
-      const auto comb = [&](std::vector<float>& s) {
-        for (std::size_t i = 0; i < s.size(); ++i) s[i] = i % 2 == 0 ? 1.0f : -1.0f;
-      };
-      if (steep) {
-        comb(v.base);
-        for (auto& [level, tile] : v.tiles) comb(tile);
-      }
-      const double bound = sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1).buffer.value;
-      for (int i = 0; i < 4000; ++i) {
-        Vec3 cell{}, p{};
-        for (std::size_t a = 0; a < 3; ++a) {
-          cell[a] = unit(random) * static_cast<double>(grid.cells[a]);
-          // Mostly at the far end, where a coordinate rounds most.
-          if (a == 0 && i % 4 != 0) cell[a] = static_cast<double>(cells) - unit(random) * 0.999;
-          p[a] = grid.origin[a] + cell[a] * grid.spacing[a];
-          cell[a] = (p[a] - grid.origin[a]) / grid.spacing[a];
-        }
-        // The brick that answers is the sampler's; at faces, where bricks disagree, the coordinate decides.
-        const double truth = reference::field_of_brick(v, brick_at(v, p), cell);
-        const double error = std::abs(static_cast<double>(sample_at(v, p)) - truth);
-        closest = std::max(closest, error / bound);
-        BOOST_TEST(error <= tolerance::bound(bound), cells << " cells, at cell " << cell[0] << ", " << cell[1]
-                                                           << ", " << cell[2] << ": error " << error
-                                                           << ", bound " << bound);
-      }
-    }
-  BOOST_TEST_MESSAGE("  sampler: error / bound " << closest);
-}
-
-BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
-  std::mt19937 random(4);
-  std::uniform_real_distribution<double> unit(0, 1);
-  for (const std::int64_t rows : {4, 1}) {
-    const Scan scan{"edge", noise(geometry(rows == 1 ? 44 : 11, rows, 24), 21), {}, 0};
-    Chain chain(scan.data);
-    for (const int gold : {2, 4, 8})
-      for (int i = 0; i < 24; ++i) {
-        // On the rim of the covered disk, and at the first and last row.
-        const double angle = 0.26 * i, r = 12;
-        const double z = rows == 1 ? 0.0 : i % 3 == 0 ? 1.5 : i % 3 == 1 ? -1.5 : 0.1;
-        const Rates rates{8, "cubic", gold};
-        const Lattice l =
-            stream_lattice(chain,
-                           grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9,
-                                   gold, Place::cell),
-                           rates);
-        std::int64_t missed = 0, covered = 0;
-        for (std::int64_t cz = 0; cz + 1 < l.nodes[2]; ++cz)
-          for (std::int64_t y = 0; y + 1 < l.nodes[1]; ++y)
-            for (std::int64_t x = 0; x + 1 < l.nodes[0]; ++x) {
-              // Near the corners, where a sliver of the cell may be covered; one row covers a plane only.
-              const auto near = [&] {
-                const double f = 0.02 * unit(random);
-                return random() % 2 == 0 ? f : 1 - f;
-              };
-              Vec3 p = l.position(x, y, cz);
-              for (std::size_t a = 0; a < 3; ++a) p[a] += near() * l.grid.spacing[a] / gold;
-              if (rows == 1 && l.position(x, y, cz)[2] <= 0 && l.position(x, y, cz + 1)[2] >= 0) p[2] = 0;
-              if (!chain.exact.covered(p)) continue;
-              ++covered;
-              for (std::int64_t c = 0; c < 8; ++c)
-                if (!(l.slack[l.at(x + (c & 1), y + (c >> 1 & 1), cz + (c >> 2))] >= 0)) {
-                  ++missed;
-                  break;
-                }
-            }
-        BOOST_TEST(missed == 0, missed << " of " << covered << " gold cells with a covered point have an "
-                                       << "untested corner; gold " << gold << ", angle " << angle << ", z "
-                                       << z);
-      }
-  }
-}
-
-BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> unit(0, 1);
-  std::int64_t fields = 0;
-  double closest = 0;
-  std::vector<Scan> scans{axis_peak(4, 12, 1, true), axis_peak(8, 20, -1, false), wave(17, 2, 8, 1)};
-  for (const Scan& s : awkward_scans())
-    if (scans.size() < 20) scans.push_back(s);
-  for (const Scan& scan : scans) {
-    Chain chain(scan.data);
-    for (const Rates& rates : {Rates{4, "linear", 4}, {8, "cubic", 8}, {16, "linear", 2}}) {
-      Grid grid = grid_at(scan.data.geometry, scan.target, 0.8, rates.gold, Place::cell);
-      grid.cells = {4, 4, 2};
-      GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
-                        {grid, 2, rates.gold, rates.upsampling, rates.u_filter, {}});
-      const int top = rates.gold == 2 ? 1 : 2;
-      const auto t = static_cast<std::uint8_t>(top);
-      for (int kind = 0; kind < 4; ++kind, ++fields) {
-        // F itself at the stored samples; F with an offset, either sign; F with noise.
-        const double size = kind == 0 ? 0 : 0.02 * chain.sups.value;
-        MixedVolume v = support::sampled_mixed(
-            grid, 2, rates.gold, {{0, 0, 0}, {1, 1, 1}, {t, t, t}, {1, 0, t}}, static_cast<unsigned>(fields),
-            [&](double x, double y, double z) {
-              const Vec3 p{grid.origin[0] + x * grid.spacing[0], grid.origin[1] + y * grid.spacing[1],
-                           grid.origin[2] + z * grid.spacing[2]};
-              const double change = kind == 1 ? 1 : kind == 2 ? -1 : 2 * unit(random) - 1;
-              return chain.exact.at(std::span(&p, 1))[0] + size * change;
-            });
-        const std::vector<std::uint8_t> all(v.level.size(), 1);
-        const opencl::DeviceArray<std::uint8_t> selected(device().state(), std::span<const std::uint8_t>(all),
-                                                         "all bricks");
-        const DeviceField field(device().state(), v);
-        const double others =
-            stream.arithmetic() + sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1).buffer.value;
-        std::vector<double> total(v.level.size(), -1.0);
-        stream.run(
-            all,
-            [&](GoldStream::Batch& batch) {
-              for (const BrickMeasure& m : batch.measure(field, 1.0f, selected))
-                total[at(m.brick)] = static_cast<double>(m.total);
-            },
-            {}, "measure");
-        std::vector<Vec3> points;
-        for (int i = 0; i < 300; ++i) {
-          Vec3 p{};
-          for (std::size_t a = 0; a < 3; ++a)
-            p[a] =
-                grid.origin[a] +
-                grid.spacing[a] *
-                    (i < 100 ? (std::floor(unit(random) * static_cast<double>(grid.cells[a] * rates.gold)) +
-                                0.5) /
-                                   rates.gold
-                             : unit(random) * static_cast<double>(grid.cells[a]));
-          if (chain.exact.covered(p)) points.push_back(p);
-        }
-        const auto F = chain.exact.at(points);
-        for (std::size_t i = 0; i < points.size(); ++i) {
-          const Index3 b = brick_at(v, points[i]), n = v.bricks();
-          const double bound = total[at((b[2] * n[1] + b[1]) * n[0] + b[0])] + others,
-                       error = std::abs(static_cast<double>(sample_at(v, points[i])) - F[i]);
-          if (error > 0) closest = std::max(closest, error / bound);
-          BOOST_TEST(error <= tolerance::bound(bound), scan.name << ", " << rates.name() << ", kind " << kind
-                                                                 << ": |V - F| " << error << ", certified "
-                                                                 << bound);
-        }
-      }
-    }
-  }
-  BOOST_TEST_MESSAGE("  " << fields << " stored fields: |V - F| / certified " << closest);
 }

@@ -243,6 +243,8 @@ inline std::vector<Scan> awkward_scans() {
       }));
   add("huge, 1e30", noise(g, 5, 1e30));
   add("small, 1e-25", noise(g, 6, 1e-25));
+  for (const int e : {-44, -40, -38, -30, 36})
+    add("noise of 1e" + std::to_string(e), noise(g, 6, std::pow(10.0, e)));
   add("denormals among ones", scan_of(g, [](auto k, auto v, auto u) {
         return (u + v + k) % 3 == 0 ? 1.0 : 1e-40 * static_cast<double>(u + 1);
       }));
