@@ -116,27 +116,35 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
   std::uniform_real_distribution<double> unit(0, 1);
   std::int64_t fields = 0;
   double closest = 0;
-  std::vector<Scan> scans{axis_peak(4, 12, 1, true), axis_peak(8, 20, -1, false), wave(17, 2, 8, 1)};
+  std::vector<Scan> scans{axis_peak(4, 12, 1, true), axis_peak(8, 20, -1, false), wave(17, 2, 8, 1),
+                          axis_peak(2, 12, 1, false), axis_peak(2, 12, -1, false)};
   for (const Scan& s : awkward_scans())
-    if (scans.size() < 20) scans.push_back(s);
+    if (scans.size() < 22) scans.push_back(s);
   for (const Scan& scan : scans) {
     Chain chain(scan.data);
-    for (const Rates& rates : {Rates{4, "linear", 4}, {8, "cubic", 8}, {16, "linear", 2}}) {
+    for (const Rates& rates :
+         {Rates{4, "linear", 4}, {8, "cubic", 8}, {16, "linear", 2}, {2, "linear", 16}}) {
       Grid grid = grid_at(scan.data.geometry, scan.target, 0.8, rates.gold, Place::cell);
       grid.cells = {4, 4, 2};
       GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
                         {grid, 2, rates.gold, rates.upsampling, rates.u_filter, {}});
       const int top = rates.gold == 2 ? 1 : 2;
       const auto t = static_cast<std::uint8_t>(top);
-      for (int kind = 0; kind < 4; ++kind, ++fields) {
-        // F itself at the stored samples; F with an offset, either sign; F with noise.
-        const double size = kind == 0 ? 0 : 0.02 * chain.sups.value;
+      for (int kind = 0; kind < 6; ++kind, ++fields) {
+        // F itself at the stored samples; F with an offset, either sign; F with noise; F with a ridge across
+        // the middle of the bricks, either sign, that dwarfs the slack.
+        const double size = (kind == 0 ? 0 : kind < 4 ? 0.02 : 0.5) * chain.sups.value;
         MixedVolume v = support::sampled_mixed(
             grid, 2, rates.gold, {{0, 0, 0}, {1, 1, 1}, {t, t, t}, {1, 0, t}}, static_cast<unsigned>(fields),
             [&](double x, double y, double z) {
               const Vec3 p{grid.origin[0] + x * grid.spacing[0], grid.origin[1] + y * grid.spacing[1],
                            grid.origin[2] + z * grid.spacing[2]};
-              const double change = kind == 1 ? 1 : kind == 2 ? -1 : 2 * unit(random) - 1;
+              const double ridge = 1 - std::abs(std::fmod(z, 2.0) - 1);
+              const double change = kind == 1   ? 1
+                                    : kind == 2 ? -1
+                                    : kind == 4 ? ridge
+                                    : kind == 5 ? -ridge
+                                                : 2 * unit(random) - 1;
               return chain.exact.at(std::span(&p, 1))[0] + size * change;
             });
         const std::vector<std::uint8_t> all(v.level.size(), 1);
@@ -153,7 +161,8 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
                 total[at(m.brick)] = static_cast<double>(m.total);
             },
             {}, "measure");
-        std::vector<Vec3> points;
+        const double middle = grid.origin[2] + grid.spacing[2];
+        std::vector<Vec3> points{scan.target, {scan.target[0], scan.target[1], middle}};
         for (int i = 0; i < 300; ++i) {
           Vec3 p{};
           for (std::size_t a = 0; a < 3; ++a)
