@@ -1,0 +1,161 @@
+// The chain from a scan to gold and its bounds on a small grid, beside F in double precision. Called by
+// attacks_test.cpp and attack_terms_test.cpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "host/gold_stream.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/exact_field.hpp"
+
+namespace vdvr::attacks {
+
+inline Device& device() {
+  static Device one;
+  return one;
+}
+
+struct Rates {
+  int upsampling;
+  const char* u_filter;
+  int gold;
+  [[nodiscard]] std::string name() const {
+    return std::string(u_filter) + " " + std::to_string(upsampling) + ", gold " + std::to_string(gold);
+  }
+};
+
+/// Every pair of rates: 4 upsamplings, 2 filters, 4 of gold.
+inline std::vector<Rates> all_rates() {
+  std::vector<Rates> all;
+  for (const int upsampling : {2, 4, 8, 16})
+    for (const char* filter : {"linear", "cubic"})
+      for (const int gold : {2, 4, 8, 16}) all.push_back({upsampling, filter, gold});
+  return all;
+}
+
+/// What the tests need of one scan.
+struct Chain {
+  explicit Chain(const ProjectionSet& given)
+      : scan(given),
+        exact(scan, {}),
+        filtered(filter_projections(device().state(), scan, {})),
+        upsampler(device().state(), filtered) {
+    measure_filter_error(filtered, scan, {});
+    sups = field_sups(device().state(), upsampler, filtered);
+  }
+  const ProjectionSet& scan;
+  ExactField exact;
+  FilteredScan filtered;
+  Upsampler upsampler;
+  FieldSups sups;
+};
+
+/// All gold nodes of a grid, x fastest, with what the certificate says of them. slack: the smallest that any
+/// brick uses; negative: untested. p: of every base cell.
+struct Lattice {
+  Grid grid;
+  int rate = 1;
+  double arithmetic = 0;
+  Index3 nodes{0, 0, 0};
+  std::vector<double> gold, slack, p;
+  [[nodiscard]] std::size_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    return static_cast<std::size_t>((z * nodes[1] + y) * nodes[0] + x);
+  }
+  [[nodiscard]] Vec3 position(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    const Index3 i{x, y, z};
+    Vec3 out{};
+    for (std::size_t a = 0; a < 3; ++a)
+      out[a] = grid.origin[a] + static_cast<double>(i[a]) / rate * grid.spacing[a];
+    return out;
+  }
+  [[nodiscard]] std::vector<Vec3> positions() const {
+    std::vector<Vec3> out;
+    for (std::int64_t z = 0; z < nodes[2]; ++z)
+      for (std::int64_t y = 0; y < nodes[1]; ++y)
+        for (std::int64_t x = 0; x < nodes[0]; ++x) out.push_back(position(x, y, z));
+    return out;
+  }
+  /// P of the base cell that holds a gold cell.
+  [[nodiscard]] double p_of_cell(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    return p[static_cast<std::size_t>((z / rate * grid.cells[1] + y / rate) * grid.cells[0] + x / rate)];
+  }
+  /// The smallest P of the base cells that a node belongs to.
+  [[nodiscard]] double p_of_node(const Index3& i) const {
+    double least = INFINITY;
+    for (int c = 0; c < 8; ++c) {
+      Index3 cell{};
+      for (std::size_t a = 0; a < 3; ++a)
+        cell[a] = std::clamp<std::int64_t>(i[a] - ((c >> a) & 1), 0, nodes[a] - 2);
+      least = std::min(least, p_of_cell(cell[0], cell[1], cell[2]));
+    }
+    return least;
+  }
+};
+
+/// Streams the grid in bricks of one base cell, so that P is known per base cell.
+inline Lattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
+  GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
+                    {grid, 1, rates.gold, rates.upsampling, rates.u_filter, {}});
+  Lattice out;
+  out.grid = grid;
+  out.rate = rates.gold;
+  out.arithmetic = stream.arithmetic();
+  for (std::size_t a = 0; a < 3; ++a) out.nodes[a] = grid.cells[a] * rates.gold + 1;
+  const auto count = static_cast<std::size_t>(out.nodes[0] * out.nodes[1] * out.nodes[2]);
+  const auto cells = static_cast<std::size_t>(grid.cells[0] * grid.cells[1] * grid.cells[2]);
+  out.gold.assign(count, 0);
+  out.slack.assign(count, INFINITY);
+  out.p.assign(cells, 0);
+  stream.run(
+      std::vector<std::uint8_t>(cells, 1),
+      [&](GoldStream::Batch& batch) {
+        const auto p = batch.largest_p();
+        for (std::size_t b = 0; b < p.size(); ++b) {
+          const std::int64_t id = batch.bricks()[b];
+          const Index3 brick{id % grid.cells[0], id / grid.cells[0] % grid.cells[1],
+                             id / grid.cells[0] / grid.cells[1]};
+          out.p[static_cast<std::size_t>(id)] = static_cast<double>(p[b].first);
+          batch.for_each_node(id, [&](const Index3& i, float gold, float slack) {
+            const std::size_t n = out.at(brick[0] * rates.gold + i[0], brick[1] * rates.gold + i[1],
+                                         brick[2] * rates.gold + i[2]);
+            out.gold[n] = static_cast<double>(gold);
+            out.slack[n] = std::min(out.slack[n], static_cast<double>(slack));
+          });
+        }
+      },
+      {}, "attack");
+  return out;
+}
+
+inline double trilinear(const std::array<double, 8>& corner, const Vec3& f) {
+  double sum = 0;
+  for (std::size_t c = 0; c < 8; ++c)
+    sum +=
+        corner[c] * ((c & 1) ? f[0] : 1 - f[0]) * ((c & 2) ? f[1] : 1 - f[1]) * ((c & 4) ? f[2] : 1 - f[2]);
+  return sum;
+}
+
+/// Where a scan's target lies on the grid: inside a gold cell, or on a gold node that is a corner of base
+/// cells, at their top or bottom.
+enum class Place { cell, top, bottom };
+inline const char* name_of(Place p) {
+  return p == Place::cell ? "in a gold cell" : p == Place::top ? "on a top node" : "on a bottom node";
+}
+
+/// 2 x 2 x 1 base cells around the target.
+inline Grid grid_at(const ParallelGeometry& g, const Vec3& target, double spacing, int gold, Place place) {
+  Grid grid;
+  grid.cells = {2, 2, 1};
+  grid.spacing = {spacing, spacing, spacing * (g.rows > 1 ? g.pitch_v : 1.0)};
+  for (std::size_t a = 0; a < 2; ++a)
+    grid.origin[a] = target[a] - (gold + (place == Place::cell ? 0.5 : 0.0)) / gold * spacing;
+  const double up = place == Place::cell ? (gold / 2 + 0.5) / gold : place == Place::top ? 1.0 : 0.0;
+  grid.origin[2] = target[2] - up * grid.spacing[2];
+  return grid;
+}
+
+}  // namespace vdvr::attacks
