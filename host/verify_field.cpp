@@ -351,14 +351,16 @@ void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view
                    [&](std::int64_t n, std::int64_t r, const std::array<double, lanes>& values) {
                      for (std::int64_t i = 0; i < lanes; ++i)
                        if (r + i < shape.z_padded)
-                         out[(n + pad_) * shape.z_padded + r + i] = static_cast<float>(values[at(i)]);
+                         out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
+                             static_cast<float>(values[at(i)]);
                    });
     // Beyond the detector's edges the series is its own mirror image.
     for (std::int64_t n = 0; n < columns_; ++n) {
       std::int64_t m = std::abs(n - pad_) % (2 * last);
       if (m > last) m = 2 * last - m;
-      if (m != n - pad_)
-        std::copy_n(out + (m + pad_) * shape.z_padded, shape.z_padded, out + n * shape.z_padded);
+      if (m == n - pad_) continue;
+      for (std::int64_t z = 0; z < shape.z_padded / 16; ++z)
+        std::copy_n(out + (z * columns_ + m + pad_) * 16, 16, out + (z * columns_ + n) * 16);
     }
   });
   table.device.write(std::span<const float>(table.host).first(at(views * table.per_view)));
@@ -465,8 +467,8 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
       kernel(state_, "verify_field", "verify_field");
   for (std::int64_t first = 0; first < g.views(); first += table.views) {
     fill(table, s, first);
-    kernel({{count(s.z_padded / 16), count((s.nx + 7) / 8), count(s.nx) * blocks},
-            {count(s.z_padded / 16), 1, 1}},
+    kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
+            {count((s.nx + 7) / 8), 1, 1}},
            values.buffer(), table.device.buffer(), device_steps.buffer(), first > 0 ? 1 : 0, to_int(first),
            to_int(std::min(table.views, g.views() - first)), to_int(g.views()), to_int(columns_),
            to_int(s.z_padded), to_int(s.nx), to_int(s.nx), to_int(static_cast<std::int64_t>(blocks)));

@@ -1,7 +1,7 @@
 // What `verify` computes on the device, apart from everything build uses but the sampler header: F at gold
 // nodes by six-point interpolation in u, |V - F| at the nodes of every tested brick, fourth differences of F,
 // and per gold cell the bound on |V - F| (docs/error-bounds.md, "What verify does").
-// Layouts: float table[view][fine column][z_padded]; float field[block][y + 2][x + 2][z_padded] with node z
+// Layouts: float table[view][z / 16][fine column][16]; float field[block][y + 2][x + 2][z_padded] with node z
 // at z + 2, two nodes of halo on every side; float error[item][y][x][error_padded], one item per tested
 // brick; int4 items[item] = brick x, y, z and its block; int4 first[block] = the block's first brick; uchar
 // tested[block][cell y][cell x]: columns of gold cells that can hold a covered point.
@@ -24,16 +24,16 @@ inline float largest_of(float16 v) {
 #define CLEAR(i, lane)              \
   float16 sum##i = (float16)(0.0f); \
   if (accumulate && x + i < nx) sum##i = vload16(0, target + (size_t)i * z_padded);
-#define ADD(i, lane)                                              \
-  {                                                               \
-    __global const float* q = plane + (size_t)at.lane * z_padded; \
-    float16 v = w0.lane * vload16(0, q);                          \
-    v = fma((float16)(w1.lane), vload16(0, q + z_padded), v);     \
-    v = fma((float16)(w2.lane), vload16(0, q + 2 * z_padded), v); \
-    v = fma((float16)(w3.lane), vload16(0, q + 3 * z_padded), v); \
-    v = fma((float16)(w4.lane), vload16(0, q + 4 * z_padded), v); \
-    v = fma((float16)(w5.lane), vload16(0, q + 5 * z_padded), v); \
-    sum##i += v;                                                  \
+#define ADD(i, lane)                                    \
+  {                                                     \
+    __global const float* q = plane + at.lane * 16;     \
+    float16 v = w0.lane * vload16(0, q);                \
+    v = fma((float16)(w1.lane), vload16(0, q + 16), v); \
+    v = fma((float16)(w2.lane), vload16(0, q + 32), v); \
+    v = fma((float16)(w3.lane), vload16(0, q + 48), v); \
+    v = fma((float16)(w4.lane), vload16(0, q + 64), v); \
+    v = fma((float16)(w5.lane), vload16(0, q + 80), v); \
+    sum##i += v;                                        \
   }
 #define PUT(i, lane) \
   if (x + i < nx) vstore16(sum##i, 0, target + (size_t)i * z_padded);
@@ -43,13 +43,14 @@ inline float largest_of(float16 v) {
 __kernel void verify_field(__global float* field, __global const float* table, __global const float4* steps,
                            int accumulate, int first_view, int views, int all_views, int columns,
                            int z_padded, int nx, int ny, int blocks) {
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1) * 8;
-  const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
-  if (z >= z_padded || x >= nx || block >= blocks) return;
+  // All columns of a block at 16 heights, then the next 16: what they read of the table stays in the cache.
+  const int x = (int)get_global_id(0) * 8, y = (int)get_global_id(1), chunks = z_padded / 16;
+  const int block = (int)get_global_id(2) / chunks, z = ((int)get_global_id(2) - block * chunks) * 16;
+  if (x >= nx || y >= ny || block >= blocks) return;
   __global float* target = field + (((size_t)block * ny + y) * nx + x) * z_padded + z;
   FOR_TILE(CLEAR)
   const float8 tile_x = (float)x + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-  __global const float* plane = table + z;
+  __global const float* plane = table + (size_t)z * columns;
   __global const float4* view = steps + (size_t)block * all_views + first_view;
   for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
     const float4 step = view[k];
@@ -197,12 +198,12 @@ inline float16 curvature(__global const float* p, int stride) {
 
 // Per column of gold cells of a tested brick: int4 {largest bound of |V - F| less the brick's constant, the
 // largest |V - F| at a corner, both as float bits; the cell that has the former, or -1; 0} and which cells
-// were tested, 16 bits to a word: int4 out[item][y][x], uint cells_tested[item][y][x][words]. `constant`:
+// were tested, 16 bits to a word: int4 out[item][y][x], uint cells_tested[item][y][x][words]. `widening`:
 // per item what the range of a cell is widened by beside its own T (for the window only).
 __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __global const float* error,
                            __global const float* field, __global const uchar* tested, VdvrGrid grid,
                            __global const int4* items, __global const int4* first,
-                           __global const float* constant, int rate, int nx, int ny, int z_padded,
+                           __global const float* widening, int rate, int nx, int ny, int z_padded,
                            int error_padded, int words, int z_first, int z_last, int windowed,
                            float window_low, float window_high, int count) {
   const int g = grid.granularity, cells = g * rate, side = cells + 1;
@@ -241,7 +242,7 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
       const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
       int16 counts = (k < end) & (k + z_begin >= z_first);
       if (windowed) {
-        const float16 more = t + constant[i];
+        const float16 more = t + widening[i];
         counts &= ~((low - more > window_high) | (high + more < window_low));
       }
       float16 total = e + t;

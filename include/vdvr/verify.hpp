@@ -15,7 +15,7 @@ namespace vdvr {
 
 struct VerifyOptions {
   bool exhaustive = false;  ///< every gold cell; otherwise a stratified sample of bricks and the worst ones
-  double fraction = 0.05;   ///< of the bricks, when not exhaustive
+  double fraction = 0.02;   ///< of the bricks, when not exhaustive
   unsigned seed = 1;
 };
 
