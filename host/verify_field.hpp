@@ -35,7 +35,8 @@ struct FieldBounds {
   using Pairs = std::array<std::array<double, 3>, 3>;
   double arithmetic = 0;       ///< |computed F - F| at any node: rounding and interpolation in u
   double differences = 0;      ///< rounding of second and fourth differences, and of the kernel's sums
-  double second = 0;           ///< sum over j of (h_j^6 / 90) sup |d_j^6 F|
+  float correction = 1;        ///< 1: second derivatives to fourth order in h, 0: plain second differences
+  double second = 0;           ///< what those err, summed over the axes: h^6 / 90 or h^4 / 12 times a sup
   Pairs rise{}, everywhere{};  ///< of h_i^2 h_j^2 |F_iijj|: above its largest difference at nodes; anywhere
 };
 

@@ -174,26 +174,28 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
 
 // --- cells ------------------------------------------------------------------------------------------------
 
-// h^2 times the second derivative to fourth order: second difference less a twelfth of the fourth.
-inline float16 curvature(__global const float* p, int stride) {
+// h^2 times the second derivative: the second difference less `correction` twelfths of the fourth.
+inline float16 curvature(__global const float* p, int stride, float correction) {
   const float16 c = vload16(0, p), low = vload16(0, p - stride), high = vload16(0, p + stride);
-  const float16 outer = (vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high);
-  return 1.25f * ((low - c) + (high - c)) - outer * (1.0f / 12.0f);
+  const float16 outer = (vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high),
+                inner = (low - c) + (high - c);
+  return inner + (3.0f * inner - outer) * (correction * (1.0f / 12.0f));
 }
-#define CORNER(dx, dy, dz)                                                                   \
-  {                                                                                          \
-    __global const float* p = at + (dy)*row + (dx)*z_padded + (dz);                          \
-    const float16 cx = curvature(p, z_padded), cy = curvature(p, row), cz = curvature(p, 1); \
-    px = fmax(px, cx);                                                                       \
-    mx = fmin(mx, cx);                                                                       \
-    py = fmax(py, cy);                                                                       \
-    my = fmin(my, cy);                                                                       \
-    pz = fmax(pz, cz);                                                                       \
-    mz = fmin(mz, cz);                                                                       \
-    const float16 v = vload16(0, p);                                                         \
-    low = fmin(low, v);                                                                      \
-    high = fmax(high, v);                                                                    \
-    e = fmax(e, vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz)));                 \
+#define CORNER(dx, dy, dz)                                                                     \
+  {                                                                                            \
+    __global const float* p = at + (dy)*row + (dx)*z_padded + (dz);                            \
+    const float16 cx = curvature(p, z_padded, correction), cy = curvature(p, row, correction), \
+                  cz = curvature(p, 1, correction);                                            \
+    px = fmax(px, cx);                                                                         \
+    mx = fmin(mx, cx);                                                                         \
+    py = fmax(py, cy);                                                                         \
+    my = fmin(my, cy);                                                                         \
+    pz = fmax(pz, cz);                                                                         \
+    mz = fmin(mz, cz);                                                                         \
+    const float16 v = vload16(0, p);                                                           \
+    low = fmin(low, v);                                                                        \
+    high = fmax(high, v);                                                                      \
+    e = fmax(e, vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz)));                   \
   }
 
 // Per column of gold cells of a tested brick: int4 {largest bound of |V - F| less the brick's constant, the
@@ -205,7 +207,7 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
                            __global const int4* items, __global const int4* first,
                            __global const float* widening, int rate, int nx, int ny, int z_padded,
                            int error_padded, int words, int z_first, int z_last, int windowed,
-                           float window_low, float window_high, int count) {
+                           float window_low, float window_high, float correction, int count) {
   const int g = grid.granularity, cells = g * rate, side = cells + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
   if (x >= cells || y >= cells || i >= count) return;
