@@ -272,7 +272,7 @@ BOOST_AUTO_TEST_CASE(altered_sample_is_found_and_named) {
   const Made& m = small();
   const std::size_t brick = brick_with_tile(m.volume);
   MixedVolume altered = m.volume;
-  middle_sample(altered, brick) += static_cast<float>(2.5 * m.certificate.epsilon_abs);
+  middle_sample(altered, brick) += static_cast<float>(1.5 * m.certificate.epsilon_abs);
   const VerifyResult r = measured(m, altered, m.certificate);
   BOOST_TEST(!r.holds);
   BOOST_TEST(r.worst.brick == static_cast<std::int64_t>(brick));
@@ -385,7 +385,7 @@ BOOST_AUTO_TEST_CASE(program_says_what_is_wrong_with_a_file_and_where) {
 
   MixedVolume altered = original.volume;
   const std::size_t brick = brick_with_tile(altered);
-  middle_sample(altered, brick) += static_cast<float>(2.5 * epsilon);
+  middle_sample(altered, brick) += static_cast<float>(1.5 * epsilon);
   write_vdvr(bad, altered, original.certificate);
   const Result mismatch = run(folder, "verify " + bad + with);
   BOOST_TEST(mismatch.code == 1);
