@@ -1,5 +1,5 @@
-// Measures a stored certificate again: gold, T and P from the projections, V through the shared sampler.
-// Shares nothing with build.cpp but the gold stream and that sampler.
+// Measures a stored certificate again (docs/error-bounds.md, "What verify does"). Shares with build only the
+// sampler header and what describes the scan: view weights, ramp kernel, covered region.
 #include "vdvr/verify.hpp"
 
 #include <fmt/format.h>
@@ -10,10 +10,11 @@
 #include <numeric>
 #include <random>
 
-#include "host/gold_stream.hpp"
 #include "host/sampler_terms.hpp"
-#include "host/worst_node.hpp"
+#include "host/verify_field.hpp"
+#include "host/verify_seams.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
@@ -21,9 +22,13 @@ namespace {
 
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-bool meets(const MixedVolume& v, std::int64_t brick, const std::array<double, 6>& roi) {
+Index3 place_of(const MixedVolume& v, std::int64_t brick) {
   const Index3 n = v.bricks();
-  const Index3 p{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+  return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+}
+
+bool meets(const MixedVolume& v, std::int64_t brick, const std::array<double, 6>& roi) {
+  const Index3 p = place_of(v, brick);
   for (std::size_t a = 0; a < 3; ++a) {
     const double low = v.grid.origin[a] + static_cast<double>(p[a] * v.granularity) * v.grid.spacing[a];
     const double high =
@@ -34,24 +39,38 @@ bool meets(const MixedVolume& v, std::int64_t brick, const std::array<double, 6>
   return true;
 }
 
+// The layers of bricks a sample is drawn from: each costs the filtered rows of its heights, so they are few.
+// The certificate's worst node is in one of them, the others are spread over the volume.
+std::vector<std::int64_t> layers_to_sample(std::int64_t count, std::int64_t worst, std::mt19937& random) {
+  constexpr std::int64_t most = 3;
+  std::vector<std::int64_t> layers{worst};
+  const std::int64_t others = std::min(count, most) - 1;
+  for (std::int64_t i = 0; i < others; ++i) {
+    const std::int64_t first = i * count / others, last = (i + 1) * count / others - 1;
+    const std::int64_t layer =
+        std::uniform_int_distribution<std::int64_t>(first, std::max(first, last))(random);
+    if (std::find(layers.begin(), layers.end(), layer) == layers.end()) layers.push_back(layer);
+  }
+  return layers;
+}
+
 // Every brick, or for each level the wanted share of its bricks and the one that holds the certificate's
 // worst node.
 std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate& stored,
                                         const VerifyOptions& options) {
   const std::size_t n = v.level.size();
   std::vector<std::uint8_t> selected(n, options.exhaustive ? 1 : 0);
+  const auto wanted_by_roi = [&](std::size_t i) {
+    return !stored.roi || meets(v, static_cast<std::int64_t>(i), *stored.roi);
+  };
   if (!options.exhaustive) {
-    // A few layers of bricks, so that few slabs have to be filtered; every level in each of them.
-    const Index3 counts = v.bricks();
-    std::vector<std::int64_t> layers(at(counts[2]));
-    std::iota(layers.begin(), layers.end(), std::int64_t{0});
+    const Index3 counts = v.bricks(), worst = brick_at(v, stored.worst_at);
     std::mt19937 random(options.seed);
-    std::shuffle(layers.begin(), layers.end(), random);
-    layers.resize(std::min<std::size_t>(layers.size(), 5));
+    std::vector<std::int64_t> layers = layers_to_sample(counts[2], worst[2], random);
     std::map<LevelTriple, std::vector<std::size_t>> strata;
     for (const std::int64_t z : layers)
       for (std::int64_t i = z * counts[0] * counts[1]; i < (z + 1) * counts[0] * counts[1]; ++i)
-        strata[v.level[at(i)]].push_back(at(i));
+        if (wanted_by_roi(at(i))) strata[v.level[at(i)]].push_back(at(i));
     const double share =
         options.fraction * static_cast<double>(counts[2]) / static_cast<double>(layers.size());
     for (auto& [level, members] : strata) {
@@ -60,13 +79,83 @@ std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate&
           8, static_cast<std::size_t>(std::ceil(share * static_cast<double>(members.size()))));
       for (std::size_t i = 0; i < std::min(wanted, members.size()); ++i) selected[members[i]] = 1;
     }
-    const Index3 b = brick_at(v, stored.worst_at);
-    selected[at((b[2] * counts[1] + b[1]) * counts[0] + b[0])] = 1;
+    selected[at((worst[2] * counts[1] + worst[1]) * counts[0] + worst[0])] = 1;
   }
-  if (stored.roi)
-    for (std::size_t i = 0; i < n; ++i)
-      if (!meets(v, static_cast<std::int64_t>(i), *stored.roi)) selected[i] = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (!wanted_by_roi(i)) selected[i] = 0;
   return selected;
+}
+
+// The corner of a gold cell where V is farthest from F, and the stored sample nearest to it.
+SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int64_t brick,
+                         const Index3& cell) {
+  const Index3 b = place_of(v, brick);
+  const VdvrBrick record = brick_record(v, tile_offsets(v), b[0], b[1], b[2]);
+  SamplePlace p;
+  p.brick = brick;
+  p.brick_at = b;
+  p.level = v.level[at(brick)];
+  const bool base = p.level == LevelTriple{0, 0, 0};
+  const float* samples =
+      base ? v.base.data() + record.offset
+           : v.tiles.at(p.level).data() + static_cast<std::int64_t>(v.tile[at(brick)]) * v.tile_size(p.level);
+  const std::array<std::uint32_t, 3> levels{record.level_x, record.level_y, record.level_z};
+  std::vector<Vec3> points;
+  std::vector<double> values;
+  std::vector<Index3> nodes;
+  for (std::int64_t corner = 0; corner < 8; ++corner) {
+    std::array<VdvrLocal, 3> local{};
+    Vec3 world{};
+    Index3 node{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      node[a] = cell[a] + (corner >> a & 1);
+      const double c = static_cast<double>(b[a] * v.granularity) + static_cast<double>(node[a]) / v.rate;
+      local[a] = vdvr_local(static_cast<float>(c), static_cast<vdvr_i32>(b[a]), levels[a], v.granularity,
+                            static_cast<vdvr_i32>(v.grid.cells[a]));
+      world[a] = v.grid.origin[a] + c * v.grid.spacing[a];
+    }
+    nodes.push_back(node);
+    points.push_back(world);
+    values.push_back(static_cast<double>(
+        vdvr_sample_in_brick(samples, record.stride_y, record.stride_z, local[0], local[1], local[2])));
+  }
+  const std::vector<double> F = field.at(points);
+  std::size_t worst = 0;
+  for (std::size_t i = 1; i < 8; ++i)
+    if (std::abs(values[i] - F[i]) > std::abs(values[worst] - F[worst])) worst = i;
+  p.world = points[worst];
+  p.value = values[worst];
+  p.field = F[worst];
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t per_sample = v.rate >> levels[a];
+    p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? b[a] * v.granularity : 0);
+  }
+  p.dataset = base ? "/base" : fmt::format("/tiles/{}{}{}", p.level[0], p.level[1], p.level[2]);
+  p.tile = base ? 0 : v.tile[at(brick)];
+  return p;
+}
+
+std::string place_text(const SamplePlace& p) {
+  const std::string where = p.dataset == "/base" ? p.dataset : fmt::format("{} tile {}", p.dataset, p.tile);
+  return fmt::format(
+      "at ({:.4f}, {:.4f}, {:.4f}), where V is {:.6g} and F {:.6g}: brick {} of level ({}, {}, {}), {} "
+      "sample ({}, {}, {}) (z, y, x)",
+      p.world[0], p.world[1], p.world[2], p.value, p.field, p.brick, p.level[0], p.level[1], p.level[2],
+      where, p.sample[2], p.sample[1], p.sample[0]);
+}
+
+// Which samplers must hold: those promised that this device has.
+void judge(const Certificate& stored, const SamplerTerms& sampler, VerifyResult& r) {
+  r.total_buffer = r.measured_total + sampler.buffer.value;
+  if (sampler.image3d) r.total_image3d = r.measured_total + sampler.image3d->value;
+  r.total = r.total_buffer;
+  if (stored.holds_buffer) r.holds_buffer = r.total_buffer <= stored.epsilon_abs;
+  if (stored.holds_image3d.value_or(false) && r.total_image3d) {
+    r.holds_image3d = *r.total_image3d <= stored.epsilon_abs;
+    r.total = std::max(r.total, *r.total_image3d);
+  }
+  if (!r.holds_buffer && !r.holds_image3d) r.failure = "the certificate holds for no sampler of this device";
+  else r.holds = r.holds_buffer.value_or(true) && r.holds_image3d.value_or(true);
 }
 
 }  // namespace
@@ -77,63 +166,68 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;
   check_scan(used);
-  FilteredScan filtered = filter_projections(state, scan, stored.field);
-  measure_filter_error(filtered, scan, stored.field);
-  Upsampler upsampler(state, filtered);
-  const FieldSups sups = field_sups(state, upsampler, filtered);
-  GoldStream stream(
-      state, filtered, upsampler, sups,
-      {volume.grid, volume.granularity, volume.rate, stored.upsampling_u, stored.u_filter, stored.window});
-
+  const std::uint64_t bytes = static_cast<std::uint64_t>(scan.size()) * sizeof(double);
+  state.memory.take(bytes, "cosine coefficients of the filtered projections");
+  struct Give {
+    opencl::State& state;
+    std::uint64_t bytes;
+    ~Give() { state.memory.give(bytes); }
+  } const give{state, bytes};
+  const ExactField exact(scan, stored.field, progress);
   const SamplerTerms sampler =
       sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device), longest_atlas(device.info()));
-  const double others =
-      stream.arithmetic() + std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+
   VerifyResult result;
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
-  const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
-  const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
-                                                          "bricks to verify");
-  const DeviceField field(state, volume);
   std::int64_t worst = -1;
-  float worst_total = -1;
-  const std::int64_t nodes_per_side = std::int64_t{volume.granularity} * volume.rate + 1;
-  stream.run(
-      selected,
-      [&](GoldStream::Batch& batch) {
-        for (const BrickMeasure& m :
-             batch.measure(field, static_cast<float>(stored.epsilon_abs - others), device_selected)) {
-          if (m.total < 0) continue;
+  Index3 worst_cell{};
+  {
+    VerifyField field(state, exact, volume, stored.window, progress);
+    field.run(
+        chosen_bricks(volume, stored, options),
+        [&](const VerifyField::Brick& b) {
+          if (b.total < 0) return;
           ++result.bricks_tested;
-          result.nodes_tested += nodes_per_side * nodes_per_side * nodes_per_side;
-          result.measured_max = std::max(result.measured_max, static_cast<double>(m.error));
-          if (!(m.total <= worst_total)) {
-            worst_total = m.total;
-            worst = m.brick;
-          }
-        }
-      },
-      progress, "verify");
+          result.cells_tested += b.cells;
+          result.nodes_tested += b.nodes;
+          result.measured_max = std::max(result.measured_max, b.error);
+          if (b.total <= result.measured_total && worst >= 0) return;
+          result.measured_total = b.total;
+          worst = b.brick;
+          worst_cell = b.worst_cell;
+        },
+        progress);
+    result.arithmetic = field.arithmetic();
+  }
   if (worst < 0) {
-    result.failure = "no tested brick holds a covered gold node";
+    result.failure = "no tested brick holds a covered gold cell";
     return result;
   }
-  std::vector<std::uint8_t> one(selected.size(), 0);
-  one[at(worst)] = 1;
-  stream.run(
-      one, [&](GoldStream::Batch& batch) { result.worst_at = worst_node(batch, volume, worst); }, {},
-      "worst");
-  result.measured_total = static_cast<double>(worst_total);
-  result.total = result.measured_total + others;
-  result.holds = result.total <= stored.epsilon_abs;
-  if (!result.holds) {
-    const LevelTriple& l = volume.level[at(worst)];
-    result.failure = fmt::format(
-        "|V - F| may reach {:.6g} > epsilon {:.6g} at ({:.4f}, {:.4f}, {:.4f}), brick {} of level ({}, {}, "
-        "{})",
-        result.total, stored.epsilon_abs, result.worst_at[0], result.worst_at[1], result.worst_at[2], worst,
-        l[0], l[1], l[2]);
+  result.worst = worst_sample(volume, exact, worst, worst_cell);
+  result.worst_at = result.worst.world;
+  judge(stored, sampler, result);
+  if (!result.holds && result.failure.empty())
+    result.failure = fmt::format("|V - F| may reach {:.6g} > epsilon {:.6g} {}", result.total,
+                                 stored.epsilon_abs, place_text(result.worst));
+  // Nodes are where V is certified without T: no total can lie below what is measured there.
+  const double promised = std::max(stored.total_buffer, stored.total_image3d.value_or(stored.total_buffer));
+  if (result.holds && !(result.measured_max - result.arithmetic <= promised)) {
+    result.holds = false;
+    result.failure = fmt::format("|V - F| reaches {:.6g}, above the total {:.6g} of the certificate, {}",
+                                 result.measured_max, promised, place_text(result.worst));
+  }
+  if (options.exhaustive) {
+    const Seams seams = compare_seams(volume);
+    result.seams = seams.different;
+    if (seams.different > 0) {
+      result.holds = false;
+      result.failure += fmt::format(
+          "{}{} samples that two bricks share differ, first at ({:.4f}, {:.4f}, {:.4f}) between bricks {} "
+          "and {}",
+          result.failure.empty() ? "" : "; ", seams.different, seams.at[0], seams.at[1], seams.at[2],
+          seams.bricks[0], seams.bricks[1]);
+    }
   }
   return result;
 }

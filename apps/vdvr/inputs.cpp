@@ -1,6 +1,10 @@
 #include "apps/vdvr/inputs.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include <nlohmann/json.hpp>
 
@@ -48,26 +52,54 @@ double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {
   return field.center.value_or(geometry.center);
 }
 
-void check_certificate(const fs::path& path, const VdvrFile& file) {
-  const Certificate& c = file.certificate;
+std::string altered_content(const VdvrFile& file) {
   const std::string found = content_sha256(file.volume);
-  if (found != c.content_sha256)
-    throw MismatchError(
-        fmt::format("{}: the content has sha256 {}, but its certificate was issued for {}; build it again",
-                    path.string(), found, c.content_sha256));
+  if (found == file.certificate.content_sha256) return {};
+  return fmt::format(
+      "the content does not match its hash: it has sha256 {}, but its certificate was issued for {}", found,
+      file.certificate.content_sha256);
+}
+
+void check_consistency(const fs::path& path, const Certificate& c) {
+  const auto contradicts = [&](const std::string& what) {
+    throw MismatchError(fmt::format("{}: the certificate contradicts itself: {}", path.string(), what));
+  };
   const bool buffer_fits = c.total_buffer <= c.epsilon_abs;
   const bool image_fits =
       !c.total_image3d || !c.holds_image3d || *c.holds_image3d == (*c.total_image3d <= c.epsilon_abs);
   if (c.holds_buffer != buffer_fits || !image_fits)
-    throw MismatchError(fmt::format(
-        "{}: the certificate contradicts itself: 'holds' does not follow from total and epsilon_abs {}",
-        path.string(), c.epsilon_abs));
+    contradicts(fmt::format("'holds' does not follow from total and epsilon_abs {}", c.epsilon_abs));
+  // Written with all digits: what differs in the tenth was not written together.
+  const auto same = [](double a, double b) {
+    return std::abs(a - b) <= 1e-10 * std::max(std::abs(a), std::abs(b));
+  };
+  if (c.reference_range > 0 && !same(c.epsilon * c.reference_range, c.epsilon_abs))
+    contradicts(fmt::format("epsilon_abs {} is not epsilon {} of the reference range {}", c.epsilon_abs,
+                            c.epsilon, c.reference_range));
+  const double sum = c.measured_total + c.budget.arithmetic.value;
+  if (!same(c.total_buffer, sum + c.budget.sampler.buffer.value))
+    contradicts(fmt::format("total {} of the buffer sampler is not measured_total, arithmetic and sampler",
+                            c.total_buffer));
+  if (c.total_image3d && c.budget.sampler.image3d &&
+      !same(*c.total_image3d, sum + c.budget.sampler.image3d->value))
+    contradicts(fmt::format("total {} of the image3d sampler is not measured_total, arithmetic and sampler",
+                            *c.total_image3d));
+}
+
+void check_certificate(const fs::path& path, const VdvrFile& file) {
+  if (const std::string altered = altered_content(file); !altered.empty())
+    throw MismatchError(fmt::format("{}: {}; build it again", path.string(), altered));
+  check_consistency(path, file.certificate);
 }
 
 void check_input(const fs::path& path, const ProjectionSet& scan, const Certificate& c) {
   if (scan.report.sha256 == c.input_sha256) return;
-  throw MismatchError(fmt::format("{}: has sha256 {}, but the volume was built from {} with {}",
-                                  path.string(), scan.report.sha256, c.input_name, c.input_sha256));
+  throw MismatchError(fmt::format(
+      "{}: these are other projections: found {} of {} x {} x {} (views, rows, columns), sha256 {}; the "
+      "volume "
+      "was built from {} of {} with sha256 {}",
+      path.string(), scan.report.name, scan.geometry.views(), scan.geometry.rows, scan.geometry.columns,
+      scan.report.sha256, c.input_name, fmt::join(c.input_shape, " x "), c.input_sha256));
 }
 
 std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate) {

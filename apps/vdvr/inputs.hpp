@@ -26,7 +26,11 @@ ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args
 /// The centre that defines F: the field's, else the scan's.
 double center_of(const FieldOptions& field, const ParallelGeometry& geometry);
 
-/// Throws MismatchError when the content is not what the certificate was issued for, or the certificate
+/// What to say when the content is not the one that was certified; empty when it is.
+std::string altered_content(const VdvrFile& file);
+/// Throws MismatchError when the certificate's own numbers do not follow from each other.
+void check_consistency(const std::filesystem::path& path, const Certificate& certificate);
+/// Both: throws MismatchError when the content is not what the certificate was issued for, or the certificate
 /// contradicts itself.
 void check_certificate(const std::filesystem::path& path, const VdvrFile& file);
 /// Throws MismatchError when the projections are not those the volume was built from.

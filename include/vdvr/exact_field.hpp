@@ -23,10 +23,16 @@ class ExactField {
 
   [[nodiscard]] bool covered(const Vec3& point) const;
   [[nodiscard]] const ParallelGeometry& geometry() const { return geometry_; }
+  /// Cosine coefficients of the filtered projections times their weights: double [view][m][l], m along u, l
+  /// along v.
+  [[nodiscard]] std::span<const double> coefficients() const { return coefficients_; }
+  /// Bounds the double-precision rounding of the coefficients and of sums over them, at any point.
+  [[nodiscard]] double rounding() const { return rounding_; }
 
  private:
   ParallelGeometry geometry_;
   std::vector<double> coefficients_;  ///< [view][column coefficient m][row coefficient l], weights included
+  double rounding_ = 0;
 };
 
 }  // namespace vdvr

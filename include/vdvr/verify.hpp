@@ -1,5 +1,9 @@
-// The certificate measured again, from the projections and the packed volume alone.
+// The certificate measured again, from the projections and the packed volume alone, by a path of its own: F
+// from double-precision cosine coefficients, V by the sampler header, one bound per gold cell
+// (docs/error-bounds.md, "What verify does").
 #pragma once
+
+#include <optional>
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
@@ -10,22 +14,47 @@
 namespace vdvr {
 
 struct VerifyOptions {
-  bool exhaustive = false;  ///< every gold node; otherwise a stratified sample of bricks and the worst ones
-  double fraction = 0.05;   ///< of the bricks, when not exhaustive
+  bool exhaustive = false;  ///< every gold cell; otherwise a stratified sample of bricks and the worst ones
+  double fraction = 0.02;   ///< of the bricks, when not exhaustive
   unsigned seed = 1;
+};
+
+/// A stored sample and how the file names it.
+struct SamplePlace {
+  Vec3 world{0, 0, 0};
+  std::int64_t brick = -1;  ///< (z * bricks_y + y) * bricks_x + x
+  Index3 brick_at{0, 0, 0};
+  LevelTriple level{0, 0, 0};   ///< z, y, x
+  std::string dataset;          ///< "/base" or "/tiles/ZYX"
+  std::int64_t tile = 0;        ///< of that dataset; 0 in the base
+  Index3 sample{0, 0, 0};       ///< x, y, z inside the tile, or of the base
+  double value = 0, field = 0;  ///< V and F at `world`
 };
 
 struct VerifyResult {
   bool holds = false;
   double epsilon_abs = 0;
-  double measured_max = 0, measured_total = 0, total = 0;
+  double measured_max = 0;    ///< largest |V - F| at a tested gold node
+  double measured_total = 0;  ///< largest bound of |V - F| over a tested gold cell, exact interpolation of V
+  double arithmetic = 0;      ///< what verify's own computation of F may err; contained in measured_total
+  double total = 0;           ///< measured_total and the worst sampler that the certificate names
+  double total_buffer = 0;
+  std::optional<double> total_image3d;              ///< absent where this device has no such sampler
+  std::optional<bool> holds_buffer, holds_image3d;  ///< absent where not promised or not on this device
   Vec3 worst_at{0, 0, 0};
-  std::int64_t bricks_tested = 0, bricks = 0, nodes_tested = 0;
-  std::string failure;  ///< one line: what does not match, and where; empty when it holds
+  SamplePlace worst;  ///< the stored sample nearest to the worst corner of the worst gold cell
+  std::int64_t bricks_tested = 0, bricks = 0;
+  std::int64_t nodes_tested = 0;  ///< distinct gold nodes, counted once per brick that they belong to
+  std::int64_t cells_tested = 0;  ///< gold cells
+  std::int64_t seams = 0;         ///< samples that two bricks store with different bits (exhaustive only)
+  std::string failure;            ///< one line: what does not match, and where; empty when it holds
 };
 
-/// Recomputes gold and P and T from `scan` with the rates and field options of `stored`, samples `volume`
-/// with the shared sampler, and compares. Does not check hashes: the caller does, from the file.
+/// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
+/// cell, V through the sampler header. Requires the samplers that `stored` says hold and that this device
+/// has. Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on the
+/// host, then 7 * views multiply-adds per gold node on the device. Throws ResourceError when --max-memory is
+/// too small for one brick and one view.
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                     const Certificate& stored, const VerifyOptions& options = {},
                     const Progress& progress = {});

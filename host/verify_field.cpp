@@ -1,0 +1,600 @@
+// F on gold nodes for `verify`, and bounds cell by cell. Double precision on the host up to the table of fine
+// columns, fp32 on the device from there on.
+#include "host/verify_field.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "host/opencl/kernel.hpp"
+#include "host/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double u = 0x1p-24;            // rounding unit of fp32
+constexpr std::int64_t density = 12;     // fine columns per detector column
+constexpr std::int64_t sup_density = 3;  // points per pixel where sups are sampled
+constexpr std::int64_t halo = 2;         // of gold nodes: RADIUS of the kernel
+constexpr std::int64_t lanes = 8;        // rows summed side by side on the host
+constexpr std::int64_t room = 64;        // floats after a buffer's end that 16-lane reads may touch
+
+cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
+
+/// Host memory counted against --max-memory.
+class HostShare {
+ public:
+  HostShare(opencl::State& state, std::uint64_t bytes, const std::string& what)
+      : state_(state), bytes_(bytes) {
+    state.memory.take(bytes, what);
+  }
+  ~HostShare() { state_.memory.give(bytes_); }
+  HostShare(const HostShare&) = delete;
+  HostShare& operator=(const HostShare&) = delete;
+
+ private:
+  opencl::State& state_;
+  std::uint64_t bytes_;
+};
+
+// line[m][row] = sum over l of a[m][l] cos(l y_row) weight(l), for rows (a multiple of `lanes`) given by the
+// cosines basis[l][row].
+void cosine_rows(const double* a, std::int64_t U, std::int64_t V, const std::vector<double>& basis,
+                 std::int64_t rows, std::vector<double>& line) {
+  for (std::int64_t m = 0; m < U; ++m)
+    for (std::int64_t r = 0; r < rows; r += lanes) {
+      std::array<double, lanes> sum{};
+      for (std::int64_t l = 0; l < V; ++l) {
+        const double c = a[m * V + l];
+        const double* b = basis.data() + l * rows + r;
+        for (std::size_t i = 0; i < lanes; ++i) sum[i] += c * b[i];
+      }
+      std::copy(sum.begin(), sum.end(), line.begin() + m * rows + r);
+    }
+}
+
+// Calls put(n, row, values of `lanes` rows) for 0 <= n <= steps * U: the sums over m of line[m][row] cos(m pi
+// n / (steps U)). cos(m (pi - x)) = (-1)^m cos(m x): odd and even m apart give two columns at once.
+template <class Put>
+void cosine_columns(const std::vector<double>& line, std::int64_t U, std::int64_t rows, std::int64_t steps,
+                    const std::vector<double>& cosine, Put&& put) {
+  const std::int64_t last = steps * U, period = 2 * last;
+  std::vector<double> c(at(U));
+  for (std::int64_t n = 0; 2 * n <= last; ++n) {
+    for (std::int64_t m = 0, i = 0; m < U; ++m) {
+      c[at(m)] = cosine[at(i)];
+      i += n;
+      if (i >= period) i -= period;
+    }
+    for (std::int64_t r = 0; r < rows; r += lanes) {
+      std::array<double, lanes> even{}, odd{}, low{}, high{};
+      const double* p = line.data() + r;
+      std::int64_t m = 0;
+      for (; m + 1 < U; m += 2, p += 2 * rows)
+        for (std::size_t i = 0; i < lanes; ++i) {
+          even[i] += c[at(m)] * p[i];
+          odd[i] += c[at(m + 1)] * p[at(rows) + i];
+        }
+      if (m < U)
+        for (std::size_t i = 0; i < lanes; ++i) even[i] += c[at(m)] * p[i];
+      for (std::size_t i = 0; i < lanes; ++i) {
+        low[i] = even[i] + odd[i];
+        high[i] = even[i] - odd[i];
+      }
+      put(n, r, low);
+      put(last - n, r, high);
+    }
+  }
+}
+
+// cos(pi i / half) for 0 <= i < 2 half.
+std::vector<double> cosine_period(std::int64_t half) {
+  std::vector<double> table(at(2 * half));
+  for (std::int64_t i = 0; i < 2 * half; ++i)
+    table[at(i)] = std::cos(pi * static_cast<double>(i) / static_cast<double>(half));
+  return table;
+}
+
+}  // namespace
+
+ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& g,
+                   const Progress& progress) {
+  const std::int64_t U = g.columns, V = g.rows, K = g.views();
+  // One row does not vary along v. Else rows at every third of a pixel, from edge to edge of the half period.
+  const std::int64_t heights = V == 1 ? 1 : sup_density * V + 1,
+                     rows = std::min<std::int64_t>(up(heights, lanes), 64);
+  const auto cosine_u = cosine_period(sup_density * U), cosine_v = cosine_period(sup_density * V);
+  const double factor_u = 1 / std::cos(pi / static_cast<double>(2 * sup_density)),
+               factor = (1 + 1e-9) * factor_u * (V == 1 ? 1 : factor_u);
+  const double wave_u = pi / (static_cast<double>(U) * g.pitch_u),
+               wave_v = pi / (static_cast<double>(V) * g.pitch_v);
+  ViewSups sups{std::vector<double>(at(K)), std::vector<double>(at(K)), std::vector<double>(at(K))};
+  parallel_for(K, progress, "sups", [&](std::int64_t k) {
+    const double* a = coefficients.data() + k * U * V;
+    std::vector<double> basis(at(V * rows)), basis_vv(at(V * rows)), line(at(U * rows));
+    const auto largest = [&](double sup) {
+      cosine_columns(line, U, rows, sup_density, cosine_u,
+                     [&](std::int64_t, std::int64_t, const std::array<double, lanes>& values) {
+                       for (const double v : values) sup = std::max(sup, std::abs(v));
+                     });
+      return sup;
+    };
+    for (std::int64_t first = 0; first < heights; first += rows) {
+      for (std::int64_t l = 0; l < V; ++l)
+        for (std::int64_t r = 0; r < rows; ++r) {
+          const std::int64_t j = std::min(first + r, heights - 1);
+          const double c = cosine_v[at(l * j % (2 * sup_density * V))], w = static_cast<double>(l) * wave_v;
+          basis[at(l * rows + r)] = c;
+          basis_vv[at(l * rows + r)] = c * w * w;
+        }
+      cosine_rows(a, U, V, basis_vv, rows, line);
+      sups.second_v[at(k)] = largest(sups.second_v[at(k)]);
+      cosine_rows(a, U, V, basis, rows, line);
+      sups.value[at(k)] = largest(sups.value[at(k)]);
+      for (std::int64_t m = 0; m < U; ++m) {
+        const double w = static_cast<double>(m) * wave_u;
+        for (std::int64_t r = 0; r < rows; ++r) line[at(m * rows + r)] *= w * w;
+      }
+      sups.second_u[at(k)] = largest(sups.second_u[at(k)]);
+    }
+    sups.value[at(k)] *= factor;
+    sups.second_u[at(k)] *= factor;
+    sups.second_v[at(k)] *= factor;
+  });
+  return sups;
+}
+
+FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
+                         double reach) {
+  const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
+  const std::size_t K = sups.value.size();
+  // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.
+  const auto derivative = [&](std::size_t k, int a, int b) {
+    double sup = INFINITY;
+    if (a >= 2) sup = sups.second_u[k] * std::pow(wu, a / 2 - 1) * std::pow(wv, b / 2);
+    if (b >= 2) sup = std::min(sup, sups.second_v[k] * std::pow(wu, a / 2) * std::pow(wv, b / 2 - 1));
+    return sup;
+  };
+  // Sum over the views of the sup of d_x^n0 d_y^n1 d_z^n2 q_k(t_k, z), times h^n.
+  const auto sup_of = [&](const std::array<int, 3>& n) {
+    double sum = 0;
+    for (std::size_t k = 0; k < K; ++k)
+      sum += std::pow(std::abs(std::cos(g.theta_rad[k])), n[0]) *
+             std::pow(std::abs(std::sin(g.theta_rad[k])), n[1]) * derivative(k, n[0] + n[1], n[2]);
+    return sum * std::pow(h[0], n[0]) * std::pow(h[1], n[1]) * std::pow(h[2], n[2]);
+  };
+  FieldBounds b;
+  double S = 0, S_uu = 0, S_6 = 0;
+  for (std::size_t k = 0; k < K; ++k) {
+    S += sups.value[k];
+    S_uu += sups.second_u[k];
+    S_6 += derivative(k, 6, 0);
+  }
+  const double d = g.pitch_u / static_cast<double>(density),
+               slope = std::min(pi / g.pitch_u * S, std::sqrt(2 * S * S_uu));
+  const double columns = static_cast<double>(density * (g.columns + 2));
+  b.arithmetic = u * (28 + 1.01 * static_cast<double>(K)) * S +
+                 (u * (4 * reach + 6) + 0x1p-48 * columns) * d * slope +
+                 3.515625 / 720 * std::pow(d, 6) * S_6 + host_rounding;
+  b.differences = 40 * u * S;
+  double plain = 0;
+  for (std::size_t j = 0; j < 3; ++j) {
+    std::array<int, 3> six{};
+    six[j] = 6;
+    b.second += sup_of(six) / 90;
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::array<int, 3> four{};
+      four[j] += 2;
+      four[i] += 2;
+      b.everywhere[j][i] = sup_of(four);
+      const auto more = [&](std::size_t axis) {
+        std::array<int, 3> n = four;
+        n[axis] += 2;
+        return sup_of(n);
+      };
+      // From the difference to the derivative at a node, then from the nodes to all of the cell.
+      b.rise[j][i] = i == j ? more(j) / 6 : (more(j) + more(i)) / 12;
+      for (std::size_t axis = 0; axis < 3; ++axis) b.rise[j][i] += more(axis) / 8;
+    }
+    plain += b.everywhere[j][j] / 12;
+  }
+  // On coarse gold the sixth derivatives weigh more than what the fourth differences gain.
+  if (plain < b.second) {
+    b.second = plain;
+    b.correction = 0;
+  }
+  return b;
+}
+
+double brick_constant(const FieldBounds& b, const std::array<double, 6>& fourth) {
+  constexpr std::array<std::array<std::size_t, 3>, 3> place{{{0, 3, 4}, {3, 1, 5}, {4, 5, 2}}};
+  double rises = 0;
+  for (std::size_t j = 0; j < 3; ++j)
+    for (std::size_t i = 0; i < 3; ++i)
+      rises += std::min(fourth[place[j][i]] + 16 * b.arithmetic + b.differences + b.rise[j][i],
+                        b.everywhere[j][i]);
+  return (b.second + rises / 8) / 8 + 2 * b.arithmetic + b.differences;
+}
+
+/// How the selected bricks are cut into pieces that are computed at once.
+struct VerifyField::Shape {
+  std::int64_t width = 1, height = 1;  // bricks per block across z, bricks per slab along z
+  std::int64_t cells = 1;              // gold cells of a brick's side
+  std::int64_t nx = 0, nz = 0, z_padded = 0, error_padded = 0, words = 0;
+  std::int64_t slab_z = 0;  // first brick layer
+  FieldBounds bounds;
+};
+
+struct VerifyField::Batch {
+  std::vector<cl_int4> first, items;
+  std::vector<std::int64_t> bricks;  // of the items
+  std::vector<std::uint8_t> tested;  // [block][y][x] gold cell columns
+};
+
+VerifyField::VerifyField(opencl::State& state, const ExactField& field, const MixedVolume& volume,
+                         const std::optional<std::pair<double, double>>& window, const Progress& progress)
+    : state_(state),
+      field_(field),
+      volume_(volume),
+      window_(window),
+      coverage_(field.geometry()),
+      h_(volume.grid.spacing),
+      sups_(view_sups(field.coefficients(), field.geometry(), progress)),
+      samples_(state, sample_buffer_size(volume), "certified samples"),
+      bricks_(state, std::span<const VdvrBrick>(brick_records(volume)), "brick records") {
+  for (double& h : h_) h /= static_cast<double>(volume.rate);
+  samples_.write(volume.base, 0);
+  std::uint64_t offset = volume.base.size();
+  for (const auto& [triple, tiles] : volume.tiles) {
+    samples_.write(tiles, offset);
+    offset += tiles.size();
+  }
+  // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on.
+  const ParallelGeometry& g = field.geometry();
+  pad_ = static_cast<std::int64_t>(
+             std::ceil(3.1 * std::hypot(h_[0], h_[1]) / g.pitch_u * static_cast<double>(density))) +
+         4;
+  columns_ = density * g.columns + 1 + 2 * pad_;
+}
+
+void VerifyField::run(const std::vector<std::uint8_t>& selected,
+                      const std::function<void(const Brick&)>& on_brick, const Progress& progress) {
+  const Index3 n = volume_.bricks();
+  Shape s;
+  s.cells = std::int64_t{volume_.granularity} * volume_.rate;
+  // Few bricks are computed one by one, many in blocks with less halo.
+  const auto wanted = std::count(selected.begin(), selected.end(), 1);
+  if (2 * wanted > static_cast<std::int64_t>(selected.size()))
+    s.width = s.height = std::max<std::int64_t>(1, 64 / s.cells);
+  s.nx = s.width * s.cells + 1 + 2 * halo;
+  s.error_padded = up(s.cells + 1, 16) + 16;
+  s.words = (s.cells + 15) / 16;
+  const double scale = static_cast<double>(density) / field_.geometry().pitch_u;
+  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), h_,
+                          scale * std::hypot(h_[0], h_[1]) * static_cast<double>(s.nx + 7));
+
+  arithmetic_ = s.bounds.arithmetic;
+
+  struct Slab {
+    std::int64_t z;
+    std::vector<std::array<std::int64_t, 2>> blocks;
+  };
+  std::vector<Slab> slabs;
+  double total = 0, done = 0;
+  for (std::int64_t z = 0; z < n[2]; z += s.height) {
+    Slab slab{z, {}};
+    for (std::int64_t y = 0; y < n[1]; y += s.width)
+      for (std::int64_t x = 0; x < n[0]; x += s.width) {
+        bool any = false;
+        for (std::int64_t bz = z; bz < std::min(n[2], z + s.height); ++bz)
+          for (std::int64_t by = y; by < std::min(n[1], y + s.width); ++by)
+            for (std::int64_t bx = x; bx < std::min(n[0], x + s.width); ++bx)
+              any = any || selected[at((bz * n[1] + by) * n[0] + bx)] != 0;
+        if (any) slab.blocks.push_back({x, y});
+      }
+    total += static_cast<double>(slab.blocks.size());
+    if (!slab.blocks.empty()) slabs.push_back(std::move(slab));
+  }
+  for (const Slab& slab : slabs) {
+    s.slab_z = slab.z;
+    const std::int64_t layers = std::min(s.height, n[2] - slab.z);
+    s.nz = std::min(layers * volume_.granularity, volume_.grid.cells[2] - slab.z * volume_.granularity) *
+               volume_.rate +
+           1 + 2 * halo;
+    s.z_padded = up(s.nz, 16);
+    run_slab(s, slab.blocks, selected, on_brick, [&](std::size_t blocks) {
+      done += static_cast<double>(blocks);
+      report(progress, "verify", done / total);
+    });
+  }
+}
+
+/// Fine columns of some views, on the host and on the device.
+struct VerifyField::Table {
+  Table(opencl::State& state, std::int64_t columns, std::int64_t z_padded, std::int64_t all_views)
+      : per_view(columns * z_padded),
+        views(std::clamp<std::int64_t>(
+            static_cast<std::int64_t>(std::min(state.memory.left() / 4, state.info.max_allocation)) /
+                (4 * per_view),
+            1, all_views)),
+        share(state, count(4 * views * per_view), "fine columns of the filtered projections"),
+        host(at(views * per_view)),
+        device(state, count(views * per_view + room), "fine columns of the filtered projections") {}
+
+  std::int64_t per_view, views;  // floats; views at a time
+  std::int64_t first_view = -1;  // what it holds
+  HostShare share;
+  std::vector<float> host;
+  opencl::DeviceArray<float> device;
+};
+
+void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view) {
+  if (table.first_view == first_view) return;
+  const ParallelGeometry& g = field_.geometry();
+  const std::int64_t U = g.columns, V = g.rows, rows = up(shape.nz, lanes);
+  const std::int64_t views = std::min(table.views, g.views() - first_view), last = density * U;
+  const double first_z = volume_.grid.origin[2] +
+                         static_cast<double>(shape.slab_z * volume_.granularity) * volume_.grid.spacing[2];
+  std::vector<double> basis(at(V * rows));
+  for (std::int64_t r = 0; r < rows; ++r) {
+    const double z = first_z + static_cast<double>(r - halo) * h_[2];
+    const double y = pi * (z / g.pitch_v + 0.5 * static_cast<double>(V)) / static_cast<double>(V);
+    for (std::int64_t l = 0; l < V; ++l) basis[at(l * rows + r)] = std::cos(static_cast<double>(l) * y);
+  }
+  const auto cosine = cosine_period(last);
+  parallel_for(views, {}, "", [&](std::int64_t k) {
+    std::vector<double> line(at(U * rows));
+    cosine_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, rows, line);
+    float* out = table.host.data() + k * table.per_view;
+    cosine_columns(line, U, rows, density, cosine,
+                   [&](std::int64_t n, std::int64_t r, const std::array<double, lanes>& values) {
+                     for (std::int64_t i = 0; i < lanes; ++i)
+                       if (r + i < shape.z_padded)
+                         out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
+                             static_cast<float>(values[at(i)]);
+                   });
+    // Beyond the detector's edges the series is its own mirror image.
+    for (std::int64_t n = 0; n < columns_; ++n) {
+      std::int64_t m = std::abs(n - pad_) % (2 * last);
+      if (m > last) m = 2 * last - m;
+      if (m == n - pad_) continue;
+      for (std::int64_t z = 0; z < shape.z_padded / 16; ++z)
+        std::copy_n(out + (z * columns_ + m + pad_) * 16, 16, out + (z * columns_ + n) * 16);
+    }
+  });
+  table.device.write(std::span<const float>(table.host).first(at(views * table.per_view)));
+  table.first_view = first_view;
+}
+
+VerifyField::Batch VerifyField::make_batch(const Shape& s,
+                                           std::span<const std::array<std::int64_t, 2>> blocks,
+                                           const std::vector<std::uint8_t>& selected) const {
+  const Grid& grid = volume_.grid;
+  const Index3 n = volume_.bricks();
+  const std::int64_t g = volume_.granularity, side = s.width * s.cells;
+  Batch batch;
+  batch.tested.assign(blocks.size() * at(side * side), 0);
+  // A cell that holds a covered point has its centre within half its diagonal of the region.
+  const double limit = -0.5 * std::hypot(h_[0], h_[1]) * (1 + 1e-9);
+  parallel_for(static_cast<std::int64_t>(blocks.size()) * side, {}, "", [&](std::int64_t row) {
+    const auto& b = blocks[at(row / side)];
+    const double y = grid.origin[1] + static_cast<double>(b[1] * g) * grid.spacing[1] +
+                     (static_cast<double>(row % side) + 0.5) * h_[1];
+    for (std::int64_t i = 0; i < side; ++i) {
+      const double x = grid.origin[0] + static_cast<double>(b[0] * g) * grid.spacing[0] +
+                       (static_cast<double>(i) + 0.5) * h_[0];
+      batch.tested[at(row * side + i)] = coverage_.margin(x, y) >= limit ? 1 : 0;
+    }
+  });
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const auto& b = blocks[i];
+    batch.first.push_back({{to_int(b[0]), to_int(b[1]), to_int(s.slab_z), 0}});
+    for (std::int64_t z = s.slab_z; z < std::min(n[2], s.slab_z + s.height); ++z)
+      for (std::int64_t y = b[1]; y < std::min(n[1], b[1] + s.width); ++y)
+        for (std::int64_t x = b[0]; x < std::min(n[0], b[0] + s.width); ++x) {
+          const std::int64_t brick = (z * n[1] + y) * n[0] + x;
+          if (!selected[at(brick)]) continue;
+          const std::uint8_t* mask = batch.tested.data() + i * at(side * side) +
+                                     at((y - b[1]) * s.cells * side + (x - b[0]) * s.cells);
+          bool any = false;
+          for (std::int64_t j = 0; j < s.cells && !any; ++j)
+            any = std::find(mask + j * side, mask + j * side + s.cells, 1) != mask + j * side + s.cells;
+          if (!any) continue;
+          batch.items.push_back({{to_int(x), to_int(y), to_int(z), to_int(static_cast<std::int64_t>(i))}});
+          batch.bricks.push_back(brick);
+        }
+  }
+  return batch;
+}
+
+void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int64_t, 2>>& blocks,
+                           const std::vector<std::uint8_t>& selected,
+                           const std::function<void(const Brick&)>& on_brick,
+                           const std::function<void(std::size_t)>& tick) {
+  Table table(state_, columns_, s.z_padded, field_.geometry().views());
+  const std::int64_t per_block = s.nx * s.nx * s.z_padded,
+                     per_item =
+                         (s.cells + 1) * (s.cells + 1) * s.error_padded + s.cells * s.cells * (4 + s.words);
+  const std::int64_t bytes = 4 * (per_block + s.width * s.width * s.height * per_item);
+  const std::uint64_t budget = std::min<std::uint64_t>(state_.memory.left() / 2, 96 << 20);
+  const std::size_t together = at(std::clamp<std::int64_t>(static_cast<std::int64_t>(budget) / bytes, 1,
+                                                           static_cast<std::int64_t>(blocks.size())));
+  opencl::DeviceArray<float> values(state_, count(static_cast<std::int64_t>(together) * per_block + room),
+                                    "field to verify against");
+  values.fill(0.0f);
+  for (std::size_t first = 0; first < blocks.size(); first += together) {
+    const auto part = std::span(blocks).subspan(first, std::min(together, blocks.size() - first));
+    const Batch batch = make_batch(s, part, selected);
+    if (!batch.items.empty()) {
+      field_of(batch, s, table, values);
+      measure(batch, s, values, on_brick);
+    }
+    tick(part.size());
+  }
+}
+
+void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
+                           opencl::DeviceArray<float>& values) {
+  const ParallelGeometry& g = field_.geometry();
+  const std::size_t K = g.theta_rad.size(), blocks = batch.first.size();
+  const double scale = static_cast<double>(density) / g.pitch_u;
+  std::vector<cl_float4> steps(blocks * K);
+  for (std::size_t b = 0; b < blocks; ++b)
+    for (std::size_t k = 0; k < K; ++k) {
+      const double c = std::cos(g.theta_rad[k]), s_k = std::sin(g.theta_rad[k]);
+      const auto node = [&](std::size_t axis, cl_int brick) {
+        return volume_.grid.origin[axis] +
+               static_cast<double>(brick) * volume_.granularity * volume_.grid.spacing[axis] -
+               static_cast<double>(halo) * h_[axis];
+      };
+      const double t = node(0, batch.first[b].s[0]) * c + node(1, batch.first[b].s[1]) * s_k;
+      // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
+      // padding.
+      const double column =
+          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(density) + static_cast<double>(pad_);
+      const double along_x = c * h_[0] * scale, along_y = s_k * h_[1] * scale,
+                   nodes = static_cast<double>(s.nx + 7);
+      const double whole =
+          std::floor(column + std::min(0.0, along_x * nodes) + std::min(0.0, along_y * nodes)) - 1;
+      steps[b * K + k] = {{static_cast<float>(along_x), static_cast<float>(along_y),
+                           static_cast<float>(column - whole), static_cast<float>(whole)}};
+    }
+  const opencl::DeviceArray<cl_float4> device_steps(state_, std::span<const cl_float4>(steps),
+                                                    "view positions");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int>
+      kernel(state_, "verify_field", "verify_field");
+  for (std::int64_t first = 0; first < g.views(); first += table.views) {
+    fill(table, s, first);
+    kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
+            {count((s.nx + 7) / 8), 1, 1}},
+           values.buffer(), table.device.buffer(), device_steps.buffer(), first > 0 ? 1 : 0, to_int(first),
+           to_int(std::min(table.views, g.views() - first)), to_int(g.views()), to_int(columns_),
+           to_int(s.z_padded), to_int(s.nx), to_int(s.nx), to_int(static_cast<std::int64_t>(blocks)));
+  }
+}
+
+namespace {
+
+/// Gold nodes of a brick that are corners of a tested cell. bits: 16 cells to a word, [y][x][words].
+std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::int64_t words) {
+  std::int64_t nodes = 0;
+  for (std::int64_t y = 0; y <= cells; ++y)
+    for (std::int64_t x = 0; x <= cells; ++x) {
+      std::uint32_t carry = 0;  // cell 15 of the word before touches node 0 of this one
+      for (std::int64_t w = 0; w < words; ++w) {
+        std::uint32_t word = 0;
+        for (std::int64_t j = std::max<std::int64_t>(y - 1, 0); j <= std::min(y, cells - 1); ++j)
+          for (std::int64_t i = std::max<std::int64_t>(x - 1, 0); i <= std::min(x, cells - 1); ++i)
+            word |= bits[(j * cells + i) * words + w];
+        nodes += std::popcount((word | word << 1 | carry) & 0xffffu);
+        carry = word >> 15;
+      }
+      nodes += carry;
+    }
+  return nodes;
+}
+
+}  // namespace
+
+void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
+                          const std::function<void(const Brick&)>& on_brick) {
+  const std::int64_t n = static_cast<std::int64_t>(batch.items.size()), side = s.cells + 1;
+  const VdvrGrid grid = sampler_grid(volume_);
+  const opencl::DeviceArray<cl_int4> items(state_, std::span<const cl_int4>(batch.items), "bricks to verify"),
+      first(state_, std::span<const cl_int4>(batch.first), "blocks to verify");
+  const opencl::DeviceArray<std::uint8_t> tested(state_, std::span<const std::uint8_t>(batch.tested),
+                                                 "columns to verify");
+  opencl::DeviceArray<float> error(state_, count(n * side * side * s.error_padded + room), "errors at nodes");
+  opencl::DeviceArray<cl_float8> fourth(state_, count(n * side), "fourth differences");
+  opencl::DeviceArray<cl_int4> columns(state_, count(n * s.cells * s.cells), "columns of gold cells");
+  opencl::DeviceArray<cl_uint> bits(state_, count(n * s.cells * s.cells * s.words), "tested gold cells");
+  const cl_int rate = volume_.rate, nx = to_int(s.nx), z_padded = to_int(s.z_padded);
+
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int>
+      errors(state_, "verify_field", "verify_errors");
+  errors({{count(side), count(side), count(n)}, {count(side), 1, 1}}, error.buffer(), values.buffer(),
+         samples_.buffer(), bricks_.buffer(), grid, items.buffer(), first.buffer(), rate, nx, nx, z_padded,
+         to_int(s.error_padded), to_int(n));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int,
+                 cl_int, cl_int>
+      fourths(state_, "verify_field", "verify_fourth");
+  fourths({{count(side), count(n), 1}, {1, 1, 1}}, fourth.buffer(), values.buffer(), tested.buffer(), grid,
+          items.buffer(), first.buffer(), rate, nx, nx, z_padded, to_int(n));
+
+  const std::vector<cl_float8> rows = fourth.to_host();
+  std::vector<double> constants(at(n));
+  std::vector<float> widening(at(n));
+  for (std::int64_t i = 0; i < n; ++i) {
+    std::array<double, 6> largest{};
+    for (std::int64_t y = 0; y < side; ++y)
+      for (std::size_t q = 0; q < 6; ++q)
+        largest[q] = std::max(largest[q], static_cast<double>(rows[at(i * side + y)].s[q]));
+    constants[at(i)] = brick_constant(s.bounds, largest) + s.bounds.arithmetic;
+    widening[at(i)] = static_cast<float>(constants[at(i)] * (1 + 1e-6));
+  }
+  const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
+                                                   "constants of bricks");
+
+  // Cells along z that meet the covered heights.
+  const double first_z =
+      volume_.grid.origin[2] + static_cast<double>(s.slab_z * volume_.granularity) * volume_.grid.spacing[2];
+  std::int64_t z_first = s.nz, z_last = -1;
+  for (std::int64_t k = 0; k < s.nz - 1 - 2 * halo; ++k)
+    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * h_[2]) >= -0.5 * h_[2] * (1 + 1e-9)) {
+      z_first = std::min(z_first, k);
+      z_last = k;
+    }
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer,
+                 cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float,
+                 cl_float, cl_float, cl_int>
+      cells(state_, "verify_field", "verify_cells");
+  cells({{count(s.cells), count(s.cells), count(n)}, {count(s.cells), 1, 1}}, columns.buffer(), bits.buffer(),
+        error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
+        device_widening.buffer(), rate, nx, nx, z_padded, to_int(s.error_padded), to_int(s.words),
+        to_int(z_first), to_int(z_last), window_ ? 1 : 0,
+        window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
+        window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f, s.bounds.correction,
+        to_int(n));
+
+  std::vector<Column> host(at(n * s.cells * s.cells));
+  {
+    const std::vector<cl_int4> raw = columns.to_host();
+    static_assert(sizeof(cl_int4) == sizeof(Column));
+    std::transform(raw.begin(), raw.end(), host.begin(), [](const cl_int4& c) {
+      return Column{std::bit_cast<float>(c.s[0]), std::bit_cast<float>(c.s[1]), c.s[2], 0};
+    });
+  }
+  const std::vector<cl_uint> host_bits = bits.to_host();
+  for (std::int64_t i = 0; i < n; ++i) {
+    Brick b;
+    b.brick = batch.bricks[at(i)];
+    b.constant = constants[at(i)];
+    b.columns = std::span<const Column>(host).subspan(at(i * s.cells * s.cells), at(s.cells * s.cells));
+    const std::uint32_t* flags = host_bits.data() + i * s.cells * s.cells * s.words;
+    for (std::int64_t w = 0; w < s.cells * s.cells * s.words; ++w) b.cells += std::popcount(flags[w]);
+    if (b.cells > 0) b.nodes = tested_nodes(flags, s.cells, s.words);
+    float best = -1;
+    for (std::int64_t j = 0; j < s.cells * s.cells; ++j) {
+      const Column& c = b.columns[at(j)];
+      if (c.total < 0) continue;
+      b.error = std::max(b.error, static_cast<double>(c.error));
+      if (c.total <= best) continue;
+      best = c.total;
+      b.worst_cell = {j % s.cells, j / s.cells, c.worst_z};
+    }
+    if (best >= 0) b.total = static_cast<double>(best) + b.constant;
+    on_brick(b);
+  }
+}
+
+}  // namespace vdvr

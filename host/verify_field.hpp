@@ -1,0 +1,109 @@
+// F and the bound on |V - F| as `verify` computes them: from the cosine coefficients of the filtered
+// projections in double precision, by six-point interpolation on fine columns, gold cell by gold cell
+// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Called by
+// verify.cpp. Launches kernels/verify_field.cl.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "host/brick_layout.hpp"
+#include "host/coverage.hpp"
+#include "host/opencl/array.hpp"
+#include "vdvr/exact_field.hpp"
+#include "vdvr/mixed_volume.hpp"
+
+namespace vdvr {
+
+/// Per view: sups over the whole detector, view weight included.
+struct ViewSups {
+  std::vector<double> value, second_u, second_v;  ///< |q|, |q_uu|, |q_vv|
+};
+
+/// Cost: views * 18 rows * columns * (rows + columns) multiply-adds on the host. `coefficients` double
+/// [view][m][l].
+ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
+                   const Progress& progress);
+
+/// What does not depend on the gold cell. Axes x, y, z.
+struct FieldBounds {
+  using Pairs = std::array<std::array<double, 3>, 3>;
+  double arithmetic = 0;       ///< |computed F - F| at any node: rounding and interpolation in u
+  double differences = 0;      ///< rounding of second and fourth differences, and of the kernel's sums
+  float correction = 1;        ///< 1: second derivatives to fourth order in h, 0: plain second differences
+  double second = 0;           ///< what those err, summed over the axes: h^6 / 90 or h^4 / 12 times a sup
+  Pairs rise{}, everywhere{};  ///< of h_i^2 h_j^2 |F_iijj|: above its largest difference at nodes; anywhere
+};
+
+/// `reach`: the largest distance, in fine columns, of a node of a block from the block's first.
+/// `host_rounding`: what the table's double-precision values err.
+FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& geometry,
+                         const Vec3& gold_spacing, double reach);
+
+/// T's part that is constant over a brick, and 2 arithmetic: `fourth` are the largest computed fourth
+/// differences at its nodes, xx, yy, zz, xy, xz, yz.
+double brick_constant(const FieldBounds& bounds, const std::array<double, 6>& fourth);
+
+class VerifyField {
+ public:
+  /// One column of gold cells, as verify_cells writes it.
+  struct Column {
+    float total, error;
+    std::int32_t worst_z, pad;
+  };
+  static_assert(sizeof(Column) == 16);
+
+  struct Brick {
+    std::int64_t brick = 0;
+    std::int64_t cells = 0, nodes = 0;  ///< tested: gold cells, and gold nodes that are their corners
+    double error = 0;                   ///< largest |V - F| at those nodes
+    double total = -1;                  ///< bound of |V - F| on the tested cells; negative: none
+    Index3 worst_cell{0, 0, 0};         ///< gold cell inside the brick
+    double constant = 0;                ///< what `total` holds beside a column's own total
+    std::span<const Column> columns;    ///< [y][x] of side granularity * rate; total < 0: untested
+  };
+
+  /// `field` outlives this object. Throws ResourceError when memory does not suffice.
+  VerifyField(opencl::State& state, const ExactField& field, const MixedVolume& volume,
+              const std::optional<std::pair<double, double>>& window, const Progress& progress);
+
+  /// Measures the selected bricks; calls back once for each, in no particular order.
+  void run(const std::vector<std::uint8_t>& selected, const std::function<void(const Brick&)>& on_brick,
+           const Progress& progress);
+
+  /// What the last run's computation of F may err at any node.
+  [[nodiscard]] double arithmetic() const { return arithmetic_; }
+
+ private:
+  struct Shape;
+  struct Table;
+  struct Batch;
+  void run_slab(const Shape& shape, const std::vector<std::array<std::int64_t, 2>>& blocks,
+                const std::vector<std::uint8_t>& selected, const std::function<void(const Brick&)>& on_brick,
+                const std::function<void(std::size_t)>& tick);
+  Batch make_batch(const Shape& shape, std::span<const std::array<std::int64_t, 2>> blocks,
+                   const std::vector<std::uint8_t>& selected) const;
+  void fill(Table& table, const Shape& shape, std::int64_t first_view);
+  void field_of(const Batch& batch, const Shape& shape, Table& table, opencl::DeviceArray<float>& values);
+  void measure(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values,
+               const std::function<void(const Brick&)>& on_brick);
+
+  opencl::State& state_;
+  const ExactField& field_;
+  const MixedVolume& volume_;
+  std::optional<std::pair<double, double>> window_;
+  Coverage coverage_;
+  Vec3 h_;  // gold spacing
+  ViewSups sups_;
+  opencl::DeviceArray<float> samples_;
+  opencl::DeviceArray<VdvrBrick> bricks_;
+  std::int64_t pad_ = 0, columns_ = 0;  // fine columns
+  double arithmetic_ = 0;
+};
+
+}  // namespace vdvr
