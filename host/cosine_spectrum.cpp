@@ -44,12 +44,13 @@ class Axes {
 
 }  // namespace
 
-void cosine_spectrum(opencl::State& state, std::vector<float>& values, const Index3& size,
+void cosine_spectrum(Device& device, std::vector<float>& values, const Index3& size,
                      const Progress& progress) {
   const std::int64_t plane = size[0] * size[1], depth = size[2];
   if (size[0] < 1 || size[1] < 1 || depth < 1 || count(plane) * count(depth) != values.size())
     throw InputError(fmt::format("cosine spectrum: {} samples are not {} x {} x {}", values.size(), size[0],
                                  size[1], size[2]));
+  opencl::State& state = device.state();
   Axes axis(state);
   const std::string stage = "spectrum";
 

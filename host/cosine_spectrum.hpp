@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/opencl/state.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 
@@ -14,7 +14,7 @@ namespace vdvr {
 /// In place: float values[z][y][x] of `size` (x, y, z) become a[m_z][m_y][m_x], with values = sum over m of a
 /// times the product of cos(pi m_j (x_j + 1/2) / n_j). Cost: samples * (n_x + n_y + n_z) multiply-adds on the
 /// device, in blocks of about 64 MiB.
-void cosine_spectrum(opencl::State& state, std::vector<float>& values, const Index3& size,
+void cosine_spectrum(Device& device, std::vector<float>& values, const Index3& size,
                      const Progress& progress = {});
 
 }  // namespace vdvr

@@ -69,6 +69,11 @@ const Bounds& bounds() {
   return made;
 }
 
+double table_bound(double C, int axes) {
+  const auto i = std::clamp(static_cast<int>(C / kExactProduct * kTableSteps - 0x1p-30), 0, kTableSteps);
+  return bounds().table[static_cast<std::size_t>(axes) - 2][static_cast<std::size_t>(i)];
+}
+
 void check_axis(const FrequencyAxis& axis) {
   constexpr std::int64_t most = 1 << 24;  // integers that fp32 holds exactly
   const double first = static_cast<double>(axis.first) * axis.step,
@@ -95,18 +100,20 @@ double largest_wave_error(int axes) {
 }
 
 double wave_error_bound(std::span<const double> kappa) {
-  int axes = 0;
-  double sum = 0;
-  for (const double k : kappa) {
-    if (beyond_nyquist(k)) return 2;  // the wave aliases: |f| + |Pf| is all there is
-    axes += k != 0;
-    sum += axis_error(k);
+  std::array<double, 3> x{};  // 1 - cos(kappa_j / 2)
+  if (kappa.size() > x.size())
+    throw InputError(fmt::format("wave error: {} axes; there may be 1 to 3", kappa.size()));
+  for (std::size_t j = 0; j < kappa.size(); ++j) {
+    if (beyond_nyquist(kappa[j])) return 2;  // the wave aliases: |f| + |Pf| is all there is
+    x[j] = axis_error(kappa[j]);
   }
-  if (axes > 3) throw InputError(fmt::format("wave error: {} axes; there may be 1 to 3", axes));
-  const double e = centre_error(kappa), C = 1 - e;
-  if (axes <= 1 || C >= kExactProduct) return e;
-  const auto i = std::clamp(static_cast<int>(C / kExactProduct * kTableSteps - 0x1p-30), 0, kTableSteps);
-  return std::min(sum, bounds().table[static_cast<std::size_t>(axes) - 2][static_cast<std::size_t>(i)]);
+  const double e = centre_error(kappa);
+  std::sort(x.begin(), x.end());
+  if (x[1] == 0 || 1 - e >= kExactProduct) return e;
+  // The largest two axes alone, then the third added; or all three at once.
+  const double pair = x[1] + x[2] - x[1] * x[2];
+  const double two = 1 - pair >= kExactProduct ? pair : std::min(x[1] + x[2], table_bound(1 - pair, 2));
+  return x[0] == 0 ? two : std::min(two + x[0], table_bound(1 - e, 3));
 }
 
 bool centre_is_local_maximum(std::span<const double> kappa) {

@@ -1,7 +1,7 @@
 // The worst error of multilinear interpolation of one plane wave, for every frequency of a grid of them
 // (docs/error-bounds.md, section 3). centre: 1 - prod cos(kappa_j / 2). bound: the same where it is proved to
-// be the worst error, else the smaller of the sum over the axes and a table over prod cos, one table for two
-// axes and one for three; times `margin`, which covers fp32 rounding. Layout float [z][y][x].
+// be the worst error, else the smallest of what is proved: sums over the axes, and tables over prod cos, one
+// for two axes and one for three; times `margin`, which covers fp32 rounding. Layout float [z][y][x].
 // Called by host/error_map.cpp.
 #ifndef VDVR_TABLE_STEPS
 #error "VDVR_TABLE_STEPS: intervals of the table of bounds"
@@ -11,6 +11,11 @@
 float axis_error(float kappa) {
   const float s = sin(0.25f * kappa);
   return 2.0f * s * s;
+}
+
+// The table falls with the product: its entry below, and one more for rounding, is never too small.
+float beyond_product(__global const float* restrict beyond, float product, float exact_product) {
+  return beyond[clamp((int)(product / exact_product * VDVR_TABLE_STEPS - 0.01f), 0, VDVR_TABLE_STEPS)];
 }
 
 __kernel void error_map(__global float* restrict centre, __global float* restrict bound,
@@ -27,13 +32,18 @@ __kernel void error_map(__global float* restrict centre, __global float* restric
   // 1 - (1 - a)(1 - b) = a + b - a b, which keeps small errors to their last digits.
   const float exy = fma(-ex, ey, ex + ey);
   const float e = fma(-exy, ez, exy + ez);
-  const int axes = (ex > 0.0f) + (ey > 0.0f) + (ez > 0.0f);
-  const float product = 1.0f - e;
+  // The largest two axes alone, then the third added; or all three at once.
+  const float low = min(ex, min(ey, ez)), high = max(ex, max(ey, ez));
+  const float mid = max(min(ex, ey), min(max(ex, ey), ez));
+  const float pair = fma(-mid, high, mid + high);
   float proved = e;
-  if (axes > 1 && product < exact_product) {
-    // The table falls with the product: its entry below, and one more for rounding, is never too small.
-    const int i = clamp((int)(product / exact_product * VDVR_TABLE_STEPS - 0.01f), 0, VDVR_TABLE_STEPS);
-    proved = min(ex + ey + ez, beyond[(axes - 2) * (VDVR_TABLE_STEPS + 1) + i]);
+  if (mid > 0.0f && 1.0f - e < exact_product) {
+    proved = pair;
+    if (1.0f - pair < exact_product)
+      proved = min(mid + high, beyond_product(beyond, 1.0f - pair, exact_product));
+    proved += low;
+    if (low > 0.0f)
+      proved = min(proved, beyond_product(beyond + VDVR_TABLE_STEPS + 1, 1.0f - e, exact_product));
   }
   const size_t at = ((size_t)z * count_y + y) * count_x + x;
   centre[at] = e;

@@ -13,9 +13,9 @@ using namespace vdvr;
 
 namespace {
 
-opencl::State& state() {
-  static Device device;
-  return device.state();
+Device& device() {
+  static Device one;
+  return one;
 }
 
 // Axis by axis with the direct sums of the reference.
@@ -45,7 +45,7 @@ BOOST_AUTO_TEST_CASE(coefficients_match_direct_sums) {
     std::vector<float> values(static_cast<std::size_t>(n[0] * n[1] * n[2]));
     for (float& v : values) v = unit(random);
     const auto expected = direct(values, n);
-    cosine_spectrum(state(), values, n);
+    cosine_spectrum(device(), values, n);
     // Per axis entries of up to 2 / n in magnitude meet sums of up to n values: magnitudes grow by 2 an axis.
     const double rounding = tolerance::fp32_sum(n[0] + n[1] + n[2] + 3, 8);
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -61,7 +61,7 @@ BOOST_AUTO_TEST_CASE(a_wave_of_the_mirror_extension_has_one_coefficient) {
       values.push_back(
           static_cast<float>(3 * std::cos(reference::frequency(5, U) * (static_cast<double>(u) + 0.5)) *
                              std::cos(reference::frequency(2, V) * (static_cast<double>(v) + 0.5))));
-  cosine_spectrum(state(), values, {U, V, 1});
+  cosine_spectrum(device(), values, {U, V, 1});
   for (std::size_t i = 0; i < values.size(); ++i)
     BOOST_TEST(std::abs(static_cast<double>(values[i]) - (i == 2 * U + 5 ? 3.0 : 0.0)) <=
                tolerance::fp32_sum(U + V + 2, 12));
@@ -69,6 +69,6 @@ BOOST_AUTO_TEST_CASE(a_wave_of_the_mirror_extension_has_one_coefficient) {
 
 BOOST_AUTO_TEST_CASE(sizes_that_do_not_fit_the_samples_are_refused) {
   std::vector<float> values(6);
-  BOOST_CHECK_THROW(cosine_spectrum(state(), values, {2, 2, 2}), InputError);
-  BOOST_CHECK_THROW(cosine_spectrum(state(), values, {0, 3, 2}), InputError);
+  BOOST_CHECK_THROW(cosine_spectrum(device(), values, {2, 2, 2}), InputError);
+  BOOST_CHECK_THROW(cosine_spectrum(device(), values, {0, 3, 2}), InputError);
 }
