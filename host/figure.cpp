@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "host/bitmap_font.hpp"
 
@@ -21,7 +22,27 @@ constexpr std::int64_t kEdge = 14, kLeft = 104, kTop = kLine + 4, kBottom = 2 * 
 constexpr std::int64_t kBarGap = 12, kBar = 18, kRight = kBarGap + kBar + 8 + 8 * kGlyph;
 
 std::int64_t width_of(const std::string& text) { return static_cast<std::int64_t>(text.size()) * kGlyph; }
-std::string number(double v) { return v == 0 ? "0" : fmt::format("{:.3g}", v); }
+std::string number(double v, int digits = 3) { return v == 0 ? "0" : fmt::format("{:.{}g}", v, digits); }
+
+/// Words into lines of at most `width` characters; a longer word has a line to itself.
+std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, std::size_t width) {
+  std::vector<std::string> lines;
+  for (const auto& paragraph : paragraphs) {
+    std::istringstream words(paragraph);
+    std::string line;
+    for (std::string word; words >> word; line += word) {
+      if (line.empty()) continue;
+      if (line.size() + 1 + word.size() <= width) {
+        line += ' ';
+      } else {
+        lines.push_back(std::move(line));
+        line.clear();
+      }
+    }
+    lines.push_back(line);
+  }
+  return lines;
+}
 
 Image blank(std::int64_t width, std::int64_t height) {
   return {width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height * 3), kPaper[0])};
@@ -60,7 +81,7 @@ std::vector<double> marks(const Scale& s) {
   std::vector<double> out{s.low, s.high};
   if (s.logarithmic) {
     for (double d = std::pow(10, std::ceil(std::log10(s.low))); d < s.high; d *= 10)
-      if (s.fraction(d) > 0.05 && s.fraction(d) < 0.95) out.push_back(d);
+      if (s.fraction(d) > 0.06 && s.fraction(d) < 0.92) out.push_back(d);
   } else {
     for (const double f : {0.25, 0.5, 0.75}) out.push_back(s.value(f));
   }
@@ -86,7 +107,8 @@ void draw_bar(Image& image, const Place& p, const Scale& scale) {
     fill(image, x + kBar, y, 4, 1, kInk);
     text(image, x + kBar + 8,
          std::clamp<std::int64_t>(y - kFontHeight * kText / 2, p.y, p.y + p.side - kFontHeight * kText),
-         scale.logarithmic && v == scale.low ? "<" + number(v) : number(v), Align::left);
+         scale.logarithmic && v == scale.low ? "<" + number(v) : number(v, scale.logarithmic ? 3 : 4),
+         Align::left);
   }
 }
 
@@ -154,10 +176,11 @@ void draw_chart(Image& image, const Place& p, const Chart& chart) {
 
 template <class Panel, class Draw>
 Image layout(const std::string& title, const std::vector<std::vector<Panel>>& rows,
-             const std::vector<std::string>& caption, std::int64_t side, Draw&& draw_panel) {
+             const std::vector<std::string>& paragraphs, std::int64_t side, Draw&& draw_panel) {
   std::size_t most = 1;
   for (const auto& row : rows) most = std::max(most, row.size());
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
+  const auto caption = wrapped(paragraphs, static_cast<std::size_t>(count(most) * cell_width(side) / kGlyph));
   const std::int64_t head = kEdge + kLine + 10;
   Image image = blank(2 * kEdge + count(most) * cell_width(side),
                       head + count(rows.size()) * cell_height(side) + count(caption.size()) * kLine + kEdge);

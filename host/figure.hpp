@@ -44,7 +44,7 @@ struct Chart {
 /// Dark to light, evenly in perceived lightness (the colours of viridis at nine stops).
 std::array<std::uint8_t, 3> colour(double fraction);
 
-/// Panels row by row, all of one side; then caption lines.
+/// Panels row by row, all of one side; then the caption, its paragraphs wrapped.
 Image draw(const std::string& title, const std::vector<std::vector<Raster>>& rows,
            const std::vector<std::string>& caption);
 Image draw(const std::string& title, const std::vector<Chart>& charts,

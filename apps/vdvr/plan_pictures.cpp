@@ -21,6 +21,7 @@ using figure::Scale;
 const std::vector<int> kRates{1, 2, 4, 8};
 constexpr std::int64_t kSide = 481, kSmallSide = 401;  // odd: frequency 0 has a pixel of its own
 constexpr double kDecades = 1e-6;                      // shown below the largest; fp32 leaves noise there
+constexpr double kFewDecades = 1e-3;                   // enough for the amplitudes of one row
 const std::string kUnit = "cycles per sample";
 
 /// A spectrum with everything that is said about it.
@@ -61,9 +62,9 @@ std::vector<double> plane_products(Device& device, const Spectrum& s, const Plan
 
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 /// From the largest down to a power of ten; a scan of zeros gets a scale all the same.
-Scale decades_below(double high) {
-  if (!(high > 0)) return {kDecades, 1, true};
-  return {std::pow(10, std::floor(std::log10(high * kDecades))), high, true};
+Scale decades_below(double high, double decades = kDecades) {
+  if (!(high > 0)) return {decades, 1, true};
+  return {std::pow(10, std::floor(std::log10(high * decades))), high, true};
 }
 
 Raster raster_of(const Spectrum& s, const Plane& p, const std::vector<double>& values,
@@ -102,12 +103,19 @@ std::string part(double value, double reference) {
   return reference > 0 ? fmt::format("{:.3g} ({:.3g} %)", value, 100 * value / reference)
                        : fmt::format("{:.3g}", value);
 }
-std::vector<std::string> sum_lines(const Spectrum& s, const std::string& of) {
-  std::string sums = "sum of amplitude x error:";
+/// The amplitude bounds: under every picture, after what else it says.
+std::vector<std::string> caption(const Spectrum& s, const std::string& of,
+                                 std::vector<std::string> lines = {}) {
+  std::string sums = "sum of amplitude x error over all frequencies:";
   for (const auto& a : s.sums)
     sums += fmt::format("{} {}x {}", a.rate == 1 ? "" : ",", a.rate, part(a.bound, s.reference));
-  return {sums, fmt::format("(% of {} {:.4g}); proved, loose, decides nothing", of, s.reference)};
+  lines.push_back(sums);
+  lines.push_back(
+      fmt::format("(% of {} {:.4g}); an upper bound, loose; it decides nothing", of, s.reference));
+  return lines;
 }
+const std::string kOfView = "the view's largest |q|,", kOfRange = "the range";
+const std::string kExact = "exact at 8x and where it is below 0.797, a proved bound beyond";
 
 Json spectrum_json(const Spectrum& s) {
   Json sums = Json::array();
@@ -141,15 +149,14 @@ class Album {
   const Progress& progress_;
 };
 
-// --- one row: 1D
-// ----------------------------------------------------------------------------------------------
-
 void draw_row(Device& device, Album& album, const Spectrum& s, const std::string& what) {
   const auto n = static_cast<std::size_t>(s.size[0]);
   std::vector<double> magnitude(n);
   for (std::size_t m = 0; m < n; ++m) magnitude[m] = static_cast<double>(std::abs(s.coefficients[m]));
-  figure::Chart spectrum{
-      "amplitude", kUnit, {{"row", figure::paired(magnitude)}}, decades_below(largest(magnitude))},
+  figure::Chart spectrum{"amplitude",
+                         kUnit,
+                         {{"row", figure::paired(magnitude)}},
+                         decades_below(largest(magnitude), kFewDecades)},
       map{"largest error of a wave", kUnit, {}, {1e-4, 1, true}}, product{"amplitude x error", kUnit, {}, {}};
   double most = 0;
   for (const int rate : kRates) {
@@ -163,13 +170,9 @@ void draw_row(Device& device, Album& album, const Spectrum& s, const std::string
     product.curves.push_back({label, figure::paired(p)});
   }
   product.scale = decades_below(most);
-  auto caption = sum_lines(s, "the largest |q|,");
   album.add("row.png", "1D: amplitudes of a filtered row, errors at 1x, 2x, 4x and 8x, their products",
-            figure::draw("1D, linear: " + what, {spectrum, map, product}, caption));
+            figure::draw("1D, linear: " + what, {spectrum, map, product}, caption(s, kOfView)));
 }
-
-// --- one filtered projection: 2D
-// ------------------------------------------------------------------------------
 
 void draw_projection(Device& device, Album& album, const Spectrum& s, const std::string& what) {
   const std::array<std::string, 3> axes{"u", "v", ""};
@@ -180,28 +183,27 @@ void draw_projection(Device& device, Album& album, const Spectrum& s, const std:
       figure::draw(
           "2D: " + what,
           {{raster_of(s, plane, magnitude, "amplitude", axes, decades_below(largest(magnitude)), kSide)}},
-          {fmt::format("{} x {} coefficients, mirror extension; a pixel shows the largest of its own",
-                       s.size[0], s.size[1])}));
+          caption(s, kOfView,
+                  {fmt::format("{} x {} coefficients, mirror extension; a pixel shows the largest of its own",
+                               s.size[0], s.size[1])})));
   const auto at1 = map_raster(device, 1, 0, "1x", {"u", "v"}, kSide),
              at8 = map_raster(device, 8, 0, "8x: the central eighth of 1x", {"u", "v"}, kSide);
   album.add(
       "projection-map.png", "2D: largest error of a wave at 1x and 8x",
-      figure::draw("2D, bilinear: largest error of a wave of amplitude 1, all phases and positions",
-                   {{at1, at8}},
-                   {fmt::format("1x: up to {:.4g}; 8x: up to {:.4g}; the frame is the part that 8x shows",
-                                at1.scale.high, at8.scale.high),
-                    "exact at 8x and where it is below 0.797, a proved bound beyond"}));
+      figure::draw(
+          "2D, bilinear: largest error of a wave of amplitude 1, all phases and positions", {{at1, at8}},
+          caption(s, kOfView,
+                  {fmt::format("1x: up to {:.4g}; 8x: up to {:.4g}; the frame is the part that 8x shows",
+                               at1.scale.high, at8.scale.high),
+                   kExact})));
   const auto p1 = plane_products(device, s, plane, 1), p8 = plane_products(device, s, plane, 8);
   const Scale scale = decades_below(std::max(largest(p1), largest(p8)));
   album.add("projection-product.png", "2D: amplitude times error at 1x and 8x",
             figure::draw("2D: amplitude x error, " + what,
                          {{raster_of(s, plane, p1, "1x", axes, scale, kSide),
                            raster_of(s, plane, p8, "8x", axes, scale, kSide)}},
-                         sum_lines(s, "the view's largest |q|,")));
+                         caption(s, kOfView)));
 }
-
-// --- the 1x base volume: 3D
-// -----------------------------------------------------------------------------------
 
 const std::array<std::string, 3> kAxes{"x", "y", "z"};
 const std::array<Plane, 3> kPlanes{{{0, 1}, {0, 2}, {1, 2}}};
@@ -222,10 +224,12 @@ void draw_volume(Device& device, Album& album, const Spectrum& s) {
   for (std::size_t i = 0; i < 3; ++i)
     spectra.push_back(
         raster_of(s, kPlanes[i], magnitudes[i], plane_title(i, ""), kAxes, decades_below(most), kSmallSide));
-  album.add("volume-spectrum.png", "3D: amplitudes of the 1x base volume, central slices",
-            figure::draw("3D: amplitude, central slices: " + kCutOut, {spectra},
-                         {fmt::format("{} x {} x {} coefficients; a pixel shows the largest of its own",
-                                      s.size[0], s.size[1], s.size[2])}));
+  album.add(
+      "volume-spectrum.png", "3D: amplitudes of the 1x base volume, central slices",
+      figure::draw("3D: amplitude, central slices: " + kCutOut, {spectra},
+                   caption(s, kOfRange,
+                           {fmt::format("{} x {} x {} coefficients; a pixel shows the largest of its own",
+                                        s.size[0], s.size[1], s.size[2])})));
 
   std::vector<std::vector<Raster>> maps;
   for (const int rate : {1, 8}) {
@@ -236,10 +240,12 @@ void draw_volume(Device& device, Album& album, const Spectrum& s) {
   }
   album.add(
       "volume-map.png", "3D: largest error of a wave at 1x and 8x, slices at frequencies 0 and 0.25",
-      figure::draw("3D, trilinear: largest error of a wave of amplitude 1", maps,
-                   {fmt::format("largest in 3D: {:.4g} at 1x, {:.4g} at 8x; alike for slices across x and y",
-                                worst_corner(3, 1), worst_corner(3, 8)),
-                    "exact at 8x and where it is below 0.797, a proved bound beyond"}));
+      figure::draw(
+          "3D, trilinear: largest error of a wave of amplitude 1", maps,
+          caption(s, kOfRange,
+                  {fmt::format("largest in 3D: {:.4g} at 1x, {:.4g} at 8x; alike for slices across x and y",
+                               worst_corner(3, 1), worst_corner(3, 8)),
+                   kExact})));
 
   std::vector<std::vector<Raster>> products;
   std::vector<std::vector<double>> values;
@@ -256,7 +262,7 @@ void draw_volume(Device& device, Album& album, const Spectrum& s) {
   }
   album.add(
       "volume-product.png", "3D: amplitude times error at 1x and 8x, central slices",
-      figure::draw("3D: amplitude x error, central slices: " + kCutOut, products, sum_lines(s, "the range")));
+      figure::draw("3D: amplitude x error, central slices: " + kCutOut, products, caption(s, kOfRange)));
 }
 
 }  // namespace
