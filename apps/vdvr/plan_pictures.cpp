@@ -91,7 +91,7 @@ Raster map_raster(Device& device, int rate, double third, const std::string& tit
           side,
           values,
           {0, largest(values), false},
-          rate == 1 ? 0.125 : 0};
+          rate == 1 && third == 0 ? 0.125 : 0};
 }
 
 /// Of all waves up to Nyquist.
