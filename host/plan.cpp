@@ -83,7 +83,7 @@ std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups
     for (const auto& [rate, value] : a.projection)
       out.push_back({"projection", "amplitude, linear in u", rate, value, true});
     for (const auto& [rate, value] : a.gold)
-      out.push_back({"gold", "amplitude, sum over axes", rate, value, true});
+      out.push_back({"gold", "amplitude", rate, value, true});
   }
   for (const int rate : bound_rates) {
     const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate,

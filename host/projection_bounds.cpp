@@ -3,6 +3,7 @@
 #include "host/projection_bounds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_map.hpp"
 
 namespace vdvr {
 namespace {
@@ -33,10 +35,6 @@ double underflow(const ParallelGeometry& g, double gain_u) {
 double product_error(std::int64_t n) { return 18 + static_cast<double>(n) / 16; }
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
-
-// The worst error of linear interpolation of cos(k x) per cell phase kappa = k d: 1 - cos(kappa / 2) up to
-// the grid's Nyquist frequency; beyond it the wave aliases and only |f - Pf| <= 2 is left.
-double axis_error(double kappa) { return std::abs(kappa) <= pi ? 1 - std::cos(kappa / 2) : 2.0; }
 
 // The largest |d| of every view of a slab of derivatives.
 std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d) {
@@ -193,13 +191,13 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
       for (std::int64_t m = 0; m < U; ++m) {
         const double wu = pi * static_cast<double>(m) / static_cast<double>(U) / g.pitch_u;
         const double eu = 1 - std::cos(wu * g.pitch_u / rates[r] / 2);
-        const double plane =
-            axis_error(wu * c * grid.spacing[0] / rates[r]) + axis_error(wu * s * grid.spacing[1] / rates[r]);
         for (std::int64_t l = 0; l < V; ++l) {
           const double wv = pi * static_cast<double>(l) / static_cast<double>(V) / g.pitch_v;
           const double magnitude = std::abs(b[at(m * V + l)]);
           p[r] += magnitude * eu;
-          f[r] += magnitude * std::min(2.0, plane + axis_error(wv * grid.spacing[2] / rates[r]));
+          f[r] += magnitude * wave_error_bound(std::array{wu * c * grid.spacing[0] / rates[r],
+                                                          wu * s * grid.spacing[1] / rates[r],
+                                                          wv * grid.spacing[2] / rates[r]});
         }
       }
     const std::lock_guard guard(lock);

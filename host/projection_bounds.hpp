@@ -53,9 +53,9 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         const std::string& u_filter);
 
-/// Amplitude bounds: sum of |A| e, e = sum over the axes of 1 - cos(k d / 2), over the spectrum of the mirror
-/// extension, for interpolation in u at each rate and for gold at each rate. Cost: views * rows * columns per
-/// rate, on the host.
+/// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, e the proved worst error of a
+/// wave (error_map.hpp), for interpolation in u at each rate and for gold at each rate. Cost: views * rows *
+/// columns per rate, on the host.
 struct AmplitudeBounds {
   std::vector<std::pair<int, double>> projection, gold;
 };

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -200,7 +201,6 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
   build({"--paper"});
   build({"--resume"});
   check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
-  check_refused({"plan", "x.h5", "--epsilon", "3%", "--pictures", "d"}, "--pictures");
   check_refused({"bench", "paper"}, "paper");
 }
 
@@ -363,6 +363,40 @@ BOOST_AUTO_TEST_CASE(interruption_leaves_nothing_behind) {
   }
   for (const auto& entry : fs::directory_iterator(folder().path))
     BOOST_TEST(entry.path().filename().string()[0] != '.', "temporary file left: " << entry.path());
+}
+
+BOOST_AUTO_TEST_CASE(plan_draws_pictures_and_overwrites_none_without_force) {
+  const fs::path output = at("plan-pictures");
+  const std::vector<std::string> words{"plan",       small_scan(),    "--epsilon", "20%",
+                                       "--pictures", output.string(), "--json"};
+  const Result r = run(words);
+  BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
+  const auto json = nlohmann::json::parse(r.out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  BOOST_TEST(json["pictures"]["files"].size() == 7u);
+  for (const auto& [name, shows] : json["pictures"]["files"].items())
+    BOOST_TEST(contents(output / name).substr(1, 3) == "PNG", name);
+  const auto numbers = nlohmann::json::parse(contents(output / "pictures.json"), nullptr, false);
+  BOOST_REQUIRE(numbers.is_object());
+  for (const std::string spectrum : {"row", "projection", "volume"}) {
+    double before = std::numeric_limits<double>::infinity();
+    for (const auto& sum : numbers[spectrum]["sums"]) {
+      const double bound = sum["amplitude_bound"].get<double>();
+      BOOST_TEST(bound > 0);
+      BOOST_TEST(bound < before);
+      BOOST_TEST(bound >= sum["with_closed_form"].get<double>());
+      before = bound;
+    }
+  }
+
+  write(output / "row.png", "kept");
+  check_refused(words, "--force");
+  BOOST_TEST(contents(output / "row.png") == "kept");
+  std::vector<std::string> forced = words;
+  forced.emplace_back("--force");
+  BOOST_TEST(run(forced).code == 0);
+  BOOST_TEST(contents(output / "row.png").substr(1, 3) == "PNG");
+  check_refused({"plan", small_scan(), "--epsilon", "20%", "--pictures", small_scan()}, "not a folder");
 }
 
 BOOST_AUTO_TEST_CASE(run_writes_the_certificate_and_the_pictures) {

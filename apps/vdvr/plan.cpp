@@ -1,10 +1,15 @@
-// vdvr plan: bounds, rates, shares, storage, memory and time foreseen; builds nothing.
+// vdvr plan: bounds, rates, shares, storage, memory and time foreseen, and pictures of what interpolation
+// does to the scan's frequencies; builds nothing.
 #include "vdvr/plan.hpp"
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/plan_pictures.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
 
@@ -50,24 +55,44 @@ void print_plan(const Planned& p) {
   print_notes(plan.notes);
 }
 
+void print_pictures(const Json& pictures) {
+  fmt::print("pictures in    {}\n", pictures["folder"].get<std::string>());
+  for (const auto& [name, shows] : pictures["files"].items())
+    fmt::print("    {:<24} {}\n", name, shows.get<std::string>());
+}
+
 }  // namespace
 
 int plan_command(Arguments& args) {
-  args.positional("IN", "projections").value("pictures", "DIR", "not in this version");
+  args.positional("IN", "projections")
+      .value("pictures", "DIR", "pictures of spectra, error maps and their products");
   add_plan_options(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  refuse(args, {"pictures"}, "this version draws no pictures of the bounds; --json has the numbers");
   refuse(args, {"roi"}, "a plan is for the whole grid; use --size and --origin, or give --roi to build");
   const CertifyOptions options{
       field_options(args), grid_options(args), rate_options(args), tolerance(args), {}};
+  std::optional<OutputFolder> folder;
+  if (args.has("pictures")) {
+    kind_of(args.path("IN"), args);
+    folder.emplace(args.path("pictures"), plan_picture_names(), common.force);
+  }
 
   Device device = open_device(common);
   ProgressLine progress(args.command(), common.quiet);
   const Planned planned = read_and_plan(device, args, options, progress.callback());
+  Json json = plan_json(planned), pictures;
+  if (folder) {
+    pictures = draw_plan_pictures(device, *folder, planned.scan, planned.plan, progress.callback());
+    pictures["folder"] = args.path("pictures").string();
+    json["pictures"] = pictures;
+  }
   progress.clear();
-  print_result(common, plan_json(planned), [&] { print_plan(planned); });
+  print_result(common, json, [&] {
+    print_plan(planned);
+    if (folder) print_pictures(pictures);
+  });
   return 0;
 }
 
