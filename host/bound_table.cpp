@@ -195,4 +195,21 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
          to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
 }
 
+std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,
+                                             const FilteredScan& scan, const Grid& grid, int upsampling,
+                                             const std::string& u_filter, int rate, const Index3& first_cell,
+                                             const Index3& nodes) {
+  Vec3 first{};
+  for (std::size_t a = 0; a < 3; ++a)
+    first[a] = grid.origin[a] + static_cast<double>(first_cell[a]) * grid.spacing[a];
+  const BoundTable table =
+      projection_table(state, upsampler, scan, columns_for(scan.geometry, grid, std::min(8, upsampling)),
+                       upsampling, u_filter, gold_nodes(scan.geometry, grid, rate, first[2], nodes[2]));
+  const ColumnBlocks blocks{
+      nodes[0], nodes[1], grid.spacing[0] / rate, grid.spacing[1] / rate, {{first[0], first[1]}}, {}};
+  opencl::DeviceArray<float> bound(state, count(nodes[0] * nodes[1] * nodes[2]), "node bounds");
+  project_bound(state, scan, table, blocks, nodes[0], nodes[1], 1, 0.0, bound);
+  return bound.to_host();
+}
+
 }  // namespace vdvr

@@ -57,4 +57,11 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
                    const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int cell,
                    double offset, opencl::DeviceArray<float>& bound);
 
+/// P at every gold node of a box of nodes that begins at a base cell's corner: float p[z][y][x], `nodes`
+/// counted x, y, z. The sharpest form, at the cost of gold itself: the certificate takes base cells.
+std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,
+                                             const FilteredScan& scan, const Grid& grid, int upsampling,
+                                             const std::string& u_filter, int rate, const Index3& first_cell,
+                                             const Index3& nodes);
+
 }  // namespace vdvr

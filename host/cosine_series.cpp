@@ -18,14 +18,15 @@ double dirichlet(std::int64_t n, double d) {
   return std::sin((count - 0.5) * t) / (2 * count * s);
 }
 
-// The derivative of even order of g at d, by its sum.
+// The derivative of g at d, by its sum.
 double derivative(std::int64_t n, double d, int order, double pitch) {
   double sum = 0;
   for (std::int64_t m = 1; m < n; ++m) {
     const double omega = pi * static_cast<double>(m) / (static_cast<double>(n) * pitch);
-    sum += std::pow(omega, order) * std::cos(pi * static_cast<double>(m) * d / static_cast<double>(n));
+    const double phase = pi * static_cast<double>(m) * d / static_cast<double>(n);
+    sum += std::pow(omega, order) * (order % 2 == 0 ? std::cos(phase) : std::sin(phase));
   }
-  return (order % 4 == 2 ? -sum : sum) / static_cast<double>(n);
+  return (order % 4 == 1 || order % 4 == 2 ? -sum : sum) / static_cast<double>(n);
 }
 
 }  // namespace
@@ -68,7 +69,8 @@ std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> po
     table.resize(static_cast<std::size_t>(period));
     for (std::int64_t j = 0; j <= period / 2; ++j) {
       const double value = derivative(n, static_cast<double>(j) / lattice, order, pitch);
-      table[static_cast<std::size_t>(j)] = table[static_cast<std::size_t>((period - j) % period)] = value;
+      table[static_cast<std::size_t>((period - j) % period)] = order % 2 == 0 ? value : -value;
+      table[static_cast<std::size_t>(j)] = value;
     }
   }
   const auto g = [&](double d) {

@@ -26,9 +26,9 @@ struct UpsampledColumns {
 /// Covers [-1/2 - margin, n - 1/2 + margin].
 UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixels);
 
-/// double matrix[position][i]: the value (order 0) or the even derivative of the series at each position,
-/// with x measured in `pitch` units. `lattice` > 0 promises that positions are multiples of 1 / lattice,
-/// which makes derivatives cheap.
+/// double matrix[position][i]: the value (order 0) or a derivative of the series at each position, with x
+/// measured in `pitch` units. `lattice` > 0 promises that positions are multiples of 1 / lattice; odd orders
+/// need it.
 std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order,
                                       double pitch, int lattice);
 

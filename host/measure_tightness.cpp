@@ -110,23 +110,6 @@ double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
   return worst;
 }
 
-// P at every gold node of one brick, in the order of BrickGold.
-std::vector<float> node_bounds(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                               const Grid& grid, int upsampling, const std::string& u_filter, int rate,
-                               const Index3& first_cell, const Index3& side) {
-  const BoundTable table = projection_table(
-      state, upsampler, scan, columns_for(scan.geometry, grid, std::min(8, upsampling)), upsampling, u_filter,
-      gold_nodes(scan.geometry, grid, rate,
-                 grid.origin[2] + static_cast<double>(first_cell[2]) * grid.spacing[2], side[2]));
-  ColumnBlocks blocks{side[0], side[1], grid.spacing[0] / rate, grid.spacing[1] / rate, {}, {}};
-  blocks.first.push_back({grid.origin[0] + static_cast<double>(first_cell[0]) * grid.spacing[0],
-                          grid.origin[1] + static_cast<double>(first_cell[1]) * grid.spacing[1]});
-  opencl::DeviceArray<float> bound(state, static_cast<std::uint64_t>(side[0] * side[1] * side[2]),
-                                   "node bounds");
-  project_bound(state, scan, table, blocks, side[0], side[1], 1, 0.0, bound);
-  return bound.to_host();
-}
-
 }  // namespace
 
 Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
@@ -175,8 +158,8 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
     out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
     const Index3 first{id % n[0] * granularity, id / n[0] % n[1] * granularity,
                        id / n[0] / n[1] * granularity};
-    const auto bound =
-        node_bounds(state, upsampler, filtered, grid, upsampling, u_filter, rate, first, computed.side);
+    const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, upsampling, u_filter, rate,
+                                                 first, computed.side);
     for (std::int64_t z = 0; z < computed.side[2]; ++z)
       for (std::int64_t y = 0; y < computed.side[1]; ++y)
         for (std::int64_t x = 0; x < computed.side[0]; ++x) {

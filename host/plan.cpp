@@ -12,6 +12,7 @@
 
 #include "host/foresee.hpp"
 #include "host/gold_stream.hpp"
+#include "host/paper_bounds.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
 #include "vdvr/error.hpp"
@@ -71,7 +72,9 @@ void check_rates(const RateOptions& rates) {
 }
 
 // Global bounds at every rate, the paper's beside ours.
-std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups, const Grid& grid) {
+std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                                 const Volume& base) {
+  const Grid& grid = base.grid;
   std::vector<Bound> out;
   const ParallelGeometry& g = scan.geometry;
   // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take
@@ -82,20 +85,26 @@ std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups
     const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates);
     for (const auto& [rate, value] : a.projection)
       out.push_back({"projection", "amplitude, linear in u", rate, value, true});
-    for (const auto& [rate, value] : a.gold)
-      out.push_back({"gold", "amplitude", rate, value, true});
+    for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude", rate, value, true});
   }
+  const auto append = [&](const std::vector<Bound>& more) {
+    out.insert(out.end(), more.begin(), more.end());
+  };
+  if (10 * static_cast<double>(g.views() * g.rows * g.columns) *
+          static_cast<double>(std::max(g.rows, g.columns)) <
+      4e10)
+    append(paper_projection_bounds(state, scan, bound_rates));
+  if (18 * static_cast<double>(grid.sample_count()) *
+          static_cast<double>(*std::max_element(grid.cells.begin(), grid.cells.end())) <
+      2e10)
+    append(paper_gold_bounds(state, base, bound_rates));
   for (const int rate : bound_rates) {
     const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate,
                  hz = grid.spacing[2] / rate;
     const double wu = pi / g.pitch_u;
-    out.push_back(
-        {"projection", "paper Eq. 5, at samples", rate, du * du / 8 * sups.sampled_second_u, false});
     out.push_back({"projection", "curvature, linear in u", rate, du * du / 8 * sups.second_u, true});
     out.push_back({"projection", "curvature, cubic in u", rate,
                    3.0 / 128 * std::pow(du, 4) * wu * wu * sups.second_u, true});
-    out.push_back({"gold", "paper Eq. 9 without d^3, at samples", rate,
-                   (h * h * sups.sampled_second_u + hz * hz * sups.sampled_second_v) / 8, false});
     out.push_back(
         {"gold", "curvature, global", rate, (h * h * sups.second_u + hz * hz * sups.second_v) / 8, true});
   }
@@ -105,6 +114,7 @@ std::vector<Bound> global_bounds(const FilteredScan& scan, const FieldSups& sups
 // What a trial of some blocks at given rates shows.
 struct Trial {
   double slack = 0, projection = 0, gold = 0, arithmetic = 0;
+  std::int64_t brick = -1;  // where P is largest
 };
 
 // A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
@@ -155,12 +165,41 @@ Trial try_rates(opencl::State& state, GoldStream& stream, const Volume& base, do
           const BrickMeasure& m = measures[i];
           if (m.total < 0) continue;
           t.slack = std::max(t.slack, static_cast<double>(m.slack));
-          t.projection = std::max(t.projection, static_cast<double>(p[i].first));
+          if (t.brick < 0 || static_cast<double>(p[i].first) > t.projection) {
+            t.projection = static_cast<double>(p[i].first);
+            t.brick = m.brick;
+          }
           t.gold = std::max(t.gold, static_cast<double>(m.slack) - static_cast<double>(p[i].second));
         }
       },
       {}, "trial");
   return t;
+}
+
+// P node by node in the brick where its dilated form is largest.
+double worst_node_bound(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                        const GoldSettings& s, std::int64_t brick) {
+  if (brick < 0) return 0;
+  Index3 n{}, first{}, nodes{};
+  for (std::size_t a = 0; a < 3; ++a) n[a] = (s.grid.cells[a] + s.granularity - 1) / s.granularity;
+  const Index3 at_brick{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+  for (std::size_t a = 0; a < 3; ++a) {
+    first[a] = at_brick[a] * s.granularity;
+    nodes[a] = std::min<std::int64_t>(s.granularity, s.grid.cells[a] - first[a]) * s.rate + 1;
+  }
+  const auto p = projection_bound_at_nodes(state, upsampler, scan, s.grid, s.upsampling, s.u_filter, s.rate,
+                                           first, nodes);
+  return static_cast<double>(*std::max_element(p.begin(), p.end()));
+}
+
+void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t, double node_by_node) {
+  bounds.push_back({"projection", "signed curvature, node by node, " + r.u_filter + " in u (trial)",
+                    r.upsampling, node_by_node, true});
+  bounds.push_back({"projection", "signed curvature, by base cell, " + r.u_filter + " in u (trial)",
+                    r.upsampling, t.projection, true});
+  bounds.push_back(
+      {"gold", fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling, r.u_filter),
+       r.gold, t.gold, true});
 }
 
 double range_of_covered(const Volume& volume, const Coverage& coverage, std::int64_t& not_covered) {
@@ -249,7 +288,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   start = now();
   const FieldSups sups = field_sups(state, upsampler, filtered);
   preparation += since(start);
-  plan.bounds = global_bounds(filtered, sups, grid);
+  plan.bounds = global_bounds(state, filtered, sups, plan.base);
   report(progress, "plan", 0.6);
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
@@ -268,12 +307,8 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
       continue;
     GoldStream stream = stream_at(r);
     const Trial t = try_rates(state, stream, plan.base, plan.epsilon_abs);
-    plan.bounds.push_back({"projection", "curvature, signed, node-wise (trial blocks), " + r.u_filter,
-                           r.upsampling, t.projection, true});
-    plan.bounds.push_back(
-        {"gold",
-         "second differences, node-wise (trial blocks), u " + r.u_filter + " " + std::to_string(r.upsampling),
-         r.gold, t.gold, true});
+    add_trial_bounds(plan.bounds, r, t,
+                     worst_node_bound(state, upsampler, filtered, stream.settings(), t.brick));
     if (!finest || t.slack < finest->second.slack) finest = {r, t};
     if (1.1 * t.slack + 4 * t.arithmetic <= share * plan.epsilon_abs) {
       chosen = {r, t};
@@ -288,7 +323,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     }
     report(progress, "plan", 0.7);
   }
-  if (!chosen && 1.2 * finest->second.slack + 6 * finest->second.arithmetic <= plan.epsilon_abs)
+  if (!chosen && 1.1 * finest->second.slack + 4 * finest->second.arithmetic <= plan.epsilon_abs)
     chosen = finest;
   if (!chosen) {
     const Trial& t = finest->second;
@@ -297,7 +332,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
         "{:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
         plan.epsilon_abs, finest->first.upsampling, finest->first.u_filter, finest->first.gold,
         t.projection > t.gold ? "interpolating the projections" : "interpolating gold", t.slack, t.arithmetic,
-        1.2 * t.slack + 6 * t.arithmetic, 100 * (1.2 * t.slack + 6 * t.arithmetic) / plan.reference_range));
+        1.1 * t.slack + 4 * t.arithmetic, 100 * (1.1 * t.slack + 4 * t.arithmetic) / plan.reference_range));
   }
   const auto& [r, t] = *chosen;
   plan.upsampling_u = r.upsampling;

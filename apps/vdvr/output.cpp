@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <set>
+
 #include <cstdio>
 
 #include "host/io/atomic_file.hpp"
@@ -176,10 +180,30 @@ void print_grid(const Grid& g) {
 
 void print_bounds(const std::vector<Bound>& bounds, double epsilon_abs) {
   if (bounds.empty()) return;
-  fmt::print("bounds         {:<11} {:>5}  {:>11}  {:>9}  method\n", "stage", "rate", "value", "of eps");
-  for (const auto& b : bounds)
-    fmt::print("               {:<11} {:>4}x  {:>11.4g}  {:>7.1f} %  {}{}\n", b.stage, b.rate, b.value,
-               100 * b.value / epsilon_abs, b.method, b.rigorous ? "" : " (for comparison)");
+  // One row per method in the order computed, one column per rate.
+  std::set<int> rates;
+  std::vector<std::pair<std::string, std::string>> rows;
+  std::map<std::pair<std::string, std::string>, std::map<int, double>> values;
+  for (const auto& b : bounds) {
+    const std::pair key{b.stage, b.method + (b.rigorous ? "" : " (comparison)")};
+    if (!values.contains(key)) rows.push_back(key);
+    values[key][b.rate] = b.value;
+    rates.insert(b.rate);
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  fmt::print("bounds         % of the tolerance {:.4g}\n", epsilon_abs);
+  fmt::print("  {:<11} {:<52}", "stage", "method");
+  for (const int rate : rates) fmt::print(" {:>8}x", rate);
+  fmt::print("\n");
+  for (const auto& row : rows) {
+    fmt::print("  {:<11} {:<52}", row.first, row.second);
+    for (const int rate : rates) {
+      const auto found = values[row].find(rate);
+      if (found == values[row].end()) fmt::print(" {:>9}", "");
+      else fmt::print(" {:>9.4g}", 100 * found->second / epsilon_abs);
+    }
+    fmt::print("\n");
+  }
 }
 
 void print_budget(const ErrorBudget& budget, double epsilon_abs) {
