@@ -143,4 +143,12 @@ bool is_thin(const Grid& grid) {
   return grid.cells[2] <= 2 || height < 0.02 * width;
 }
 
+std::string outside_certificate(const RenderOptions& options) {
+  const std::string rounding = "colours are rounded to 8 bits";
+  if (options.mode != RenderMode::dvr) return rounding;
+  return fmt::format(
+      "rays stop at opacity {}, so what lies behind is missing with a weight of at most {:.2g}; {}",
+      options.termination, 1 - options.termination, rounding);
+}
+
 }  // namespace vdvr::cli

@@ -43,4 +43,7 @@ const char* sampler_name(SamplerKind kind);
 /// True for volumes of a cell or two in z, of which only slices across z show anything.
 bool is_thin(const Grid& grid);
 
+/// What lies between the certified field and the pixels of such a picture: no certificate covers it.
+std::string outside_certificate(const RenderOptions& options);
+
 }  // namespace vdvr::cli

@@ -224,22 +224,31 @@ int render_command(Arguments& args) {
   }
   progress.clear();
 
-  const std::string stamp = scene.verified ? "certified"
+  // The base samples alone are another field than the one certified.
+  const bool certified = scene.verified && args.text_or("method", "vdvr") == "vdvr";
+  const std::string stamp = certified        ? "certified"
+                            : scene.verified ? "base samples alone: no certificate"
                             : scene.certificate
                                 ? "UNVERIFIED: the content was not compared with the certificate"
                                 : "no certificate";
   const Json json = {{"output", output.string()},
                      {"frames", frames},
-                     {"verified", scene.verified},
+                     {"verified", certified},
                      {"sampler", sampler_name(result.sampler)},
                      {"sampler_reason", result.sampler_reason},
                      {"samples", result.samples},
                      {"seconds", result.seconds},
+                     {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
+                     {"outside_certificate", outside_certificate(o)},
                      {"device", device.info().name}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
+    if (certified)
+      fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
+                 scene.certificate->epsilon_abs);
+    fmt::print("  not covered  {}\n", outside_certificate(o));
     // Slices count no samples along rays.
     fmt::print("  {}{:.3f} s on {}\n",
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,

@@ -25,6 +25,7 @@ struct Outcome {
   ErrorSlice error;
   std::string sampler, sampler_reason;
   std::vector<std::pair<std::string, std::string>> files;  ///< name and what it shows
+  std::map<std::string, std::string> outside;              ///< of a picture: what no certificate covers
   std::map<std::string, double> seconds;
 };
 
@@ -60,6 +61,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     const RenderResult r = raycast(device, resident, o);
     write_png(folder.file(name), r.image);
     out.files.emplace_back(name, what);
+    out.outside[name] = outside_certificate(o);
     out.sampler = sampler_name(r.sampler);
     out.sampler_reason = r.sampler_reason;
   };
@@ -97,6 +99,7 @@ Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::
   return {
       {"output", folder.string()},
       {"files", files},
+      {"outside_certificate", out.outside},
       {"geometry", geometry_json(out.planned.scan.geometry)},
       {"report", report_json(out.planned.scan.report)},
       {"grid", grid_json(out.built.volume.grid)},
@@ -124,6 +127,9 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
   print_seconds(out.seconds);
   fmt::print("files in       {}\n", folder.string());
   for (const auto& [name, what] : out.files) fmt::print("    {:<18} {}\n", name, what);
+  fmt::print("pictures       show samples within {:.4g} of F; beyond that ", c.epsilon_abs);
+  const auto dvr = out.outside.find("dvr.png");
+  fmt::print("{}\n", dvr == out.outside.end() ? "" : dvr->second);
 }
 
 }  // namespace
