@@ -16,9 +16,10 @@ FieldSlopes field_slopes(const MixedVolume& v) {
   const Index3 bricks = v.bricks();
   const auto offsets = tile_offsets(v);
   FieldSlopes out;
+  out.bricks.resize(v.level.size());
   std::mutex lock;
   parallel_for(bricks[2] * bricks[1], {}, "slopes", [&](std::int64_t row) {
-    FieldSlopes local;
+    std::array<double, 3> per_cell{0, 0, 0};
     const std::int64_t bz = row / bricks[1], by = row % bricks[1];
     for (std::int64_t bx = 0; bx < bricks[0]; ++bx) {
       const VdvrBrick r = brick_record(v, offsets, bx, by, bz);
@@ -44,19 +45,15 @@ FieldSlopes field_slopes(const MixedVolume& v) {
             if (z < end[2]) largest[2] = std::max(largest[2], std::abs(p[x + stride[2]] - p[x]));
           }
         }
-      local.magnitude = std::max(local.magnitude, static_cast<double>(magnitude));
+      FieldSlopes::Brick& own = out.bricks[static_cast<std::size_t>((bz * bricks[1] + by) * bricks[0] + bx)];
+      own.magnitude = static_cast<double>(magnitude);
       for (std::size_t a = 0; a < 3; ++a) {
-        local.per_sample[a] = std::max(local.per_sample[a], static_cast<double>(largest[a]));
-        local.per_cell[a] =
-            std::max(local.per_cell[a], static_cast<double>(largest[a]) * std::exp2(levels[a]));
+        own.per_sample[a] = static_cast<double>(largest[a]);
+        per_cell[a] = std::max(per_cell[a], own.per_sample[a] * std::exp2(levels[a]));
       }
     }
     const std::lock_guard guard(lock);
-    out.magnitude = std::max(out.magnitude, local.magnitude);
-    for (std::size_t a = 0; a < 3; ++a) {
-      out.per_sample[a] = std::max(out.per_sample[a], local.per_sample[a]);
-      out.per_cell[a] = std::max(out.per_cell[a], local.per_cell[a]);
-    }
+    for (std::size_t a = 0; a < 3; ++a) out.per_cell[a] = std::max(out.per_cell[a], per_cell[a]);
   });
   return out;
 }
@@ -67,22 +64,25 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
   SamplerTerms terms;
   // Seven lerps of two rounded products and one rounded sum each, on three levels: 14 u of the largest sample
   // covers them. A cell coordinate rounds by at most 2 u of its size, and a wrong position costs its share of
-  // the slope per cell.
-  double buffer = 14 * u * slopes.magnitude;
+  // the slope per cell, in whichever brick it ends.
+  double coordinates = 0;
   for (std::size_t a = 0; a < 3; ++a)
-    buffer += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
-  terms.buffer = {buffer, "rounding: 14 u of the largest sample, 2 n u of the largest slope per cell"};
-  if (probe.image3d) {
-    double image = probe.constant_error * slopes.magnitude;
-    for (std::size_t a = 0; a < 3; ++a) {
-      image += (probe.delta + 2 * u * static_cast<double>(atlas_length)) * slopes.per_sample[a];
-      image += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
-    }
-    image += 14 * u * slopes.magnitude;
-    terms.image3d =
-        ErrorTerm{image, fmt::format("device probe: weights err by {:.3g}, products by {:.3g} of the sample",
-                                     probe.delta, probe.constant_error)};
+    coordinates += 2 * u * static_cast<double>(grid.cells[a]) * slopes.per_cell[a];
+  double magnitude = 0, image = 0;
+  for (const FieldSlopes::Brick& b : slopes.bricks) {
+    magnitude = std::max(magnitude, b.magnitude);
+    double own = (probe.constant_error + 14 * u) * b.magnitude;
+    for (const double difference : b.per_sample)
+      own += (probe.delta + 2 * u * static_cast<double>(atlas_length)) * difference;
+    image = std::max(image, own);
   }
+  const double buffer = 14 * u * magnitude + coordinates;
+  terms.buffer = {buffer, "rounding: 14 u of the largest sample, 2 n u of the largest slope per cell"};
+  if (probe.image3d)
+    terms.image3d = ErrorTerm{
+        image + coordinates,
+        fmt::format("device probe, largest brick: weights err by {:.3g}, products by {:.3g} of the sample",
+                    probe.delta, probe.constant_error)};
   return terms;
 }
 

@@ -2,7 +2,8 @@
 // Called by build.cpp and verify.cpp.
 #pragma once
 
-#include <optional>
+#include <array>
+#include <vector>
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/mixed_volume.hpp"
@@ -10,18 +11,20 @@
 
 namespace vdvr {
 
-/// Largest neighbour differences of the stored samples per axis x, y, z: inside any brick at its own spacing,
-/// and per base cell.
+/// Largest neighbour differences of the stored samples per axis x, y, z.
 struct FieldSlopes {
-  std::array<double, 3> per_sample{0, 0, 0};
-  std::array<double, 3> per_cell{0, 0, 0};
-  double magnitude = 0;  ///< largest |sample|
+  struct Brick {
+    std::array<double, 3> per_sample{0, 0, 0};  ///< at its own spacing
+    double magnitude = 0;                       ///< largest |sample|
+  };
+  std::vector<Brick> bricks;
+  std::array<double, 3> per_cell{0, 0, 0};  ///< over all bricks, per base cell
 };
 /// Cost: one pass over all samples that a brick can interpolate, over all cores.
 FieldSlopes field_slopes(const MixedVolume& volume);
 
-/// buffer: fp32 rounding of the coordinate and of seven interpolations. image3d: the texture unit's weights
-/// and products, as probed; absent where the device has no such sampler.
+/// The largest over the bricks. buffer: fp32 rounding of the coordinate and of seven interpolations. image3d:
+/// the texture unit's weights and products, as probed; absent where the device has no such sampler.
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
                            std::int64_t atlas_length);
 
