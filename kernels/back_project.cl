@@ -9,33 +9,14 @@
 // Called by host/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
+#include "shared/lanes.h"
+
 #ifndef VDVR_CUBIC
 #error "VDVR_CUBIC must be 0 (linear in u) or 1 (4-point cubic in u)"
 #endif
 // Tuning; never changes the result.
-#ifndef VDVR_LANES
-#define VDVR_LANES 16
-#endif
 #ifndef VDVR_TILE
 #define VDVR_TILE 8
-#endif
-
-#if VDVR_LANES == 1
-#define VEC float
-#define LOAD(p) (*(p))
-#define STORE(v, p) (*(p) = (v))
-#elif VDVR_LANES == 4
-#define VEC float4
-#define LOAD(p) vload4(0, p)
-#define STORE(v, p) vstore4(v, 0, p)
-#elif VDVR_LANES == 8
-#define VEC float8
-#define LOAD(p) vload8(0, p)
-#define STORE(v, p) vstore8(v, 0, p)
-#else
-#define VEC float16
-#define LOAD(p) (*(__global const float16*)(p))
-#define STORE(v, p) (*(__global float16*)(p) = (v))
 #endif
 
 // A tile of 1 or 4 x 2 neighbours; lane i of a TILE value belongs to column i % 4, row i / 4.

@@ -6,22 +6,7 @@
 // 16 + terms / 16 instead of terms. Called by host/filter_projections.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
-#ifndef VDVR_LANES
-#define VDVR_LANES 16
-#endif
-#if VDVR_LANES == 1
-#define VEC float
-#define LOAD(p) (*(p))
-#define STORE(v, p) (*(p) = (v))
-#elif VDVR_LANES == 4
-#define VEC float4
-#define LOAD(p) vload4(0, p)
-#define STORE(v, p) vstore4(v, 0, p)
-#else
-#define VEC float16
-#define LOAD(p) (*(__global const float16*)(p))
-#define STORE(v, p) (*(__global float16*)(p) = (v))
-#endif
+#include "shared/lanes.h"
 
 // Eight rows of `a` share each vector of `v`. Named sums, not arrays: compilers keep these in registers.
 #define FOR_ROWS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
