@@ -35,13 +35,6 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// Granularity that does not waste tiles on a grid thinner than a brick.
-int fitting_granularity(int wanted, const Grid& grid) {
-  int g = wanted;
-  while (g > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < g) g /= 2;
-  return g;
-}
-
 // Bricks that meet the region of interest; all where there is none.
 std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b,
                                         const std::optional<std::array<double, 6>>& roi) {
@@ -78,7 +71,7 @@ class Builder {
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
     bricks_.rate = plan.gold_rate;
-    bricks_.base = plan.base.samples;
+    bricks_.base = plan.fitted.empty() ? plan.base.samples : plan.fitted;
     selected_ = bricks_in_roi(bricks_, options.roi);
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
@@ -93,6 +86,8 @@ class Builder {
     sups_ = field_sups(state_, *upsampler_, filtered_);
     GoldSettings settings{plan.grid,         bricks_.granularity, plan.gold_rate,
                           plan.upsampling_u, plan.u_filter,       options.window};
+    settings.midrange = plan.settings.coefficients == "midrange";
+    settings.grid_only = plan.settings.terms == "grid";
     stream_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     watch_.lap("bounds");
     probe_ = probe_sampler(device);
@@ -101,16 +96,19 @@ class Builder {
 
   // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
   double node_tolerance(const SamplerTerms& sampler) const {
+    if (stream_->settings().grid_only) return plan_.epsilon_abs;
     return plan_.epsilon_abs - stream_->arithmetic() -
            std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
   }
 
   void classify(double tolerance) {
-    // Gold computed in two blocks differs by its rounding; a brick at the gold rate must pass all the same.
-    const double strict = tolerance - 2 * stream_->arithmetic();
+    // Gold computed in two blocks differs by rounding; a brick at the gold rate must pass all the same. The
+    // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
+    double largest = 0;
+    for (const float v : bricks_.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
+    const double strict = tolerance - std::min(2 * stream_->arithmetic(), 0x1p-15 * largest);
     const DeviceField base(state_, as_mixed({bricks_.grid, bricks_.base}, bricks_.granularity));
-    std::vector<std::uint8_t> near = stream_->bricks_near_coverage();
-    for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && selected_[i];
+    const std::vector<std::uint8_t> near = classified();
     const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near),
                                                         "bricks to classify");
     measures_.assign(bricks_.level.size(), {});
@@ -139,6 +137,13 @@ class Builder {
         },
         progress_, "classify");
     watch_.lap("classify");
+  }
+
+  // Bricks that may hold a tested node.
+  std::vector<std::uint8_t> classified() const {
+    std::vector<std::uint8_t> near = stream_->bricks_near_coverage();
+    for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && selected_[i];
+    return near;
   }
 
   // Closes, packs, measures; raises bricks until every node is within the tolerance.
@@ -303,10 +308,11 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
                          "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
-  c.holds_buffer = c.total_buffer <= c.epsilon_abs;
+  c.comparison = is_comparison(plan, options);
+  c.holds_buffer = !c.comparison && c.total_buffer <= c.epsilon_abs;
   if (sampler.image3d) {
     c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
-    c.holds_image3d = *c.total_image3d <= c.epsilon_abs;
+    c.holds_image3d = !c.comparison && *c.total_image3d <= c.epsilon_abs;
   }
   c.upsampling_u = plan.upsampling_u;
   c.u_filter = plan.u_filter;
@@ -330,6 +336,11 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.driver = device.info().driver;
   c.version = VDVR_VERSION;
   c.notes = plan.notes;
+  if (c.comparison)
+    c.notes.push_back(fmt::format("built for comparison with {}: nothing is certified",
+                                  plan.settings.terms == "grid"
+                                      ? "terms grid, which test |V - gold| alone"
+                                      : "closing none, whose field is not continuous"));
   c.notes.push_back(
       "covers interpolation, not physics: noise, too few views, the filter window and truncation shape F "
       "itself");
@@ -371,7 +382,7 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
         sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(), atlas);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || attempt == 2) {
+    if (holds || attempt == 2 || is_comparison(plan, options)) {
       result.seconds = builder.seconds();
       return result;
     }

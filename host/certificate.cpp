@@ -167,6 +167,7 @@ void read_promise(const Member& m, Certificate& c) {
   c.reference_range = m.at("reference_range").number();
   const Member holds = m.at("holds"), total = m.at("total");
   c.holds_buffer = holds.at("buffer").flag();
+  if (m.has("comparison")) c.comparison = m.at("comparison").flag();
   if (holds.has("image3d")) c.holds_image3d = holds.at("image3d").flag();
   c.total_buffer = total.at("buffer").number();
   if (total.has("image3d")) c.total_image3d = total.at("image3d").number();
@@ -223,6 +224,7 @@ std::string to_json(const Certificate& c) {
   j["epsilon"] = finite("epsilon", c.epsilon);
   j["epsilon_abs"] = finite("epsilon_abs", c.epsilon_abs);
   j["reference_range"] = finite("reference_range", c.reference_range);
+  if (c.comparison) j["comparison"] = true;
   j["holds"] = {{"buffer", c.holds_buffer}};
   if (c.holds_image3d) j["holds"]["image3d"] = *c.holds_image3d;
   j["total"] = {{"buffer", finite("total.buffer", c.total_buffer)}};

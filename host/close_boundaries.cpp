@@ -48,67 +48,73 @@ struct TileView {
   }
 };
 
-// Puts the base samples into a tile: base is the one source of every sample on the base lattice.
-void put_base_samples(const OpenBricks& b, const TileView& t, std::vector<float>& tile) {
-  const Index3 n = b.grid.samples();
-  const std::int64_t g = b.granularity;
-  for (std::int64_t z = 0; z <= t.end[2] >> t.level[2]; ++z)
-    for (std::int64_t y = 0; y <= t.end[1] >> t.level[1]; ++y)
-      for (std::int64_t x = 0; x <= t.end[0] >> t.level[0]; ++x)
-        tile[t.index({x << t.level[0], y << t.level[1], z << t.level[2]})] = b.base[at(
-            ((t.position[2] * g + z) * n[1] + t.position[1] * g + y) * n[0] + t.position[0] * g + x)];
-}
+// What a brick stores before closing: its tile, or at level 0 its part of the base.
+class BrickSamples {
+ public:
+  BrickSamples(const OpenBricks& b, std::int64_t brick)
+      : bricks_(&b), view_(b, brick), tile_(&b.gold[at(brick)]) {}
+  [[nodiscard]] const TileView& view() const { return view_; }
+  [[nodiscard]] float operator()(const Index3& i) const {
+    if (!tile_->empty()) return (*tile_)[view_.index(i)];
+    const Index3 n = bricks_->grid.samples();
+    const std::int64_t g = bricks_->granularity;
+    return bricks_->base[at(((view_.position[2] * g + i[2]) * n[1] + view_.position[1] * g + i[1]) * n[0] +
+                            view_.position[0] * g + i[0])];
+  }
 
-// The closing of one edge or face of a brick.
+ private:
+  const OpenBricks* bricks_;
+  TileView view_;
+  const std::vector<float>* tile_;
+};
+
+// The closing of one corner, edge or face of a brick.
 class Entity {
  public:
   Entity(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side)
-      : own_(b, brick), owner_(own_) {
-    const auto incident = incident_bricks(b, brick, side);
-    const std::int64_t owner = *std::min_element(incident.begin(), incident.end());
-    owner_ = TileView(b, owner);
-    owner_gold_ = &b.gold[at(owner)];
+      : own_(b, brick), owner_(b, brick) {
+    // The coarsest incident brick is the source, the first of them where there are several.
+    std::int64_t owner = brick;
     lowest_ = own_.level;
-    for (const std::int64_t i : incident) {
-      const LevelTriple& l = b.level[at(i)];
+    for (const std::int64_t i : incident_bricks(b, brick, side)) {
+      const LevelTriple &l = b.level[at(i)], &o = b.level[at(owner)];
+      if (l < o || (l == o && i < owner)) owner = i;
       for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min(lowest_[a], static_cast<int>(l[2 - a]));
     }
+    owner_ = BrickSamples(b, owner);
     for (std::size_t a = 0; a < 3; ++a) {
       fixed_[a] = side[a] == 0 ? 0 : own_.end[a];
       if (side[a] == 1) along_.push_back(a);
     }
     unchanged_ = owner == brick;
-    for (const std::size_t a : along_) unchanged_ = unchanged_ && lowest_[a] == own_.level[a];
   }
 
   void close(std::vector<float>& tile) const {
     if (unchanged_) return;
     std::vector<std::int64_t> step;
     for (const std::size_t a : along_) step.push_back(std::int64_t{1} << (own_.level[a] - lowest_[a]));
-    if (along_.size() == 1) close_edge(tile, along_[0], step[0]);
+    if (along_.empty()) take_from_owner(tile, fixed_);
+    else if (along_.size() == 1) close_edge(tile, along_[0], step[0]);
     else close_face(tile, along_[0], along_[1], step[0], step[1]);
   }
 
  private:
-  // The sample that every incident brick takes at a lattice point: base where it lies on the base lattice
-  // (already in place), else the owner's gold sample.
+  // The sample that every incident brick takes at a lattice point of the coarsest one.
   void take_from_owner(std::vector<float>& tile, const Index3& i) const {
-    bool on_base = true;
-    for (std::size_t a = 0; a < 3; ++a) on_base = on_base && i[a] % (std::int64_t{1} << own_.level[a]) == 0;
-    if (on_base) return;
+    const TileView& owner = owner_.view();
     Index3 o{};
     for (std::size_t a = 0; a < 3; ++a) {
       const bool runs_along = std::find(along_.begin(), along_.end(), a) != along_.end();
       if (runs_along) {
-        const int shift = owner_.level[a] - own_.level[a];
+        const int shift = owner.level[a] - own_.level[a];
         o[a] = shift >= 0 ? i[a] << shift : i[a] >> -shift;
       } else {
         const bool far_side = i[a] != 0;  // of this brick; the owner may lie on either side of the border
         const std::int64_t plane = own_.position[a] + (far_side ? 1 : 0);
-        o[a] = owner_.position[a] == plane ? 0 : owner_.end[a];
+        o[a] = owner.position[a] == plane ? 0 : owner.end[a];
       }
     }
-    tile[own_.index(i)] = (*owner_gold_)[owner_.index(o)];
+    tile[own_.index(i)] = owner_(o);
   }
 
   void close_edge(std::vector<float>& tile, std::size_t a, std::int64_t step) const {
@@ -155,8 +161,8 @@ class Entity {
     return static_cast<float>(part) / static_cast<float>(whole);
   }
 
-  TileView own_, owner_;
-  const std::vector<float>* owner_gold_ = nullptr;
+  TileView own_;
+  BrickSamples owner_;
   std::array<int, 3> lowest_{};
   Index3 fixed_{};
   std::vector<std::size_t> along_;  // ascending axes
@@ -182,9 +188,8 @@ void repeat_last_planes(const TileView& t, int granularity, std::vector<float>& 
 std::vector<float> closed_tile(const OpenBricks& b, std::int64_t brick) {
   const TileView t(b, brick);
   std::vector<float> tile = b.gold[at(brick)];
-  put_base_samples(b, t, tile);
   for (const std::size_t inside :
-       {std::size_t{1}, std::size_t{2}})  // edges run along one axis, faces along two
+       {std::size_t{0}, std::size_t{1}, std::size_t{2}})  // corners, edges along one axis, faces along two
     for (int part = 0; part < 27; ++part) {
       const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
       if (static_cast<std::size_t>(std::count(side.begin(), side.end(), 1)) == inside)

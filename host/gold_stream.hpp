@@ -17,21 +17,14 @@
 #include "host/back_project.hpp"
 #include "host/brick_layout.hpp"
 #include "host/coverage.hpp"
-#include "host/bound_table.hpp"
+#include "host/fit_coefficients.hpp"
+#include "host/gold_settings.hpp"
+#include "host/node_slack.hpp"
 #include "host/projection_bounds.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 
 namespace vdvr {
-
-struct GoldSettings {
-  Grid grid;
-  int granularity = 4;
-  int rate = 8;
-  int upsampling = 8;
-  std::string u_filter = "linear";
-  std::optional<std::pair<double, double>> window;
-};
 
 /// What one brick measured against gold.
 struct BrickMeasure {
@@ -88,7 +81,7 @@ class GoldStream {
   /// fp32 error bound of any gold sample.
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
   /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
-  [[nodiscard]] double rounding_in_slack() const { return 1.5 * rounding_; }
+  [[nodiscard]] double rounding_in_slack() const { return node_slack_ ? node_slack_->rounding() : 0; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
@@ -105,6 +98,10 @@ class GoldStream {
     std::vector<std::array<std::int64_t, 2>> first;
   };
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
+  [[nodiscard]] std::vector<float> margins(const ColumnBlocks& columns) const;
+  [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const std::vector<float>& margins,
+                                                                std::int64_t nx, std::int64_t ny) const;
+  std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void run_slab(const Work& work, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
@@ -113,18 +110,22 @@ class GoldStream {
   opencl::State& state_;
   const FilteredScan& scan_;
   Upsampler& upsampler_;
-  FieldSups sups_;
   GoldSettings settings_;
   Coverage coverage_;
   UpsampledColumns columns_;
-  std::vector<float> cell_p_;       // P per base cell once computed, [z][y][x]; negative: not yet
-  std::vector<float> cell_addend_;  // 2.5 P and the remainder of T, alike
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
+  std::int64_t halo_ = 1;  // gold nodes around a block
   GoldSpent spent_;
   double arithmetic_ = 0;
-  double rounding_ = 0;   // the part of it that differs from sample to sample
-  double remainder_ = 0;  // of T, anywhere in the field
+  std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
+
+/// Base samples fitted to the trilinear filter, on bricks with selected != 0; elsewhere `base` stays. Gold at
+/// 2x serves: the error between base samples peaks near the middles of edges, faces and cells, and a fit to
+/// those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
+void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                      const FieldSups& sups, GoldSettings settings, const std::vector<std::uint8_t>& selected,
+                      std::vector<float>& base, const Progress& progress);
 
 class GoldStream::Batch {
  public:
@@ -137,6 +138,10 @@ class GoldStream::Batch {
   std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
                                    const opencl::DeviceArray<std::uint8_t>& selected);
 
+  /// Writes the fitted base samples of the blocks into `base` [z][y][x] of the whole grid, where they may be
+  /// kept.
+  void fit_base(std::vector<float>& base);
+
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();
 
@@ -146,19 +151,19 @@ class GoldStream::Batch {
   void for_each_node(std::int64_t brick, Visit&& visit) const {
     const auto [b, x, y, z] = place(brick);
     const std::vector<float> gold = gold_.to_host(), slack = slack_.to_host();
-    const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
-    for (std::int64_t k = 0; k <= side && z * side + k < nz_; ++k)
+    const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate, h = shape_.halo;
+    for (std::int64_t k = 0; k <= side && z * side + k < shape_.nz; ++k)
       for (std::int64_t j = 0; j <= side; ++j)
         for (std::int64_t i = 0; i <= side; ++i) {
           const std::int64_t nx = x * side + i, ny = y * side + j, nz = z * side + k;
-          visit(Index3{i, j, k},
-                gold[static_cast<std::size_t>(((b * (ny_ + 2) + ny + 1) * (nx_ + 2) + nx + 1) * gold_stride_ +
-                                              nz + 1)],
-                slack[static_cast<std::size_t>(((b * ny_ + ny) * nx_ + nx) * stride_ + nz)]);
+          const std::int64_t column = (b * (shape_.ny + 2 * h) + ny + h) * (shape_.nx + 2 * h) + nx + h;
+          visit(Index3{i, j, k}, gold[static_cast<std::size_t>(column * shape_.gold_stride + nz + h)],
+                slack[static_cast<std::size_t>(((b * shape_.ny + ny) * shape_.nx + nx) * stride_ + nz)]);
         }
   }
 
-  /// Gold samples of the requested tiles, in the order asked, concatenated: float [z][y][x] each.
+  /// Samples of the requested tiles, in the order asked, concatenated: float [z][y][x] each. They are gold at
+  /// the top level, fitted below it if the settings say so.
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
   /// Measures a stored field on every selected brick.
@@ -168,17 +173,24 @@ class GoldStream::Batch {
  private:
   friend class GoldStream;
   struct Results;
+  struct TileRequest;
+  [[nodiscard]] TileRequest request(std::int64_t brick, std::int64_t spacing, std::uint64_t offset) const;
   Results run_measure(const DeviceField& field, float tolerance,
                       const opencl::DeviceArray<std::uint8_t>& selected);
   Batch(opencl::State& state, const GoldSettings& settings) : state_(state), settings_(settings) {}
+  void choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
+              const std::vector<std::uint8_t>& selected);
   [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
   [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }
+  /// Samples of level log2(rate / spacing) on the blocks, made on first use.
+  const LevelSamples& lattice(std::int64_t spacing);
 
   opencl::State& state_;
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
-  std::int64_t nx_ = 0, ny_ = 0, nz_ = 0, gold_stride_ = 0, stride_ = 0;
-  float lowest_ = 0;  // margin below which a column is untested
+  GoldBlocks shape_;
+  std::int64_t stride_ = 0;                        // of the slack's columns
+  std::map<std::int64_t, LevelSamples> lattices_;  // by spacing
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;

@@ -31,6 +31,8 @@ struct Rates {
 
 // Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
 constexpr double share = 0.5, patient_share = 0.65;
+// The same for P of linear interpolation in u alone.
+constexpr double linear_share = 0.1;
 
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -141,11 +143,11 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   return selected;
 }
 
-int trial_granularity(const Grid& grid) {
-  int granularity = 4;
-  while (granularity > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < granularity)
-    granularity /= 2;
-  return granularity;
+// Whether the grid keeps enough of the tolerance. Cubic interpolation in u costs twice the time and hardly
+// any of the tolerance: linear must not cost much more, or the volume pays for it.
+bool fits(const Rates& r, const Trial& t, double epsilon) {
+  if (r.u_filter == "linear" && 2.5 * t.projection > linear_share * epsilon) return false;
+  return 1.1 * t.slack + 4 * t.arithmetic <= share * epsilon;
 }
 
 Trial try_rates(opencl::State& state, GoldStream& stream, const Volume& base, double epsilon) {
@@ -202,7 +204,9 @@ void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t
        r.gold, t.gold, true});
 }
 
-double range_of_covered(const Volume& volume, const Coverage& coverage, std::int64_t& not_covered) {
+// Smallest and largest covered sample.
+std::pair<double, double> covered_values(const Volume& volume, const Coverage& coverage,
+                                         std::int64_t& not_covered) {
   const Index3 n = volume.grid.samples();
   double low = INFINITY, high = -INFINITY;
   not_covered = 0;
@@ -224,21 +228,20 @@ double range_of_covered(const Volume& volume, const Coverage& coverage, std::int
       high = std::max(high, v);
     }
   }
-  return high - low;
+  return {low, high};
 }
 
-void set_epsilon(Plan& plan, const Tolerance& tolerance) {
+void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
   if (tolerance.relative.has_value() == tolerance.absolute.has_value())
     throw InputError("give one of --epsilon and --epsilon-abs");
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   if (!(given > 0) || !std::isfinite(given))
     throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
-  if (tolerance.relative) {
-    plan.epsilon = given;
-    plan.epsilon_abs = given * plan.reference_range;
-  } else {
-    plan.epsilon_abs = given;
-    plan.epsilon = plan.reference_range > 0 ? given / plan.reference_range : 0;
+  plan.epsilon = given;
+  plan.epsilon_abs = given * plan.reference_range;
+  if (tolerance.absolute || tolerance.of_max) {
+    plan.epsilon_abs = tolerance.absolute ? given : given * largest;
+    plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   }
   if (!(plan.epsilon_abs > 0))
     throw InputError(
@@ -249,7 +252,8 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance) {
 }  // namespace
 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
-               const RateOptions& rates, const Tolerance& tolerance, const Progress& progress) {
+               const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
+               const Progress& progress) {
   check_rates(rates);
   ParallelGeometry used = scan.geometry;
   if (field.center) used.center = *field.center;
@@ -258,6 +262,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.notes = check_scan(used);
   plan.grid = grid;
   plan.field = field;
+  plan.settings = settings;
   report(progress, "plan", 0.0);
   const auto now = [] { return std::chrono::steady_clock::now(); };
   const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
@@ -271,18 +276,19 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   // The reference range at rates whose own error cannot matter.
   plan.base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
   std::int64_t not_covered = 0;
-  plan.reference_range = range_of_covered(plan.base, coverage, not_covered);
+  auto [low, high] = covered_values(plan.base, coverage, not_covered);
   plan.not_covered_count = not_covered;
   plan.not_covered_fraction = static_cast<double>(not_covered) / static_cast<double>(grid.sample_count());
   // One plane of covered samples suffices; none does not.
   if (not_covered == grid.sample_count() && grid.cells[2] > 1)
     throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
-  if (!std::isfinite(plan.reference_range))
-    plan.reference_range = [&] {  // a one-row scan covers only the plane z = 0, between samples
-      const auto [low, high] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
-      return static_cast<double>(*high) - static_cast<double>(*low);
-    }();
-  set_epsilon(plan, tolerance);
+  if (!std::isfinite(high - low)) {  // a one-row scan covers only the plane z = 0, between samples
+    const auto [lowest, highest] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
+    low = static_cast<double>(*lowest);
+    high = static_cast<double>(*highest);
+  }
+  plan.reference_range = high - low;
+  set_epsilon(plan, tolerance, std::max(std::fabs(low), std::fabs(high)));
   report(progress, "plan", 0.3);
 
   start = now();
@@ -294,15 +300,24 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
   // all.
   const auto all = candidates(rates);
+  const bool grid_only = settings.terms == "grid";
   const auto stream_at = [&](const Rates& r) {
     return GoldStream(state, filtered, upsampler, sups,
-                      {grid, trial_granularity(grid), r.gold, r.upsampling, r.u_filter, {}});
+                      {grid,
+                       fitting_granularity(settings.granularity, grid),
+                       r.gold,
+                       r.upsampling,
+                       r.u_filter,
+                       {},
+                       settings.coefficients == "midrange",
+                       false,
+                       grid_only});
   };
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
     // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
     const double step = filtered.geometry.pitch_u / r.upsampling;
-    if (r.u_filter == "linear" && &r != &all.back() &&
+    if (!grid_only && r.u_filter == "linear" && &r != &all.back() &&
         2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs)
       continue;
     GoldStream stream = stream_at(r);
@@ -310,7 +325,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     add_trial_bounds(plan.bounds, r, t,
                      worst_node_bound(state, upsampler, filtered, stream.settings(), t.brick));
     if (!finest || t.slack < finest->second.slack) finest = {r, t};
-    if (1.1 * t.slack + 4 * t.arithmetic <= share * plan.epsilon_abs) {
+    if (grid_only || fits(r, t, plan.epsilon_abs)) {
       chosen = {r, t};
       break;
     }
@@ -341,7 +356,8 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   plan.budget.projection = {t.projection, "curvature, node-wise, on trial blocks"};
   plan.budget.gold = {t.gold, "second differences of gold on trial blocks"};
   plan.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
-  plan.budget.grid = {plan.epsilon_abs - t.slack - t.arithmetic, "what is left"};
+  plan.budget.grid = {grid_only ? plan.epsilon_abs : plan.epsilon_abs - t.slack - t.arithmetic,
+                      grid_only ? "all: no other term counts" : "what is left"};
   plan.gold_samples = 1;
   for (const std::int64_t cells : grid.cells)
     plan.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
@@ -349,14 +365,26 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
   report(progress, "plan", 0.8);
 
-  GoldStream stream = stream_at(r);
-  const Foreseen foreseen = foresee_build(state, stream, plan.base, plan.epsilon_abs - 3 * t.arithmetic);
-  plan.samples_ratio = foreseen.samples_ratio;
-  plan.seconds = preparation + foreseen.seconds;
-  // On the device what the trial took and the stored field; on the host the scan, filtered too, the base
-  // samples twice, and the tiles before and after closing.
-  plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes +
-                      4 * (2 * static_cast<std::uint64_t>(scan.size()) + 2 * plan.base.samples.size());
+  if (settings.coefficients == "midrange") {
+    start = now();
+    plan.fitted = plan.base.samples;
+    GoldStream stream = stream_at(r);
+    fit_base_samples(state, filtered, upsampler, sups, stream.settings(), stream.bricks_near_coverage(),
+                     plan.fitted, {});
+    preparation += since(start);
+  }
+  if (settings.foresee) {
+    GoldStream stream = stream_at(r);
+    const Foreseen foreseen =
+        foresee_build(state, stream, plan.fitted.empty() ? plan.base : Volume{grid, plan.fitted},
+                      plan.epsilon_abs - t.arithmetic);
+    plan.samples_ratio = foreseen.samples_ratio;
+    plan.seconds = preparation + foreseen.seconds;
+    // On the device what the trial took and the stored field; on the host the scan, filtered too, the base
+    // samples three times, and the tiles before and after closing.
+    plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes +
+                        4 * (2 * static_cast<std::uint64_t>(scan.size()) + 3 * plan.base.samples.size());
+  }
   report(progress, "plan", 1.0);
   return plan;
 }

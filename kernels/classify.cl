@@ -5,33 +5,11 @@
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
-// Gold at every `spacing`-th column, interpolated linearly along z from its every `spacing`-th node:
-// along[block][y / spacing][x / spacing][stride]. One work-item fills one column.
-__kernel void interpolate_columns(__global float* along, __global const float* gold, int nx, int ny, int nz,
-                                  int gold_stride, int stride, int spacing, int blocks) {
-  const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
-  const int x = (int)get_global_id(0), y = (int)get_global_id(1), block = (int)get_global_id(2);
-  if (x >= cx || y >= cy || block >= blocks) return;
-  __global const float* from =
-      gold + (((size_t)block * (ny + 2) + y * spacing + 1) * (nx + 2) + x * spacing + 1) * gold_stride + 1;
-  __global float* to = along + (((size_t)block * cy + y) * cx + x) * stride;
-  const float step = 1.0f / (float)spacing;
-  for (int k = 0; k + spacing < nz; k += spacing) {
-    const float low = from[k], high = from[k + spacing];
-    to[k] = low;
-    for (int i = 1; i < spacing; ++i) {
-      const float f = (float)i * step;
-      to[k + i] = (1.0f - f) * low + f * high;
-    }
-  }
-  to[nz - 1] = from[nz - 1];
-}
-
 // The level's interpolant at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                             \
-  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + stride + (z))) + \
-        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + stride + (z))) -          \
-        vload16(0, gold_column + (z))) +                                                        \
+#define ERROR_AT(z)                                                                                  \
+  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + gold_stride + (z))) + \
+        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + gold_stride + (z))) -          \
+        vload16(0, gold_column + (z))) +                                                             \
    vload16(0, slack_column + (z)))
 
 inline float largest_of(float16 v) {
@@ -48,13 +26,15 @@ inline float largest_of(float16 v) {
 __kernel void level_error(volatile __global int* error, __global const int* before,
                           __global const float* along, __global const float* gold,
                           __global const float* slack, __global const float* margin, float lowest, int nx,
-                          int ny, int nz, int gold_stride, int stride, int spacing, int bricks_x,
-                          int bricks_y, int bricks_z, int blocks, float tolerance) {
+                          int ny, int nz, int halo, int gold_stride, int stride, int spacing, int reach,
+                          int cx, int cy, int bricks_x, int bricks_y, int bricks_z, int blocks,
+                          float tolerance) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
   if (x >= nx || y >= ny || block >= blocks) return;
   const size_t column = ((size_t)block * ny + y) * nx + x;
-  if (margin[column] < lowest) return;
+  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
+  if (margin[gold_at] < lowest) return;
   // A column on a border belongs to the closed boxes of the bricks on both sides.
   const int bx0 = max((x - 1) / VDVR_BRICK_NODES, 0), bx1 = min(x / VDVR_BRICK_NODES, bricks_x - 1);
   const int by0 = max((y - 1) / VDVR_BRICK_NODES, 0), by1 = min(y / VDVR_BRICK_NODES, bricks_y - 1);
@@ -66,15 +46,14 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
       wanted = wanted || (bits >= 0 && !(as_float(bits) <= tolerance));
     }
   if (!wanted) return;
-  const int cx = (nx - 1) / spacing + 1, cy = (ny - 1) / spacing + 1;
-  const int ix = min(x / spacing, cx - 2), iy = min(y / spacing, cy - 2);
+  const int ix = min(x / spacing, (nx - 1) / spacing - 1), iy = min(y / spacing, (ny - 1) / spacing - 1);
   const float fx = (float)(x - ix * spacing) / (float)spacing,
               fy = (float)(y - iy * spacing) / (float)spacing;
   const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
-  __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * stride + first;
-  __global const float* b = a + (size_t)cx * stride;
-  __global const float* gold_column =
-      gold + (((size_t)block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + first + 1;
+  __global const float* a =
+      along + (((size_t)block * cy + iy + reach) * cx + ix + reach) * gold_stride + halo + first;
+  __global const float* b = a + (size_t)cx * gold_stride;
+  __global const float* gold_column = gold + gold_at * gold_stride + halo + first;
   __global const float* slack_column = slack + column * stride + first;
 
   // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
@@ -82,8 +61,8 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   int z = 0;
   for (; z + 16 <= last - first + 1; z += 16) largest = fmax(largest, largest_of(ERROR_AT(z)));
   for (; z <= last - first; ++z) {
-    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[stride + z]) +
-                    fy * ((1.0f - fx) * b[z] + fx * b[stride + z]);
+    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[gold_stride + z]) +
+                    fy * ((1.0f - fx) * b[z] + fx * b[gold_stride + z]);
     largest = fmax(largest, fabs(v - gold_column[z]) + slack_column[z]);
   }
   if (largest < 0.0f) return;
@@ -91,7 +70,7 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
     for (int bx = bx0; bx <= bx1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
 }
 
-// Copies the samples of tiles out of gold: request i writes tile samples float[sz][sy][sx] at `offset`.
+// Copies the samples of tiles out of a lattice: request i writes tile samples float[sz][sy][sx] at `offset`.
 typedef struct {
   int block, node_x, node_y, node_z;    // of the brick's first node in its block
   int spacing_x, spacing_y, spacing_z;  // in gold nodes
@@ -101,9 +80,10 @@ typedef struct {
   ulong offset;
 } TileRequest;
 
-__kernel void extract_tiles(__global float* out, __global const float* gold, __global const float* margin,
-                            __global const TileRequest* requests, int count, int nx, int ny, int gold_stride,
-                            float kept) {
+// From the lattice of their spacing (fit_coefficients.cl): node n at n / spacing + reach.
+__kernel void extract_tiles(__global float* out, __global const float* lattice, __global const float* margin,
+                            __global const TileRequest* requests, int count, int nx, int ny, int halo,
+                            int spacing, int reach, int cx, int cy, int lattice_stride, float kept) {
   const int i = (int)get_global_id(0), request = (int)get_global_id(1);
   if (request >= count) return;
   const TileRequest r = requests[request];
@@ -111,7 +91,8 @@ __kernel void extract_tiles(__global float* out, __global const float* gold, __g
   const int ix = i % r.side_x, iy = i / r.side_x % r.side_y, iz = i / r.side_x / r.side_y;
   const int x = min(r.node_x + ix * r.spacing_x, r.last_x), y = min(r.node_y + iy * r.spacing_y, r.last_y);
   const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
-  const bool keep = margin[((size_t)r.block * ny + y) * nx + x] >= kept;
-  out[r.offset + i] =
-      keep ? gold[(((size_t)r.block * (ny + 2) + y + 1) * (nx + 2) + x + 1) * gold_stride + z + 1] : 0.0f;
+  const bool keep =
+      margin[((size_t)r.block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo] >= kept;
+  const size_t column = ((size_t)r.block * cy + y / spacing + reach) * cx + x / spacing + reach;
+  out[r.offset + i] = keep ? lattice[column * lattice_stride + z / spacing + reach] : 0.0f;
 }

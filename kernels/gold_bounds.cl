@@ -2,8 +2,8 @@
 // projections, T from second differences of gold, and the node slack that the node test adds to |V - gold|.
 // Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted sup of
 // the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
-// float[block][cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one node
-// of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack
+// float[block][cell z][y][x]; gold float[block][y + halo][x + halo][gold stride], node z at z + halo, with a
+// halo of at least one node; margin float[block][y + halo][x + halo]; cells float[block][y][x][stride] with cell z at z + 1; slack
 // float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
 
 #define UNTESTED (-1e30f)
@@ -117,15 +117,15 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
 // window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
 // room.
 __kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* addend, int nx,
-                         int ny, int nz, int gold_stride, int stride, int rate, int cells_x, int cells_y,
-                         int blocks, float t_constant, int windowed, float window_low, float window_high) {
+                         int ny, int nz, int halo, int gold_stride, int stride, int rate, int cells_x,
+                         int cells_y, int blocks, float counted, float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
     return;  // one cell more than there is: it must be marked UNTESTED
-  const int row = (nx + 2) * gold_stride;
-  __global const float* at =
-      gold + ((size_t)block * (ny + 2) + y + 1) * row + (size_t)(x + 1) * gold_stride + z + 1;
+  const int row = (nx + 2 * halo) * gold_stride;
+  __global const float* at = gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row +
+                             (size_t)(x + halo) * gold_stride + z + halo;
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
   const float16 bound =
@@ -138,7 +138,7 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
     slack = select(slack, (float16)(UNTESTED), (low - slack > window_high) | (high + slack < window_low));
   }
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  slack = select(slack, (float16)(UNTESTED), k > nz - 2);
+  slack = select(slack * counted, (float16)(UNTESTED), k > nz - 2);
   __global float* target = cells + (((size_t)block * ny + y) * nx + x) * stride;
   vstore16(slack, 0, target + z + 1);
   if (z == 0) target[0] = UNTESTED;
@@ -148,7 +148,7 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
 // region. margin: per block and column the coverage margin across z; nodes with less than `lowest` are
 // untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
 __kernel void node_slack(__global float* slack, __global const float* cells, __global const float* margin,
-                         __global const int2* last, int nx, int ny, int nz, int stride, int blocks,
+                         __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,
                          float lowest, int z_first, int z_last) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
@@ -156,7 +156,8 @@ __kernel void node_slack(__global float* slack, __global const float* cells, __g
   const size_t column = ((size_t)block * ny + y) * nx + x;
   float16 largest = (float16)(UNTESTED);
   const int2 end = last[block];
-  if (margin[column] >= lowest && x <= end.x && y <= end.y) {
+  const size_t here = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
+  if (margin[here] >= lowest && x <= end.x && y <= end.y) {
     for (int dy = -1; dy <= 0; ++dy)
       for (int dx = -1; dx <= 0; ++dx) {
         if (x + dx < 0 || y + dy < 0 || x + dx >= end.x || y + dy >= end.y) continue;

@@ -25,8 +25,8 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
                            __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
                            __global const float* gold, __global const float* slack,
                            __global const float* margin, __global const int4* first_brick,
-                           __global const uchar* selected, float lowest, int nx, int ny, int gold_stride,
-                           int stride, int rate, int bricks_x, int bricks_y, int bricks_z, int blocks,
+                           __global const uchar* selected, float lowest, int nx, int ny, int halo,
+                           int gold_stride, int stride, int rate, int bricks_x, int bricks_y, int bricks_z, int blocks,
                            float tolerance) {
   const int g = grid.granularity, side = g * rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
@@ -39,14 +39,12 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
   const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
   if (ix > last_x || iy > last_y) return;
   const size_t column = ((size_t)block * ny + brick_y * g * rate + iy) * nx + brick_x * g * rate + ix;
-  if (margin[column] < lowest) return;
+  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + brick_y * g * rate + iy + halo) * (nx + 2 * halo) +
+                         brick_x * g * rate + ix + halo;
+  if (margin[gold_at] < lowest) return;
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
-  __global const float* gold_start =
-      gold +
-      (((size_t)block * (ny + 2) + brick_y * g * rate + iy + 1) * (nx + 2) + brick_x * g * rate + ix + 1) *
-          gold_stride +
-      1;
+  __global const float* gold_start = gold + gold_at * gold_stride + halo;
   __global const float* slack_start = slack + column * stride;
 
   for (int brick_z = 0; brick_z < bricks_z; ++brick_z) {

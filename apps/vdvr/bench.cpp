@@ -120,7 +120,8 @@ int bench_build(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const CertifyOptions options = certify_options(args);
+  CertifyOptions options = certify_options(args);
+  options.plan.foresee = false;
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
   ProgressLine progress("bench", common.quiet);
   Device device = open_device(common);

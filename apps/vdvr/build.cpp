@@ -16,7 +16,8 @@ int build_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const CertifyOptions options = certify_options(args);
+  CertifyOptions options = certify_options(args);
+  options.plan.foresee = false;
   const auto output = args.path("output");
   check_output(output, common.force, {args.path("IN")});
 

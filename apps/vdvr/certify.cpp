@@ -19,7 +19,8 @@ void add_plan_options(Arguments& args) {
 }
 
 CertifyOptions certify_options(const Arguments& args) {
-  return {field_options(args), grid_options(args), rate_options(args), tolerance(args), build_options(args)};
+  return {field_options(args), grid_options(args),  rate_options(args),
+          tolerance(args),     build_options(args), plan_settings(args)};
 }
 
 Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
@@ -29,7 +30,8 @@ Planned read_and_plan(Device& device, const Arguments& args, const CertifyOption
   FieldOptions field = options.field;
   field.center = center_of(field, planned.scan.geometry);
   const Grid grid = make_grid(planned.scan.geometry, options.grid);
-  planned.plan = make_plan(device, planned.scan, grid, field, options.rates, options.tolerance, progress);
+  planned.plan =
+      make_plan(device, planned.scan, grid, field, options.rates, options.tolerance, options.plan, progress);
   return planned;
 }
 
@@ -41,17 +43,21 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
   // (but in a scan of nothing but zeros, whose range is 0).
   if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
     throw InputError("--window or --roi leaves no covered gold node to test: nothing would be certified");
-  if (!c.holds_buffer)
+  if (!c.holds_buffer && !c.comparison)
     throw ToleranceError(fmt::format(
         "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
         c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
-  c.options_json = options_json(planned.plan, options.build, planned.scan.geometry,
+  c.options_json = options_json(planned.plan, options.build, options.tolerance.of_max, planned.scan.geometry,
                                 center_of(planned.plan.field, planned.scan.geometry));
   c.content_sha256 = content_sha256(result.volume);
   return result;
 }
 
 int certificate_exit_code(const char* command, const Certificate& certificate) {
+  if (certificate.comparison) {
+    fmt::print(stderr, "vdvr {}: a volume for comparison: nothing is certified\n", command);
+    return 1;
+  }
   if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
   fmt::print(stderr,
              "vdvr {}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "

@@ -19,6 +19,7 @@ struct CertifyOptions {
   RateOptions rates;
   Tolerance tolerance;
   BuildOptions build;
+  PlanSettings plan;
 };
 CertifyOptions certify_options(const Arguments& args);
 

@@ -64,6 +64,11 @@ void check_consistency(const fs::path& path, const Certificate& c) {
   const auto contradicts = [&](const std::string& what) {
     throw MismatchError(fmt::format("{}: the certificate contradicts itself: {}", path.string(), what));
   };
+  if (c.comparison) {
+    if (c.holds_buffer || c.holds_image3d.value_or(false))
+      contradicts("it was built for comparison, and yet something 'holds'");
+    return;
+  }
   const bool buffer_fits = c.total_buffer <= c.epsilon_abs;
   const bool image_fits =
       !c.total_image3d || !c.holds_image3d || *c.holds_image3d == (*c.total_image3d <= c.epsilon_abs);

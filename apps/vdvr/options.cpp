@@ -19,12 +19,15 @@ struct Limited {
   const char* help;
 };
 const std::vector<Limited> kBuildLimits{
-    {"closing", {"coarse", "paper", "none"}, {"coarse"}, "how bricks of different levels meet"},
-    {"coefficients", {"sampled", "midrange"}, {"sampled"}, "what the stored samples are"},
+    {"closing",
+     {"coarse", "paper", "none"},
+     {"coarse", "paper", "none"},
+     "how bricks of different levels meet"},
+    {"coefficients", {"midrange", "sampled"}, {"midrange", "sampled"}, "what the stored samples are"},
     {"levels", {"isotropic", "anisotropic"}, {"isotropic"}, "levels per brick or per axis"},
     {"storage", {"auto", "f32", "u16", "u8"}, {"auto", "f32"}, "sample type of base and tiles"},
-    {"terms", {"all", "grid"}, {"all"}, "error terms that are charged"},
-    {"epsilon-of", {"range", "max"}, {"range"}, "what --epsilon is a fraction of"}};
+    {"terms", {"all", "grid"}, {"all", "grid"}, "error terms that are charged"},
+    {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of"}};
 
 bool is_power_of_two(std::int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
@@ -110,6 +113,11 @@ RateOptions rate_options(const Arguments& args) {
   rates.upsampling = rate(args, "upsampling", 64);
   rates.u_filter = args.choice("u-filter", {"auto", "linear", "cubic"}, "auto");
   rates.gold = rate(args, "gold", 64);
+  if (args.has("paper")) {
+    if (!args.has("upsampling")) rates.upsampling = 8;
+    if (!args.has("u-filter")) rates.u_filter = "linear";
+    if (!args.has("gold")) rates.gold = 8;
+  }
   return rates;
 }
 
@@ -123,6 +131,7 @@ Tolerance tolerance(const Arguments& args) {
   if (args.has("epsilon") == args.has("epsilon-abs"))
     throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
   Tolerance result;
+  result.of_max = args.choice("epsilon-of", {"range", "max"}, args.has("paper") ? "max" : "range") == "max";
   if (args.has("epsilon-abs")) {
     result.absolute = args.positive_or("epsilon-abs", 0);
     return result;
@@ -165,14 +174,18 @@ void add_build(Arguments& args) {
       .value("granularity", "1|2|4|8", "base cells per brick and axis (default 4)")
       .value("window", "LO,HI", "test only where the field meets these values");
   for (const auto& l : kBuildLimits) add_limited(args, l.name, l.all, l.supported, l.help);
-  args.flag("paper", "the paper's settings; not in this version").flag("resume", "not in this version");
+  args.flag("paper",
+            "the paper's settings, for comparison: --closing paper --coefficients sampled --granularity 4 "
+            "--upsampling 8 --u-filter linear --gold 8 --terms grid --epsilon-of max, each unless given")
+      .flag("resume", "not in this version");
 }
 
 BuildOptions build_options(const Arguments& args) {
   for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
-  refuse(args, {"paper"}, "this version has only its own settings (closing coarse, coefficients sampled)");
   refuse(args, {"resume"}, "this version cannot resume; start again without it");
+  const bool paper = args.has("paper");
   BuildOptions build;
+  build.closing = args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse");
   build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
   if (!is_power_of_two(build.granularity))
     throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", build.granularity));
@@ -190,16 +203,30 @@ BuildOptions build_options(const Arguments& args) {
   return build;
 }
 
-std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
-                         double center) {
+PlanSettings plan_settings(const Arguments& args) {
+  const bool paper = args.has("paper");
+  PlanSettings settings;
+  settings.coefficients =
+      args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
+  settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
+  settings.granularity = build_options(args).granularity;
+  if (settings.coefficients == "midrange" && build_options(args).closing == "paper")
+    throw InputError(
+        "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
+        "coarse");
+  return settings;
+}
+
+std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
+                         const ParallelGeometry& geometry, double center) {
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
-  j["closing"] = "coarse";
-  j["coefficients"] = "sampled";
+  j["closing"] = build.closing;
+  j["coefficients"] = plan.settings.coefficients;
   j["levels"] = "isotropic";
   j["storage"] = "f32";
-  j["terms"] = "all";
-  j["epsilon_of"] = "range";
+  j["terms"] = plan.settings.terms;
+  j["epsilon_of"] = epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.upsampling_u;
   j["u_filter"] = plan.u_filter;
   j["gold"] = plan.gold_rate;

@@ -40,6 +40,8 @@ RateOptions rate_options(const Arguments& args);
 Tolerance tolerance(const Arguments& args);
 /// Includes --roi of the grid group.
 BuildOptions build_options(const Arguments& args);
+/// Of the build group, what a plan must know.
+PlanSettings plan_settings(const Arguments& args);
 
 /// InputError when one of `names` was given: `reason` says why the command does not take it.
 void refuse(const Arguments& args, const std::vector<std::string>& names, const std::string& reason);
@@ -51,7 +53,7 @@ std::string limited_choice(const Arguments& args, const std::string& name,
 
 /// What a volume is built with, for the certificate's `options`; includes the scan's geometry, so that a
 /// reader of the file can tell which points are covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
-                         double center);
+std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
+                         const ParallelGeometry& geometry, double center);
 
 }  // namespace vdvr::cli

@@ -225,8 +225,12 @@ void print_budget(const ErrorBudget& budget, double epsilon_abs) {
 void print_certificate(const Certificate& c) {
   const auto verdict = [&](const char* sampler, bool holds, double total) {
     fmt::print("  {:<12} {}: total {:.4g}, {:.1f} % of the tolerance\n", sampler,
-               holds ? "holds" : "DOES NOT HOLD", total, 100 * total / c.epsilon_abs);
+               c.comparison ? "not certified"
+               : holds      ? "holds"
+                            : "DOES NOT HOLD",
+               total, 100 * total / c.epsilon_abs);
   };
+  if (c.comparison) fmt::print("NOT CERTIFIED  built for comparison; what the certificate would say:\n");
   fmt::print("certificate    |V - F| <= {:.4g} at every covered point{}{}: {:.4g} % of the range {:.4g}\n",
              c.epsilon_abs, c.roi ? " of the region of interest" : "", c.window ? " within the window" : "",
              100 * c.epsilon, c.reference_range);

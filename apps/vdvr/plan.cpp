@@ -67,12 +67,14 @@ int plan_command(Arguments& args) {
   args.positional("IN", "projections")
       .value("pictures", "DIR", "pictures of spectra, error maps and their products");
   add_plan_options(args);
+  add_build(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  refuse(args, {"roi"}, "a plan is for the whole grid; use --size and --origin, or give --roi to build");
-  const CertifyOptions options{
-      field_options(args), grid_options(args), rate_options(args), tolerance(args), {}};
+  refuse(args, {"roi", "window"},
+         "a plan is for the whole grid; use --size and --origin, or give it to build");
+  refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
+  const CertifyOptions options = certify_options(args);
   std::optional<OutputFolder> folder;
   if (args.has("pictures")) {
     kind_of(args.path("IN"), args);

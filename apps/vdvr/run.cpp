@@ -142,7 +142,10 @@ int run_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const CertifyOptions options = certify_options(args);
+  CertifyOptions options = certify_options(args);
+  options.plan.foresee = false;
+  if (options.plan.terms != "all" || options.build.closing == "none")
+    throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto input = args.path("IN"), output = args.path("output");
   kind_of(input, args);
   OutputFolder folder(output, file_names(), common.force);

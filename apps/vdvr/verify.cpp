@@ -122,6 +122,9 @@ int verify_command(Arguments& args) {
   const Certificate& certificate = file.certificate;
   const std::string altered = altered_content(file);
   if (altered.empty()) check_consistency(path, certificate);
+  if (certificate.comparison)
+    throw MismatchError(
+        fmt::format("{}: was built for comparison: it carries no promise to verify", path.string()));
   check_field_options(args, certificate.field);
   const ProjectionSet scan = load_scan(projections, args, certificate.field, progress.callback());
   check_input(projections, scan, certificate);

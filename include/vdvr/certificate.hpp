@@ -50,6 +50,8 @@ struct Certificate {
   double epsilon = 0;          ///< fraction of reference_range
   double epsilon_abs = 0;      ///< density units
   double reference_range = 0;  ///< max - min of F over covered 1x samples
+  /// Built by settings that leave terms or the closing out, to compare with: it promises nothing.
+  bool comparison = false;
   bool holds_buffer = false;
   std::optional<bool> holds_image3d;
   double total_buffer = 0;

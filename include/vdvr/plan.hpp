@@ -14,6 +14,7 @@ namespace vdvr {
 struct Tolerance {
   std::optional<double> relative;  ///< fraction of the reference range
   std::optional<double> absolute;  ///< density units; one of the two is set
+  bool of_max = false;             ///< relative to max |F| over covered samples, as in the paper
 };
 
 struct RateOptions {
@@ -22,8 +23,18 @@ struct RateOptions {
   std::optional<int> gold;        ///< none: auto
 };
 
+/// What is stored, and which error terms the tolerance must cover.
+struct PlanSettings {
+  std::string coefficients = "midrange";  ///< midrange: samples fitted to the trilinear filter | sampled
+  std::string terms =
+      "all";            ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
+  int granularity = 4;  ///< for what is foreseen
+  bool foresee = true;  ///< storage, memory and time; costs about as much as the rest of a plan
+};
+
 struct Plan {
   Grid grid;
+  PlanSettings settings;
   FieldOptions field;
   double epsilon = 0, epsilon_abs = 0, reference_range = 0;
   int upsampling_u = 8;
@@ -37,12 +48,14 @@ struct Plan {
   double samples_ratio = 0;        ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
-  Volume base;  ///< the 1x reconstruction it rests on
+  Volume base;                ///< the 1x reconstruction it rests on
+  std::vector<float> fitted;  ///< the base samples to store, where those are not F: midrange coefficients
   std::vector<std::string> notes;
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
-               const RateOptions& rates, const Tolerance& tolerance, const Progress& progress = {});
+               const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings = {},
+               const Progress& progress = {});
 
 }  // namespace vdvr

@@ -1,0 +1,32 @@
+// What gold is streamed for. Called by gold_stream.hpp and node_slack.hpp.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "vdvr/grid.hpp"
+
+namespace vdvr {
+
+struct GoldSettings {
+  Grid grid;
+  int granularity = 4;
+  int rate = 8;
+  int upsampling = 8;
+  std::string u_filter = "linear";
+  std::optional<std::pair<double, double>> window;
+  bool midrange = false;   ///< samples fitted to the trilinear filter; else gold at the nodes
+  bool base_only = false;  ///< only fitted base samples are asked for: no slack, no other level
+  bool grid_only = false;  ///< slack counts as 0: the paper's test, for comparison
+};
+
+/// The largest granularity up to `wanted` that does not waste tiles on a grid thinner than a brick.
+inline int fitting_granularity(int wanted, const Grid& grid) {
+  int g = wanted;
+  while (g > 1 && *std::min_element(grid.cells.begin(), grid.cells.end()) < g) g /= 2;
+  return g;
+}
+
+}  // namespace vdvr
