@@ -33,6 +33,7 @@ void add_options(Arguments& args) {
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
       .value("step", "S", "in base cells (default 1)")
+      .flag("no-shading", "colours of the transfer function alone, without light")
       .value("turntable", "N", "N pictures over a full turn, frame-0000.png and so on")
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections")
@@ -80,6 +81,7 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
+  o.shading = !args.has("no-shading");
   const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
   o.slice_axis = axis[0] - 'x';
   o.slice_position = args.number("slice-position");
@@ -97,9 +99,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
-    refuse(args, {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step"},
+    refuse(args, {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading"},
            "does not apply to a slice");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
+  if (o.mode == RenderMode::mip)
+    refuse(args, {"no-shading"}, "does not apply to --mode mip, which has no light");
   if (o.mode != RenderMode::iso) refuse(args, {"iso"}, "applies to --mode iso");
   if (o.mode == RenderMode::iso) refuse(args, {"tf", "tf-range"}, "does not apply to --mode iso");
   if (o.mode != RenderMode::error) refuse(args, {"projections"}, "applies to --mode error");
