@@ -237,7 +237,7 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
   const int scale = text_scale(image);
   const double lo = bar.points.front().value, hi = bar.points.back().value;
   const std::int64_t line_height = (kFontHeight + 3) * scale, margin = 8 * scale, width = 10 * scale;
-  const std::int64_t top = margin + (bar.unit.empty() ? 0 : line_height);
+  const std::int64_t top = margin + (bar.unit.empty() ? 0 : line_height + 2 * scale);
   const std::int64_t height = std::min<std::int64_t>(image.height - above - margin - top, image.height / 2);
   if (height < 2 * line_height) return;  // a picture too flat for a bar
   std::vector<std::string> labels;

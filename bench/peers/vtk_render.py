@@ -4,10 +4,11 @@
 VTK: vtkFixedPointVolumeRayCastMapper at full resolution (no automatic sample distances, one ray a pixel, one
 sample a base cell), shading on. Ours: `vdvr bench render --method dvr`. Both: the same MHA volume, transfer
 function, camera path (a full turn), 512 x 512 pixels, all cores. First the pictures are compared: without shading
-they must agree (same camera, samples, colours and opacities); with it the programs differ by design (VTK takes
-gradients over two cells and leaves places without one in the dark), so there the difference has a wide limit. Then
-rounds alternate between the two. VTK's time is that of the mapper alone, without the window that would show its
-picture; the time with the window is given beside it.
+they must agree (same camera, samples, colours and opacities); with it the weights of light are the same but not the
+gradients (VTK: over two cells at the samples, as one of a table of directions, and places without one stay in the
+dark; ours: over one cell at the point itself, fading out where there is none), so the limit is wider. Then rounds
+alternate between the two. VTK's time is that of the mapper alone, without the window that would show its picture;
+the time with the window is given beside it.
 
     python3 -m venv build/peers/vtk && build/peers/vtk/bin/pip install -r bench/peers/vtk_requirements.txt
     bench/peers/vtk_render.py                 # runs itself in that environment
@@ -54,7 +55,7 @@ def options():
     p.add_argument("--limit", type=float, default=2.0,
                    help="mean absolute difference, of 255, allowed without shading where either picture differs from "
                         "the background (default 2)")
-    p.add_argument("--shaded-limit", type=float, default=48.0, help="the same with shading (default 48)")
+    p.add_argument("--shaded-limit", type=float, default=12.0, help="the same with shading (default 12)")
     p.add_argument("--device", default="cpu", help="our device (default cpu)")
     p.add_argument("--keep", metavar="DIR", help="keep the pictures compared in this folder")
     return p.parse_args()
@@ -126,6 +127,11 @@ class Peer:
         self.renderer.SetBackground(*BOTTOM)
         self.renderer.SetBackground2(*TOP)
         self.renderer.GradientBackgroundOn()
+        # VTK multiplies its ambient weight by the light's ambient colour, which is black by default.
+        light = vtk.vtkLight()
+        light.SetLightTypeToHeadlight()
+        light.SetAmbientColor(1, 1, 1)
+        self.renderer.AddLight(light)
         self.window = vtk.vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
         self.window.SetMultiSamples(0)
@@ -257,7 +263,7 @@ def compare(o, name, volume, transfer, folder):
             [o.vdvr, "bench", "render", volume, "--method", "dvr", "--tf", transfer, "--frames", str(o.frames),
              "--azimuth", f"{start}", "--elevation", f"{o.elevation}", "--size", f"{o.pixels}x{o.pixels}", "--device",
              o.device, "--quiet"]).splitlines()[-1])
-        ours.append(line["fps"]["median"])
+        ours.append(line["fps"])
         for f in range(o.frames):
             mapper, window = peer.seconds(start + 360.0 * f / o.frames)
             theirs.append(1 / mapper)
@@ -269,9 +275,13 @@ def compare(o, name, volume, transfer, folder):
         "frames": o.frames, "rounds": o.rounds,
         "difference": {"unshaded": plain, "limit": o.limit, "shaded": shaded, "shaded_limit": o.shaded_limit,
                        "of": 255},
-        "fps": spread(ours), "peer_fps": spread(theirs), "peer_fps_with_window": spread(theirs_whole),
+        "fps": {"min": min(x["min"] for x in ours), "median": statistics.median(x["median"] for x in ours),
+                "max": max(x["max"] for x in ours)},
+        "peer_fps": spread(theirs), "peer_fps_with_window": spread(theirs_whole),
     }
     result["ratio"] = result["fps"]["median"] / result["peer_fps"]["median"]
+    # On a machine that others use too, the fastest frames of both were disturbed least.
+    result["ratio_of_fastest"] = result["fps"]["max"] / result["peer_fps"]["max"]
     print(json.dumps(result), flush=True)
     return result
 
@@ -296,10 +306,10 @@ def main():
             cases.append((f"marschner-lobb {n}^3", path))
         for name, path in cases:
             results.append(compare(o, name, path, transfer, folder))
-    print(f"\n{'volume':<24} {'vdvr fps':>9} {'VTK fps':>9} {'ratio':>7} {'difference of 255, unshaded / shaded':>37}")
+    print(f"\n{'volume':<24} {'vdvr fps':>9} {'VTK fps':>9} {'ratio':>7} {'of fastest':>11} {'difference of 255, unshaded / shaded':>37}")
     for r in results:
         print(f"{r['volume']:<24} {r['fps']['median']:>9.2f} {r['peer_fps']['median']:>9.2f} {r['ratio']:>7.2f} "
-              f"{r['difference']['unshaded']:>28.2f} / {r['difference']['shaded']:.2f}")
+              f"{r['ratio_of_fastest']:>11.2f} {r['difference']['unshaded']:>28.2f} / {r['difference']['shaded']:.2f}")
 
 
 if __name__ == "__main__":
