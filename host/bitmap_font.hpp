@@ -1,4 +1,5 @@
-// A 5 x 7 bitmap font for captions: digits, small letters, a few signs. Called by error_slice.cpp.
+// A 5 x 7 bitmap font for captions: digits, letters, the usual signs. Called by error_slice.cpp, figure.cpp
+// and decorate.cpp.
 #pragma once
 
 #include <array>

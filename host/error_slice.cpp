@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/bitmap_font.hpp"
 #include "vdvr/error.hpp"
@@ -16,7 +17,7 @@ using Colour = std::array<std::uint8_t, 3>;
 
 constexpr Colour kPaper{24, 24, 24}, kInk{230, 230, 230}, kNotCompared{64, 64, 64};
 constexpr Colour kAbove{0, 255, 255};  // above the tolerance: a hue that the map does not have
-constexpr std::int64_t kCaption = 44, kMargin = 8, kBar = 10;
+constexpr std::int64_t kCaption = kErrorCaption, kMargin = 8, kBar = 10;
 
 /// Dark to light with rising luminance, so that it reads in print too; e in [0, 1].
 Colour error_colour(double e) {
@@ -134,6 +135,8 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
       }
       const double error = std::abs(static_cast<double>(sample_at(volume, point)) - truth);
       ++result.pixels;
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] =
+          static_cast<float>(error);
       if (std::isnan(error) || error > result.max_error) {  // a NaN stays the largest
         result.max_error = error;
         result.worst_at = point;
@@ -166,6 +169,9 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
   result.image = {options.width, options.height, {}};
   result.image.rgb.resize(static_cast<std::size_t>(options.width * options.height * 3));
   for (std::int64_t i = 0; i < options.width * options.height; ++i) put(result.image, i, 0, kPaper);
+  result.errors = {options.width, options.height - kCaption, {}};
+  result.errors.values.assign(static_cast<std::size_t>(result.errors.width * result.errors.height),
+                              std::numeric_limits<float>::quiet_NaN());
   compare(result, pixels, axes_of(options.axis), f, scan.geometry, volume, certificate);
   draw_caption(result.image, result, certificate, options);
   return result;

@@ -20,8 +20,12 @@ struct ErrorSliceOptions {
   std::int64_t width = 512, height = 512;  ///< of the picture with its caption
 };
 
+/// Height of the caption below the slice, in pixels.
+inline constexpr std::int64_t kErrorCaption = 44;
+
 struct ErrorSlice {
   Image image;
+  FloatImage errors;  ///< of the picture without its caption; NaN where not compared
   double max_error = 0;
   Vec3 worst_at{0, 0, 0};
   std::int64_t pixels = 0;  ///< compared: covered and, where there is a region of interest, inside it

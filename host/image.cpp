@@ -1,8 +1,10 @@
-// PNG output; the one unit that holds stb_image_write. Called by the render and run commands.
-#include "vdvr/image.hpp"
+// PNG and NumPy output; the one unit that holds stb_image_write. Called by the render and run commands and
+// animation.cpp.
+#include "host/png.hpp"
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <limits>
 #include <string>
 
@@ -28,7 +30,7 @@ void append(void* context, void* data, int size) {
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, const Image& image) {
+std::string encode_png(const std::filesystem::path& path, const Image& image) {
   // stb counts a row's and the picture's bytes in int.
   constexpr std::int64_t most = std::numeric_limits<int>::max() / 4;
   if (image.width < 1 || image.height < 1 || image.width > most / image.height)
@@ -42,6 +44,33 @@ void write_png(const std::filesystem::path& path, const Image& image) {
   const int width = static_cast<int>(image.width), height = static_cast<int>(image.height);
   if (stbi_write_png_to_func(append, &bytes, width, height, 3, image.rgb.data(), 3 * width) == 0)
     throw ResourceError(fmt::format("{}: no memory to encode {} x {} pixels", path.string(), width, height));
+  return bytes;
+}
+
+void write_png(const std::filesystem::path& path, const Image& image) {
+  io::write_file(path, encode_png(path, image));
+}
+
+void write_npy(const std::filesystem::path& path, const FloatImage& image) {
+  if (image.width < 1 || image.height < 1 ||
+      image.values.size() != static_cast<std::size_t>(image.width * image.height))
+    throw InputError(fmt::format("{}: {} values for {} x {} pixels", path.string(), image.values.size(),
+                                 image.width, image.height));
+  std::string header = fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
+                                   image.height, image.width);
+  // Magic, version and length take 10 bytes; the header ends in a line feed at a multiple of 64.
+  header.append(63 - (10 + header.size()) % 64, ' ').push_back('\n');
+  std::string bytes = "\x93NUMPY";
+  bytes.push_back('\x01');
+  bytes.push_back('\x00');
+  bytes.push_back(static_cast<char>(header.size() & 0xff));
+  bytes.push_back(static_cast<char>(header.size() >> 8));
+  bytes += header;
+  bytes.reserve(bytes.size() + 4 * image.values.size());
+  for (const float value : image.values) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    for (int b = 0; b < 4; ++b) bytes.push_back(static_cast<char>(bits >> (8 * b)));
+  }
   io::write_file(path, bytes);
 }
 

@@ -1,5 +1,6 @@
-// Uniform volumes as MetaImage or NRRD: any scalar type in, float32 out. Layout float samples[z][y][x], x
-// fastest. Called by `simulate --volume`, `probe`, `render --method dvr`, `reconstruct`, `export`.
+// Uniform volumes as MetaImage or NRRD: any scalar type in, float32 out; volume_stack.cpp reads the rest.
+// Layout float samples[z][y][x], x fastest. Called by `simulate --volume`, `probe`, `render --method dvr`,
+// `reconstruct`, `export`.
 #include "vdvr/volume_file.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "host/io/atomic_file.hpp"
 #include "host/io/limits.hpp"
 #include "host/io/raster_file.hpp"
+#include "host/volume_stack.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -64,15 +66,29 @@ void append_little_endian(std::ofstream& file, const std::vector<float>& samples
 
 }  // namespace
 
+bool is_volume_input(const std::filesystem::path& path) {
+  return is_volume_path(path) || is_tiff_path(path) || hdf5_volume_path(path) || is_tiff_folder(path);
+}
+
+std::filesystem::path file_of_volume(const std::filesystem::path& path) {
+  const auto parts = hdf5_volume_path(path);
+  return parts ? parts->first : path;
+}
+
 bool is_volume_path(const std::filesystem::path& path) {
   const std::string e = extension_of(path);
   return e == ".mha" || e == ".mhd" || e == ".nrrd" || e == ".nhdr";
 }
 
 Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  if (const auto parts = hdf5_volume_path(path))
+    return read_hdf5_volume(parts->first, parts->second, max_memory_bytes);
+  if (is_tiff_path(path) || is_tiff_folder(path)) return read_tiff_volume(path, max_memory_bytes);
   if (!is_volume_path(path))
-    throw FileError(
-        fmt::format("{}: not a volume by its extension (.mha, .mhd, .nrrd, .nhdr)", path.string()));
+    throw FileError(fmt::format(
+        "{}: not a volume by its name (.mha, .mhd, .nrrd, .nhdr, .tif, FILE.h5:/dataset, a folder "
+        "of TIFF slices)",
+        path.string()));
   io::RasterSamples source(io::read_raster_header(path), max_memory_bytes);
   const io::RasterHeader& header = source.header();
   Volume volume;

@@ -72,3 +72,24 @@ BOOST_AUTO_TEST_CASE(useless_zoom_is_refused) {
   BOOST_CHECK_THROW(orbit_camera(grid, 0, 0, 0), InputError);
   BOOST_CHECK_THROW(orbit_camera(grid, NAN, 0, 1), InputError);
 }
+
+BOOST_AUTO_TEST_CASE(view_up_is_minus_z_unless_that_is_the_direction_of_view) {
+  const Camera level = look_at({0, 5, 0}, {0, 0, 0}, std::nullopt, 30);
+  BOOST_TEST((level.view_up == Vec3{0, 0, -1}));
+  // Seen from -z as a slice across z: x right, y down; from +z x stays right.
+  const auto below = right_and_down(look_at({0, 0, -5}, {0, 0, 0}, std::nullopt, 30), {2, 3, 0});
+  BOOST_TEST(!(std::abs(below.first - 2) > rounding));
+  BOOST_TEST(!(std::abs(below.second - 3) > rounding));
+  const auto above = right_and_down(look_at({0, 0, 5}, {0, 0, 0}, std::nullopt, 30), {2, 3, 0});
+  BOOST_TEST(!(std::abs(above.first - 2) > rounding));
+  BOOST_TEST(!(std::abs(above.second + 3) > rounding));
+}
+
+BOOST_AUTO_TEST_CASE(cameras_without_a_direction_are_refused) {
+  const Vec3 eye{0, 5, 0}, middle{0, 0, 0};
+  BOOST_CHECK_THROW(look_at(eye, eye, std::nullopt, 30), InputError);
+  BOOST_CHECK_THROW(look_at(eye, middle, Vec3{0, -2, 0}, 30), InputError);
+  BOOST_CHECK_THROW(look_at(eye, middle, Vec3{0, 0, 0}, 30), InputError);
+  BOOST_CHECK_THROW(look_at(eye, middle, std::nullopt, 180), InputError);
+  BOOST_CHECK_THROW(look_at(eye, {0, NAN, 0}, std::nullopt, 30), InputError);
+}

@@ -204,6 +204,74 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
   check_refused({"bench", "paper"}, "paper");
 }
 
+BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
+  const auto render = [&](const std::string& output, const std::vector<std::string>& more,
+                          const std::string& named) {
+    std::vector<std::string> words{"render", "x.mha", "-o", at(output)};
+    words.insert(words.end(), more.begin(), more.end());
+    check_refused(words, named);
+  };
+  render("x.png", {"--camera-position", "1,2,3", "--azimuth", "3"}, "--azimuth");
+  render("x.png", {"--camera-view-angle", "20", "--zoom", "2"}, "--zoom");
+  render("x.png", {"--camera-position", "1,2,3", "--turntable", "4"}, "--turntable");
+  render("x.png", {"--turntable", "4"}, ".apng");
+  render("x.gif", {}, "--turntable");
+  render("x.jpg", {}, ".png");
+  render("x.npy", {"--axes"}, "--axes");
+  render("x.png", {"--mode", "slice", "--box"}, "--box");
+  render("x.png", {"--mode", "slice", "--azimuth", "3"}, "--azimuth");
+  render("x.png", {"--mode", "iso", "--colorbar"}, "--colorbar");
+  render("x.png", {"--mode", "iso", "--tf", "bone"}, "--tf");
+  render("x.png", {"--mode", "mip", "--no-shading"}, "--no-shading");
+}
+
+BOOST_AUTO_TEST_CASE(presets_are_listed_without_a_volume) {
+  const Result r = run({"render", "--tf", "list"});
+  BOOST_TEST(r.code == 0);
+  BOOST_TEST(r.out.find("marschner-lobb") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
+  const std::string volume = at("ramp.mha");
+  {
+    std::string bytes =
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nDimSize = 8 8 8\nElementType = MET_UCHAR\n"
+        "ElementDataFile = LOCAL\n";
+    for (int i = 0; i < 512; ++i) bytes.push_back(static_cast<char>(i % 64));
+    write(volume, bytes);
+  }
+  const std::vector<std::string> render{"render", volume, "--size", "24x16", "--quiet", "--force"};
+  const auto draw = [&](const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> words = render;
+    words.insert(words.end(), {"-o", at(output)});
+    words.insert(words.end(), more.begin(), more.end());
+    const Result r = run(words);
+    BOOST_TEST(r.code == 0, r.err);
+    BOOST_TEST(r.out.empty());
+  };
+  draw("ramp.png", {"--tf", "bone", "--axes", "--box", "--colorbar", "--caption"});
+  for (const char* mode : {"dvr", "iso", "mip", "slice"}) {
+    draw("ramp.npy", {"--mode", mode});
+    const std::string bytes = contents(at("ramp.npy"));
+    BOOST_TEST(bytes.find("(16, 24)") != std::string::npos);
+    BOOST_TEST(bytes.size() % 64 == (16 * 24 * 4) % 64);
+  }
+  draw("ramp.apng", {"--turntable", "3", "--tf", "grey", "--tf-range", "0,63"});
+  draw("ramp.gif", {"--turntable", "3"});
+  BOOST_TEST(contents(at("ramp.gif")).rfind("GIF89a", 0) == 0);
+  draw("turn", {"--turntable", "3"});
+  BOOST_TEST(fs::exists(at("turn/frame-0002.png")));
+  // A shorter turn leaves nothing of the longer one behind.
+  draw("turn", {"--turntable", "2"});
+  BOOST_TEST(!fs::exists(at("turn/frame-0002.png")));
+  check_refused({"render", volume, "-o", at("z.png"), "--tf", "purple"}, "purple");
+  check_refused({"render", volume, "-o", at("z.png"), "--tf-range", "3,1"}, "--tf-range");
+  check_refused({"render", volume, "-o", at("z.png"), "--camera-position", "0,0,50", "--camera-focal-point",
+                 "0,0,0", "--camera-view-up", "0,0,1"},
+                "--camera-view-up");
+  check_refused({"render", at("ramp.h5") + ":/volume", "-o", at("z.png")}, "ramp.h5: no such file");
+}
+
 BOOST_AUTO_TEST_CASE(missing_input_is_refused) {
   for (const auto& words : readers(at("does-not-exist.h5"))) check_refused(words, "does-not-exist.h5");
 }

@@ -1,11 +1,15 @@
 #define BOOST_TEST_MODULE volume_file
 #include "vdvr/volume_file.hpp"
 
+#include <hdf5.h>
+#include <tiffio.h>
 #include <zlib.h>
 
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
+#include <algorithm>
 #include <cstring>
+#include <functional>
 #include <limits>
 
 #include "tests/support/temporary_folder.hpp"
@@ -46,6 +50,98 @@ std::string deflated(const std::string& bytes) {
            bytes.size());
   out.resize(size);
   return out;
+}
+
+// --- every scalar type, in both byte orders: eight samples 0, 1, 2 ... 7, the last negative where it can be
+
+template <class T>
+std::string samples_as(bool big_endian) {
+  std::string bytes;
+  for (int i = 0; i < 8; ++i) {
+    const T value = i == 7 && std::is_signed_v<T> ? static_cast<T>(-7) : static_cast<T>(i);
+    std::string one(sizeof(T), '\0');
+    std::memcpy(one.data(), &value, sizeof(T));
+    if (big_endian) std::reverse(one.begin(), one.end());
+    bytes += one;
+  }
+  return bytes;
+}
+
+struct ScalarType {
+  const char *met, *nrrd;
+  bool is_signed;
+  std::string (*samples)(bool);
+};
+const std::vector<ScalarType> scalar_types{{"MET_UCHAR", "uint8", false, samples_as<std::uint8_t>},
+                                           {"MET_CHAR", "int8", true, samples_as<std::int8_t>},
+                                           {"MET_USHORT", "ushort", false, samples_as<std::uint16_t>},
+                                           {"MET_SHORT", "int16", true, samples_as<std::int16_t>},
+                                           {"MET_UINT", "unsigned int", false, samples_as<std::uint32_t>},
+                                           {"MET_INT", "int", true, samples_as<std::int32_t>},
+                                           {"MET_FLOAT", "float", true, samples_as<float>},
+                                           {"MET_DOUBLE", "double", true, samples_as<double>}};
+
+void check_counted(const Volume& volume, bool is_signed) {
+  BOOST_REQUIRE(volume.samples.size() == 8);
+  for (std::size_t i = 0; i < 7; ++i) BOOST_TEST(volume.samples[i] == static_cast<float>(i));
+  BOOST_TEST(volume.samples[7] == (is_signed ? -7 : 7));
+}
+
+// --- HDF5
+
+/// A dataset with attributes of three numbers; `type` of the file.
+void write_hdf5(const std::filesystem::path& path, hid_t type, const std::vector<hsize_t>& shape,
+                const std::vector<std::pair<std::string, std::vector<double>>>& attributes = {}) {
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
+  const hid_t data = H5Dcreate2(file, "volume", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  std::vector<double> values;
+  for (hsize_t i = 0; i < static_cast<hsize_t>(H5Sget_simple_extent_npoints(space)); ++i)
+    values.push_back(static_cast<double>(i));
+  H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+  for (const auto& [name, numbers] : attributes) {
+    const hsize_t n = numbers.size();
+    const hid_t row = H5Screate_simple(1, &n, nullptr);
+    const hid_t attribute = H5Acreate2(data, name.c_str(), H5T_IEEE_F64LE, row, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(attribute, H5T_NATIVE_DOUBLE, numbers.data());
+    H5Aclose(attribute);
+    H5Sclose(row);
+  }
+  H5Dclose(data);
+  H5Sclose(space);
+  H5Fclose(file);
+}
+
+// --- TIFF
+
+/// Images of 3 x 2 pixels of uint16 one after another, counting on.
+void write_tiff(const std::filesystem::path& path, int first, int images, const char* mode = "w",
+                const std::string& description = "", std::uint32_t columns = 3) {
+  TIFF* tiff = TIFFOpen(path.c_str(), mode);
+  for (int i = 0; i < images; ++i) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, columns);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 2);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 2);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (!description.empty()) {
+      TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+      TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 4.0);
+      TIFFSetField(tiff, TIFFTAG_YRESOLUTION, 2.0);
+    }
+    std::vector<std::uint16_t> pixels;
+    for (std::uint32_t p = 0; p < 2 * columns; ++p)
+      pixels.push_back(static_cast<std::uint16_t>(first + i * 6 + static_cast<int>(p)));
+    TIFFWriteEncodedStrip(tiff, 0, pixels.data(), static_cast<tmsize_t>(pixels.size() * 2));
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+void check_counting(const Volume& volume) {
+  for (std::size_t i = 0; i < volume.samples.size(); ++i)
+    BOOST_TEST(volume.samples[i] == static_cast<float>(i));
 }
 
 }  // namespace
@@ -188,4 +284,101 @@ BOOST_AUTO_TEST_CASE(memory_limit_is_honoured) {
   const TemporaryFolder folder;
   write_volume(folder / "v.mha", ramp());
   BOOST_CHECK_THROW(static_cast<void>(read_volume(folder / "v.mha", 10)), ResourceError);
+}
+
+BOOST_AUTO_TEST_CASE(every_scalar_type_is_read_in_both_byte_orders) {
+  const TemporaryFolder folder;
+  for (const auto& type : scalar_types)
+    for (const bool big : {false, true}) {
+      BOOST_TEST_CONTEXT(type.met << (big ? ", big-endian" : ", little-endian")) {
+        const std::string samples = type.samples(big);
+        check_counted(read_volume(folder.file(
+                          "v.mha", mha_start + "BinaryDataByteOrderMSB = " + (big ? "True" : "False") +
+                                       "\nDimSize = 2 2 2\nElementType = " + type.met +
+                                       "\nElementDataFile = LOCAL\n" + samples)),
+                      type.is_signed);
+        const std::string nrrd = nrrd_start + "type: " + type.nrrd + "\nendian: " + (big ? "big" : "little");
+        check_counted(read_volume(folder.file("v.nrrd", nrrd + "\nencoding: raw\n\n" + samples)),
+                      type.is_signed);
+        check_counted(read_volume(folder.file("v.nrrd", nrrd + "\nencoding: gzip\n\n" + deflated(samples))),
+                      type.is_signed);
+      }
+    }
+}
+
+BOOST_AUTO_TEST_CASE(hdf5_datasets_of_every_type_are_read_with_axes_turned) {
+  const TemporaryFolder folder;
+  const auto path = folder / "v.h5";
+  const std::filesystem::path name = path.string() + ":/volume";
+  BOOST_TEST(is_volume_input(name));
+  BOOST_TEST((file_of_volume(name) == path));
+  for (const hid_t type : {H5T_STD_U8LE, H5T_STD_I16BE, H5T_STD_U16LE, H5T_STD_I32BE, H5T_STD_I32LE,
+                           H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_IEEE_F64BE}) {
+    write_hdf5(path, type, {4, 3, 2}, {{"spacing", {3, 2, 1}}, {"origin", {30, 20, -10}}});
+    const Volume volume = read_volume(name);
+    BOOST_TEST((volume.grid.cells == Index3{1, 2, 3}));
+    BOOST_TEST((volume.grid.spacing == Vec3{1, 2, 3}));
+    BOOST_TEST((volume.grid.origin == Vec3{-10, 20, 30}));
+    check_counting(volume);
+  }
+  write_hdf5(path, H5T_STD_U8LE, {2, 2, 2}, {{"element_size_um", {5, 4, 3}}});
+  BOOST_TEST((read_volume(name).grid.spacing == Vec3{3, 4, 5}));
+  BOOST_TEST(read_volume(name).grid.unit == "um");
+}
+
+BOOST_AUTO_TEST_CASE(hdf5_datasets_that_are_no_volume_are_refused) {
+  const TemporaryFolder folder;
+  const auto path = folder / "v.h5";
+  const auto refused = [&](const std::string& dataset, const std::string& reason) {
+    const std::string what = message_of(path.string() + ":" + dataset);
+    BOOST_TEST(what.find(reason) != std::string::npos, what);
+    BOOST_TEST(what.find(path.string()) != std::string::npos, what);
+  };
+  refused("/volume", "cannot be opened");
+  write_hdf5(path, H5T_STD_U8LE, {4, 3});
+  refused("/volume", "2 axes");
+  refused("/other", "no such dataset");
+  write_hdf5(path, H5T_STD_U8LE, {4, 3, 1});
+  refused("/volume", "at least two");
+  write_hdf5(path, H5T_STD_U8LE, {2, 2, 2}, {{"spacing", {1, 1}}});
+  refused("/volume", "3 numbers");
+  write_hdf5(path, H5T_STD_U8LE, {2, 2, 2}, {{"spacing", {1, 0, 1}}});
+  refused("/volume", "spacing");
+  write_hdf5(path, H5T_STD_U8LE, {16, 16, 16});
+  const std::string whole = support::bytes_of(path);
+  static_cast<void>(folder.file("v.h5", whole.substr(0, whole.size() / 2)));
+  refused("/volume", "truncated");
+  BOOST_CHECK_THROW(static_cast<void>(read_volume(path)), FileError);
+}
+
+BOOST_AUTO_TEST_CASE(tiff_slices_are_stacked_along_z_in_natural_order) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "slices");
+  for (int i = 0; i < 11; ++i) write_tiff(folder / ("slices/s" + std::to_string(i) + ".tif"), 6 * i, 1);
+  BOOST_TEST(is_volume_input(folder / "slices"));
+  const Volume volume = read_volume(folder / "slices");
+  BOOST_TEST((volume.grid.cells == Index3{2, 1, 10}));
+  check_counting(volume);
+  write_tiff(folder / "slices/s11.tif", 66, 1, "w", "", 4);
+  BOOST_TEST(message_of(folder / "slices").find("s11.tif") != std::string::npos);
+  static_cast<void>(folder.file("slices/scan.json", "{}"));
+  BOOST_TEST(!is_volume_input(folder / "slices"));
+}
+
+BOOST_AUTO_TEST_CASE(tiff_files_of_several_images_are_read_with_the_tags_of_imagej) {
+  const TemporaryFolder folder;
+  for (const char* mode : {"wl", "wb"}) {  // little- and big-endian
+    write_tiff(folder / "v.tif", 0, 4, mode, "ImageJ=1.53\nimages=4\nunit=um\nspacing=0.75\n");
+    const Volume volume = read_volume(folder / "v.tif");
+    BOOST_TEST((volume.grid.cells == Index3{2, 1, 3}));
+    BOOST_TEST((volume.grid.spacing == Vec3{0.25, 0.5, 0.75}));
+    BOOST_TEST(volume.grid.unit == "um");
+    check_counting(volume);
+  }
+  const std::string whole = support::bytes_of(folder / "v.tif");
+  BOOST_TEST(message_of(folder.file("cut.tif", whole.substr(0, whole.size() / 2))) != "accepted");
+  write_tiff(folder / "v.tif", 0, 1);
+  BOOST_TEST(message_of(folder / "v.tif").find("at least two") != std::string::npos);
+  write_tiff(folder / "v.tif", 0, 1, "w", "ImageJ=1.53\nimages=4000\n");
+  BOOST_TEST(message_of(folder / "v.tif") != "accepted");
 }

@@ -101,6 +101,14 @@ std::string Arguments::take_word() {
   return word;
 }
 
+bool Arguments::asks(const std::string& name, const std::string& value) const {
+  for (std::size_t i = 0; i < tokens_.size(); ++i)
+    if (tokens_[i] == option(name) + "=" + value ||
+        (tokens_[i] == option(name) && i + 1 < tokens_.size() && tokens_[i + 1] == value))
+      return true;
+  return false;
+}
+
 bool Arguments::parse() {
   po::options_description all;
   for (const auto& g : groups_) all.add(g);

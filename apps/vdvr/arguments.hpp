@@ -35,6 +35,9 @@ class Arguments {
   std::string take_word();
 
   [[nodiscard]] bool has(const std::string& name) const;
+  /// True when the words hold "--name value", whatever else they lack; for options that only ask. Before
+  /// parse().
+  [[nodiscard]] bool asks(const std::string& name, const std::string& value) const;
   /// The text given; InputError when it is absent.
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] std::string text_or(const std::string& name, const std::string& fallback) const;

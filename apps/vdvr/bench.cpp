@@ -11,6 +11,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/measure_tightness.hpp"
 #include "vdvr/simulate.hpp"
@@ -162,9 +163,12 @@ void check_picture(const Image& image) {
 
 int bench_render(Arguments& args) {
   const std::vector<std::string> methods{"vdvr", "dvr", "d2vr"}, supported{"vdvr", "dvr"};
-  args.positional("FILE", "a certified volume or an MHA/NRRD volume");
+  args.positional("FILE", "a certified volume, or a uniform one");
   add_limited(args, "method", methods, supported, "the mixed volume, or its base samples alone");
   args.value("frames", "60", "over a full turn (default 60)").value("size", "512x512", "pixels");
+  constexpr Orbit first{0, 20, 1};
+  add_transfer(args);
+  add_orbit(args, first);
   args.value("sampler", "auto|image3d|buffer", "default auto");
   add_common(args);
   if (!args.parse()) return 0;
@@ -179,7 +183,7 @@ int bench_render(Arguments& args) {
     o.width = (*size)[0];
     o.height = (*size)[1];
   }
-  o.transfer = two_material_transfer(bright);
+  o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.sampler = safe_sampler(sampler == "auto"     ? SamplerKind::automatic
                            : sampler == "buffer" ? SamplerKind::buffer
                                                  : SamplerKind::image3d,
@@ -188,15 +192,16 @@ int bench_render(Arguments& args) {
   Device device = open_device(common);
   ProgressLine progress("bench", common.quiet);
   const ResidentVolume resident(device, scene.volume);
-  o.camera = orbit_camera(scene.volume.grid, 0, 20, 1);
+  const Orbit orbit = orbit_options(args, first);
+  o.camera = orbit_camera(scene.volume.grid, orbit.azimuth, orbit.elevation, orbit.zoom);
   RenderResult last =
       raycast(device, resident, o);  // also builds the kernels and lets `auto` choose, before timing
   check_picture(last.image);
   std::vector<double> fps, rays, samples;
   for (std::int64_t f = 0; f < frames; ++f) {
     report(progress.callback(), "render", static_cast<double>(f) / static_cast<double>(frames));
-    o.camera =
-        orbit_camera(scene.volume.grid, 360.0 * static_cast<double>(f) / static_cast<double>(frames), 20, 1);
+    const double turned = 360.0 * static_cast<double>(f) / static_cast<double>(frames);
+    o.camera = orbit_camera(scene.volume.grid, orbit.azimuth + turned, orbit.elevation, orbit.zoom);
     const auto start = Clock::now();
     last = raycast(device, resident, o);
     const double seconds = since(start);
@@ -209,6 +214,8 @@ int bench_render(Arguments& args) {
   line["method"] = method;
   line["size"] = {o.width, o.height};
   line["cells"] = scene.volume.grid.cells;
+  line["transfer"] = o.transfer.name;
+  line["orbit"] = {orbit.azimuth, orbit.elevation, orbit.zoom};
   line["sampler"] = sampler_name(last.sampler);
   line["resident_bytes"] = resident.bytes();
   std::vector<double> seconds(fps.size());

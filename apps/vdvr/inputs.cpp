@@ -18,13 +18,15 @@ namespace vdvr::cli {
 
 InputKind kind_of(const fs::path& path, const Arguments& args) {
   std::error_code error;
-  if (!fs::exists(path, error)) throw FileError(fmt::format("{}: no such file or folder", path.string()));
-  if (fs::is_directory(path, error)) return InputKind::scan;
+  const fs::path file = file_of_volume(path);
+  if (!fs::exists(file, error)) throw FileError(fmt::format("{}: no such file or folder", file.string()));
+  if (file != path) return InputKind::volume;
+  if (fs::is_directory(path, error)) return is_volume_input(path) ? InputKind::volume : InputKind::scan;
   if (fs::is_regular_file(path, error) && fs::file_size(path, error) == 0)
     throw FileError(fmt::format("{}: is empty", path.string()));
   // A truncated .vdvr no longer looks like one: let its own reader say what is wrong.
   if (path.extension() == ".vdvr" || is_vdvr(path)) return InputKind::certified;
-  if (is_volume_path(path) && !args.has("angles-file")) return InputKind::volume;
+  if (is_volume_input(path) && !args.has("angles-file")) return InputKind::volume;
   return InputKind::scan;
 }
 
@@ -34,6 +36,10 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
     case InputKind::certified:
       throw InputError(fmt::format("{}: is a certified volume, not projections", path.string()));
     case InputKind::volume:
+      if (std::error_code error; fs::is_directory(path, error))
+        throw InputError(fmt::format(
+            "{}: holds TIFF slices and no scan.json, so it is a volume; a scan is described by scan.json",
+            path.string()));
       throw InputError(
           fmt::format("{}: is a volume; give --angles-file if it is a stack of projections", path.string()));
     case InputKind::scan:

@@ -31,7 +31,8 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
       break;
   }
   throw InputError(
-      fmt::format("{}: is neither a certified volume nor an MHA/NRRD volume; build or reconstruct it first",
+      fmt::format("{}: is neither a certified volume nor a uniform one (MHA, NRRD, FILE.h5:/dataset, TIFF "
+                  "slices); build or reconstruct it first",
                   path.string()));
 }
 

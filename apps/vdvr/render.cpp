@@ -1,86 +1,69 @@
-// vdvr render: a picture, or a turntable of pictures.
+// vdvr render: a picture, the values behind it, or a turntable.
 #include <fmt/format.h>
-
-#include <chrono>
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/view.hpp"
 #include "host/error_slice.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
 namespace {
 
 const std::vector<std::string> kMethods{"vdvr", "dvr", "d2vr"}, kSupportedMethods{"vdvr", "dvr"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
-const std::vector<std::string> kCameraOptions{"camera-position", "camera-focal-point", "camera-view-up",
-                                              "camera-view-angle"};
+constexpr Orbit kOrbit{30, 20, 1};
+// Twenty pictures a second: a turn of 60 takes three.
+constexpr int kFrameMs = 50;
 
 void add_options(Arguments& args) {
-  args.positional("FILE", "a certified volume or an MHA/NRRD volume")
-      .value("output,o", "IMG.png", "the picture; with --turntable a folder");
+  args.positional("FILE", "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices")
+      .value("output,o", "IMG.png|X.npy",
+             "the picture; or as float32 what lies behind its pixels: opacity, depth, maximum, field, error; "
+             "with "
+             "--turntable a folder, or T.apng or T.gif");
   add_limited(args, "method", kMethods, kSupportedMethods, "the mixed volume, or its base samples alone");
   args.value("mode", "dvr|iso|mip|slice|error", "default dvr; error: |V - F| on a slice, needs --projections")
-      .value("size", "512x512", "pixels")
-      .value("tf", "FILE.json|NAME",
-             "transfer function (default, grey, bone, soft, mip); without it one that suits the volume")
-      .value("iso", "V", "density of the iso-surface (default: between background and object)")
+      .value("size", "512x512", "pixels");
+  add_transfer(args);
+  args.value("iso", "V", "density of the iso-surface (default: between background and object)")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
       .value("step", "S", "in base cells (default 1)")
+      .flag("no-shading", "colours of the transfer function alone, without light")
       .value("turntable", "N", "N pictures over a full turn, frame-0000.png and so on")
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections")
       .flag("unverified", "render although content and certificate do not match");
   add_scan(args);
-  args.group("Camera")
-      .value("azimuth", "DEG", "about z; 0 looks along -y with x to the right (default 30)")
-      .value("elevation", "DEG", "default 20")
-      .value("zoom", "Z", "1 fits the volume (default 1)")
-      .value("camera-position", "X,Y,Z", "instead of azimuth, elevation and zoom")
-      .value("camera-focal-point", "X,Y,Z", "default: the volume's centre")
-      .value("camera-view-up", "X,Y,Z", "default 0,0,-1: detector row 0 is up")
-      .value("camera-view-angle", "DEG", "vertical (default 30)");
+  args.group("Camera");
+  add_orbit(args, kOrbit);
+  add_free_camera(args);
+  add_overlay(args);
 }
 
-struct Orbit {
-  double azimuth = 30, elevation = 20, zoom = 1;
-};
+/// What the name of the output asks for.
+enum class OutputKind { picture, values, folder, apng, gif };
 
-Orbit orbit_options(const Arguments& args) {
-  Orbit orbit;
-  orbit.azimuth = args.number_or("azimuth", orbit.azimuth);
-  orbit.elevation = args.number_or("elevation", orbit.elevation);
-  orbit.zoom = args.positive_or("zoom", orbit.zoom);
-  return orbit;
-}
-
-bool has_free_camera(const Arguments& args) {
-  bool any = false;
-  for (const auto& name : kCameraOptions) any = any || args.has(name);
-  return any;
-}
-
-Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit) {
-  Camera camera = orbit_camera(grid, orbit.azimuth, orbit.elevation, orbit.zoom);
-  if (!has_free_camera(args)) return camera;
-  camera.position = args.vec3("camera-position").value_or(camera.position);
-  camera.focal_point = args.vec3("camera-focal-point").value_or(camera.focal_point);
-  camera.view_up = args.vec3("camera-view-up").value_or(camera.view_up);
-  camera.view_angle_deg = args.positive_or("camera-view-angle", camera.view_angle_deg);
-  if (camera.view_angle_deg >= 180)
-    throw InputError(fmt::format("--camera-view-angle: {} is not below 180", camera.view_angle_deg));
-  return camera;
-}
-
-TransferFunction transfer_for(const Arguments& args, const Brightness& b) {
-  if (!args.has("tf")) return two_material_transfer(b);
-  const std::string name = args.text("tf");
-  const std::filesystem::path file(name);
-  if (file.extension() == ".json") return read_transfer_function(file);
-  return transfer_preset(name, b.lo, b.hi);
+OutputKind output_kind(const std::filesystem::path& output, bool turntable) {
+  const std::string e = output.extension().string();
+  if (turntable) {
+    if (e == ".apng") return OutputKind::apng;
+    if (e == ".gif") return OutputKind::gif;
+    if (e == ".png" || e == ".npy")
+      throw InputError(
+          fmt::format("{}: a turntable goes into a folder, or moves as .apng or .gif", output.string()));
+    return OutputKind::folder;
+  }
+  if (e == ".png") return OutputKind::picture;
+  if (e == ".npy") return OutputKind::values;
+  if (e == ".apng" || e == ".gif")
+    throw InputError(fmt::format("{}: moving pictures need --turntable N", output.string()));
+  throw InputError(fmt::format("{}: give the output a name that ends in .png, or .npy for float32 values",
+                               output.string()));
 }
 
 /// Everything that the words alone decide; what depends on the volume is filled in by `complete`.
@@ -98,6 +81,7 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
+  o.shading = !args.has("no-shading");
   const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
   o.slice_axis = axis[0] - 'x';
   o.slice_position = args.number("slice-position");
@@ -113,13 +97,15 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   const bool flat = o.mode == RenderMode::slice || o.mode == RenderMode::error;
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
-  if (flat) refuse(args, kCameraOptions, "a slice has no camera");
+  if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
-    refuse(args, {"azimuth", "elevation", "zoom", "turntable", "tf", "iso", "step"},
+    refuse(args, {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading"},
            "does not apply to a slice");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
+  if (o.mode == RenderMode::mip)
+    refuse(args, {"no-shading"}, "does not apply to --mode mip, which has no light");
   if (o.mode != RenderMode::iso) refuse(args, {"iso"}, "applies to --mode iso");
-  if (o.mode == RenderMode::iso) refuse(args, {"tf"}, "does not apply to --mode iso");
+  if (o.mode == RenderMode::iso) refuse(args, {"tf", "tf-range"}, "does not apply to --mode iso");
   if (o.mode != RenderMode::error) refuse(args, {"projections"}, "applies to --mode error");
   if (o.mode == RenderMode::error) {
     refuse(args, {"method", "unverified", "sampler"},
@@ -130,7 +116,7 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
 }
 
 int render_error(const Arguments& args, const CommonOptions& common, const RenderOptions& o,
-                 const std::filesystem::path& output) {
+                 const std::filesystem::path& output, OutputKind kind) {
   const auto path = args.path("FILE"), projections = args.path("projections");
   ProgressLine progress(args.command(), common.quiet);
   const Scene scene = open_scene(path, args, "vdvr", false);
@@ -142,11 +128,14 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   const auto axis = static_cast<std::size_t>(o.slice_axis);
   const double middle = g.origin[axis] + 0.5 * static_cast<double>(g.cells[axis]) * g.spacing[axis];
   Device device = open_device(common);
+  // Values have no caption: the slice alone has the size asked for.
+  const std::int64_t height = o.height + (kind == OutputKind::values ? kErrorCaption : 0);
   const ErrorSlice slice =
       error_slice(device, scan, scene.volume, *scene.certificate,
-                  {o.slice_axis, o.slice_position.value_or(middle), o.width, o.height}, progress.callback());
+                  {o.slice_axis, o.slice_position.value_or(middle), o.width, height}, progress.callback());
   throw_if_interrupted();
-  write_png(output, slice.image);
+  if (kind == OutputKind::values) write_npy(output, slice.errors);
+  else write_png(output, slice.image);
   progress.clear();
   const double epsilon = scene.certificate->epsilon_abs;
   const Json json = {{"output", output.string()},    {"mode", "error"},
@@ -161,26 +150,104 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
 
 std::string frame_name(std::int64_t frame) { return fmt::format("frame-{:04}.png", frame); }
 
-/// Renders `frames` pictures into a folder. Returns the last.
-RenderResult render_turntable(const Arguments& args, const CommonOptions& common, Device& device,
-                              const ResidentVolume& resident, const Scene& scene, RenderOptions o,
-                              std::int64_t frames, const Progress& progress) {
-  std::vector<std::string> names;
-  for (std::int64_t f = 0; f < frames; ++f) names.push_back(frame_name(f));
-  if (scene.certificate) names.emplace_back("certificate.json");
-  OutputFolder folder(args.path("output"), names, common.force);
-  folder.begin();
+/// What a turntable needs beside its frames.
+struct Stage {
+  Device& device;
+  const ResidentVolume& resident;
+  const Scene& scene;
+  const Overlay& overlay;
+  bool certified;
+
+  [[nodiscard]] RenderResult draw(const RenderOptions& o) const {
+    return render_with_overlay(device, resident, scene, o, overlay, certified);
+  }
+};
+
+/// Renders `frames` pictures and hands each to `take`. Returns the last.
+template <class Take>
+RenderResult turn(const Arguments& args, const Stage& stage, RenderOptions o, std::int64_t frames,
+                  const Progress& progress, Take&& take) {
   RenderResult last;
   for (std::int64_t f = 0; f < frames; ++f) {
     report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
-    Orbit orbit = orbit_options(args);
+    Orbit orbit = orbit_options(args, kOrbit);
     orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
-    o.camera = camera_for(args, resident.grid(), orbit);
-    last = raycast(device, resident, o);
-    write_png(folder.file(frame_name(f)), last.image);
+    o.camera = camera_for(args, stage.resident.grid(), orbit);
+    last = stage.draw(o);
+    take(f, last.image);
   }
-  if (scene.certificate) folder.finish(to_json(*scene.certificate));
   return last;
+}
+
+/// Frames that an earlier, longer turn may have left in the folder go with it.
+std::vector<std::string> turntable_names(const std::filesystem::path& folder, std::int64_t frames,
+                                         bool certificate) {
+  std::vector<std::string> names;
+  for (std::int64_t f = 0; f < frames; ++f) names.push_back(frame_name(f));
+  std::error_code error;
+  for (std::int64_t f = frames; f <= 9999 && std::filesystem::exists(folder / frame_name(f), error); ++f)
+    names.push_back(frame_name(f));
+  if (certificate) names.emplace_back("certificate.json");
+  return names;
+}
+
+RenderResult turn_into_folder(const Arguments& args, const CommonOptions& common, const Stage& stage,
+                              const RenderOptions& o, std::int64_t frames, const Progress& progress) {
+  const auto path = args.path("output");
+  OutputFolder folder(path, turntable_names(path, frames, stage.scene.certificate.has_value()), common.force);
+  folder.begin();
+  RenderResult last = turn(args, stage, o, frames, progress, [&](std::int64_t f, const Image& image) {
+    write_png(folder.file(frame_name(f)), image);
+  });
+  if (stage.scene.certificate) folder.finish(to_json(*stage.scene.certificate));
+  return last;
+}
+
+RenderResult turn_into_file(const Arguments& args, const CommonOptions& common, const Stage& stage,
+                            const RenderOptions& o, std::int64_t frames, OutputKind kind,
+                            const Progress& progress) {
+  // Palette and encoder want all frames together.
+  const double bytes =
+      3.0 * static_cast<double>(o.width) * static_cast<double>(o.height) * static_cast<double>(frames);
+  const double limit = common.max_memory != 0 ? static_cast<double>(common.max_memory) : 0x1p32;
+  if (bytes > limit)
+    throw ResourceError(fmt::format(
+        "{} frames need {:.0f} MiB together; take fewer, a smaller --size, or a folder as the output", frames,
+        bytes / (1 << 20)));
+  std::vector<Image> images;
+  RenderResult last = turn(args, stage, o, frames, progress,
+                           [&](std::int64_t, const Image& image) { images.push_back(image); });
+  report(progress, "encode", 0);
+  if (kind == OutputKind::gif) write_gif(args.path("output"), images, kFrameMs);
+  else write_apng(args.path("output"), images, kFrameMs);
+  return last;
+}
+
+Json transfer_json(const TransferFunction& f) {
+  return {{"name", f.name}, {"range", {f.points.front().value, f.points.back().value}}, {"note", f.note}};
+}
+
+/// One picture, or the values behind it.
+RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::filesystem::path& output,
+                      OutputKind kind) {
+  if (kind == OutputKind::picture) {
+    RenderResult result = stage.draw(o);
+    throw_if_interrupted();
+    write_png(output, result.image);
+    return result;
+  }
+  FloatImage values;
+  RenderResult result;
+  if (o.mode == RenderMode::slice) {
+    values = slice_values(stage.scene.volume, o);
+    result.sampler = SamplerKind::buffer;
+    result.sampler_reason = "values of a slice are sampled on the host";
+  } else {
+    result = raycast_with_values(stage.device, stage.resident, o, values);
+  }
+  throw_if_interrupted();
+  write_npy(output, values);
+  return result;
 }
 
 }  // namespace
@@ -188,49 +255,50 @@ RenderResult render_turntable(const Arguments& args, const CommonOptions& common
 int render_command(Arguments& args) {
   add_options(args);
   add_common(args);
+  if (args.asks("tf", "list")) {
+    fmt::print("transfer functions by name, stretched over the volume's own values:\n{}", preset_table());
+    return 0;
+  }
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   RenderOptions o = render_options(args);
   check_combination(args, o);
+  const Overlay overlay = overlay_options(args, o.mode);
   const auto path = args.path("FILE"), output = args.path("output");
   const bool turntable = args.has("turntable");
   const std::int64_t frames = args.integer_or("turntable", 1, 1, 9999);
-  if (!turntable) {
-    if (output.extension() != ".png")
-      throw InputError(
-          fmt::format("{}: pictures are PNG; give the output a name that ends in .png", output.string()));
-    check_output(output, common.force, {path});
-  }
-  if (o.mode == RenderMode::error) return render_error(args, common, o, output);
+  const OutputKind kind = output_kind(output, turntable);
+  if (kind == OutputKind::values)
+    refuse(args, {"axes", "box", "colorbar", "caption"}, "is drawn over pictures, not into values");
+  if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
+  if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
   const Scene scene = open_scene(path, args, args.text_or("method", "vdvr"), args.has("unverified"));
   const Brightness bright = brightness_of(scene.volume);
   o.iso = args.number_or("iso", bright.threshold);
-  o.transfer = transfer_for(args, bright);
+  o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.sampler = safe_sampler(o.sampler, scene.certificate);
-  o.camera = camera_for(args, scene.volume.grid, orbit_options(args));
+  o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
+  // The base samples alone are another field than the one certified.
+  const bool certified = scene.verified && args.text_or("method", "vdvr") == "vdvr";
 
   Device device = open_device(common);
   ProgressLine progress(args.command(), common.quiet);
   const ResidentVolume resident(device, scene.volume);
-  RenderResult result;
-  if (turntable) {
-    result = render_turntable(args, common, device, resident, scene, o, frames, progress.callback());
-  } else {
-    result = raycast(device, resident, o);
-    throw_if_interrupted();
-    write_png(output, result.image);
-  }
+  const Stage stage{device, resident, scene, overlay, certified};
+  const RenderResult result =
+      kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
+      : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
+                                 : draw_one(stage, o, output, kind);
   progress.clear();
 
-  // The base samples alone are another field than the one certified.
-  const bool certified = scene.verified && args.text_or("method", "vdvr") == "vdvr";
   const std::string stamp = certified        ? "certified"
                             : scene.verified ? "base samples alone: no certificate"
                             : scene.certificate
                                 ? "UNVERIFIED: the content was not compared with the certificate"
                                 : "no certificate";
+  const bool has_transfer = o.mode == RenderMode::dvr || o.mode == RenderMode::mip;
   const Json json = {{"output", output.string()},
                      {"frames", frames},
                      {"verified", certified},
@@ -240,6 +308,7 @@ int render_command(Arguments& args) {
                      {"seconds", result.seconds},
                      {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
                      {"outside_certificate", outside_certificate(o)},
+                     {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
                      {"device", device.info().name}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
@@ -249,6 +318,10 @@ int render_command(Arguments& args) {
       fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
                  scene.certificate->epsilon_abs);
     fmt::print("  not covered  {}\n", outside_certificate(o));
+    if (has_transfer)
+      fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,
+                 o.transfer.points.front().value, o.transfer.points.back().value);
+    if (has_transfer && !o.transfer.note.empty()) print_notes({o.transfer.note});
     // Slices count no samples along rays.
     fmt::print("  {}{:.3f} s on {}\n",
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,

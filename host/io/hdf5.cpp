@@ -243,17 +243,28 @@ std::optional<std::vector<std::string>> Hdf5File::text_attribute(const std::stri
 }
 
 std::optional<double> Hdf5File::number_attribute(const std::string& object, const std::string& name) const {
+  const auto numbers = numbers_attribute(object, name, 1);
+  if (!numbers) return std::nullopt;
+  return numbers->front();
+}
+
+std::optional<std::vector<double>> Hdf5File::numbers_attribute(const std::string& object,
+                                                               const std::string& name,
+                                                               std::size_t count) const {
   const Quiet quiet;
   const Hdf5Handle handle = open_object(object);
   if (!handle.valid() || H5Aexists(handle.id(), name.c_str()) <= 0) return std::nullopt;
   const Hdf5Handle attribute(H5Aopen(handle.id(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  if (!attribute.valid()) return std::nullopt;
   const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose), space(H5Aget_space(attribute.id()), H5Sclose);
   const H5T_class_t kind = H5Tget_class(type.id());
-  double value = 0;
-  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || H5Sget_simple_extent_npoints(space.id()) != 1 ||
-      H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0)
-    throw FileError(fmt::format("{}: attribute '{}' is not one number", named(object), name));
-  return value;
+  std::vector<double> values(count);
+  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) ||
+      H5Sget_simple_extent_npoints(space.id()) != static_cast<hssize_t>(count) ||
+      H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, values.data()) < 0)
+    throw FileError(fmt::format("{}: attribute '{}' is not {}", named(object), name,
+                                count == 1 ? "one number" : fmt::format("{} numbers", count)));
+  return values;
 }
 
 // --- writing

@@ -1,7 +1,8 @@
 // The HDF5 C API behind handles that close themselves and errors that are exceptions: FileError on reading,
 // ResourceError on writing, each with file and object path. HDF5's own messages are silenced and quoted in
 // ours. External links, external storage and virtual datasets are refused: a scan is one file, and its hash
-// covers all of it. Called by host/io/hdf5_scan.cpp and the tests. Not thread-safe, as HDF5 itself.
+// covers all of it. Called by host/io/hdf5_scan.cpp,
+// host/volume_stack.cpp and the tests. Not thread-safe, as HDF5 itself.
 #pragma once
 
 #include <hdf5.h>
@@ -82,6 +83,10 @@ class Hdf5File {
   /// A scalar numeric attribute. Throws FileError when it is there and not one number.
   [[nodiscard]] std::optional<double> number_attribute(const std::string& object,
                                                        const std::string& name) const;
+  /// A numeric attribute of `count` numbers. Throws FileError when it is there and not that.
+  [[nodiscard]] std::optional<std::vector<double>> numbers_attribute(const std::string& object,
+                                                                     const std::string& name,
+                                                                     std::size_t count) const;
 
   void create_group(const std::string& group);
   /// Chunked by `chunk`, with the Fletcher32 checksum.

@@ -33,9 +33,11 @@ struct Close {
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& path) : path_(path.string()) {
+  explicit Reader(const std::filesystem::path& path, bool several = false)
+      : path_(path.string()), several_(several) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) throw FileError(path_ + ": no such file");
+    file_ = path_;
     file_bytes_ = std::filesystem::file_size(path, error);
     if (file_bytes_ == 0) throw FileError(path_ + ": is empty");
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
@@ -54,6 +56,25 @@ class Reader {
     return std::move(image_);
   }
 
+  TiffStack stack() {
+    TiffStack s;
+    s.images = static_cast<std::int64_t>(TIFFNumberOfDirectories(tiff_.get()));
+    const char* text = nullptr;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &text) == 1 && text) s.description = text;
+    float per_unit = 0;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &per_unit) == 1)
+      s.pixels_per_unit_x = static_cast<double>(per_unit);
+    if (TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &per_unit) == 1)
+      s.pixels_per_unit_y = static_cast<double>(per_unit);
+    return s;
+  }
+
+  void go_to(std::int64_t index) {
+    path_ = fmt::format("{}, image {}", file_, index);
+    if (TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(index)) != 1) fail("is truncated or damaged");
+    read_header();
+  }
+
  private:
   [[noreturn]] void fail(const std::string& what) const {
     throw FileError(
@@ -70,7 +91,8 @@ class Reader {
     if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEWIDTH, &width) != 1 ||
         TIFFGetField(tiff_.get(), TIFFTAG_IMAGELENGTH, &height) != 1)
       fail("has no image size");
-    if (TIFFLastDirectory(tiff_.get()) == 0) fail("holds several images; one projection per file is needed");
+    if (!several_ && TIFFLastDirectory(tiff_.get()) == 0)
+      fail("holds several images; one projection per file is needed");
     if (tag(TIFFTAG_SAMPLESPERPIXEL, 1) != 1) fail("has several samples per pixel; greyscale is needed");
     if (tag(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_PALETTE) fail("has a colour palette");
     if (tag(TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT) != ORIENTATION_TOPLEFT)
@@ -155,7 +177,8 @@ class Reader {
       }
   }
 
-  std::string path_, message_;
+  std::string path_, file_, message_;
+  bool several_ = false;
   std::uintmax_t file_bytes_ = 0;
   std::unique_ptr<TIFF, Close> tiff_;
   std::uint16_t bits_ = 0, format_ = 0;
@@ -165,5 +188,16 @@ class Reader {
 }  // namespace
 
 TiffImage read_tiff(const std::filesystem::path& path) { return Reader(path).read(); }
+
+void read_tiff_stack(const std::filesystem::path& path, const std::function<void(const TiffStack&)>& begin,
+                     const std::function<void(std::int64_t, TiffImage)>& take) {
+  Reader reader(path, true);
+  const TiffStack stack = reader.stack();
+  begin(stack);
+  for (std::int64_t i = 0; i < stack.images; ++i) {
+    reader.go_to(i);
+    take(i, reader.read());
+  }
+}
 
 }  // namespace vdvr::io

@@ -1,4 +1,4 @@
-// An 8-bit RGB picture and its PNG form.
+// Pictures: 8-bit RGB with its PNG form, floats with their NumPy form, and moving ones as APNG and GIF.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,21 @@ struct Image {
   std::vector<std::uint8_t> rgb;
 };
 
-/// Written whole or not at all. Throws ResourceError (disk) or FileError (folder missing, not writable).
+/// float values[y][x], row 0 on top; NaN where there is nothing to say.
+struct FloatImage {
+  std::int64_t width = 0, height = 0;
+  std::vector<float> values;
+};
+
+/// Each is written whole or not at all. Throws InputError (size), ResourceError (disk) or FileError (folder
+/// missing, not writable).
 void write_png(const std::filesystem::path& path, const Image& image);
+/// NumPy's format 1.0: float32, little-endian, shape (height, width), C order.
+void write_npy(const std::filesystem::path& path, const FloatImage& image);
+/// Frames of one size, shown `frame_ms` each, for ever. APNG is lossless; a viewer without it shows frame 0.
+void write_apng(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
+/// One palette of 255 colours for all frames, median cut over their pixels, ordered dither (which stands
+/// still from frame to frame). Sides up to 65535. GIF counts time in hundredths of a second.
+void write_gif(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
 
 }  // namespace vdvr

@@ -23,12 +23,26 @@ struct TransferPoint {
 struct TransferFunction {
   std::string name;
   std::vector<TransferPoint> points;
+  /// World length that opacities of a file hold over; 0: one base cell. `raycast` takes them as of a base
+  /// cell: call per_base_cell first.
+  double opacity_length = 0;
+  std::string note = {};  ///< what a file left open and the reader filled in; empty: nothing
 };
-/// A named preset ("default", "grey", "bone", "soft", "mip") stretched over [lo, hi]. Throws InputError.
-/// For CT take lo = max(0, minimum): air is 0, and what lies below is undershoot of the filter.
+struct TransferPreset {
+  std::string name, purpose;
+};
+const std::vector<TransferPreset>& transfer_presets();
+/// A preset by name, stretched over [lo, hi]. Throws InputError. For CT take lo = max(0, minimum): air is 0,
+/// and what lies below is undershoot of the filter. The presets "iso" and "marschner-lobb" have their surface
+/// in the middle.
 TransferFunction transfer_preset(const std::string& name, double lo, double hi);
-/// JSON: {"points": [{"value", "rgb", "opacity"}]}. Throws FileError.
+/// Told apart by content: our {"points": [{"value", "rgb", "opacity"}]}, a 3D Slicer volume property
+/// (.vp.json) or a ParaView preset (docs/rendering.md). Values as in the file. Throws FileError.
 TransferFunction read_transfer_function(const std::filesystem::path& path);
+/// The same with values mapped linearly so that the first lies at lo and the last at hi. Throws InputError.
+TransferFunction stretched(TransferFunction transfer, double lo, double hi);
+/// The same with opacities of one base cell, the smallest spacing of the grid.
+TransferFunction per_base_cell(TransferFunction transfer, const Grid& grid);
 
 struct Camera {
   Vec3 position{0, 3, 0};
@@ -40,6 +54,11 @@ struct Camera {
 /// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits
 /// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError.
 Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
+/// Without `view_up` it is -z, and where that is (within 1e-6) the direction of view, the y direction that
+/// leaves +x to the right. Throws InputError: not finite, position and focal point the same, a view_up
+/// parallel to the view, an angle outside (0, 180).
+Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optional<Vec3>& view_up,
+               double view_angle_deg);
 
 enum class RenderMode { dvr, iso, mip, slice, error };
 enum class SamplerKind { automatic, image3d, buffer };
@@ -102,6 +121,15 @@ class ResidentVolume {
 /// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
 /// Mode `error` throws InputError: error slices need the projections (`run`, `render --projections`).
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
+
+/// The same picture, and in `values` what lies behind its pixels: dvr, the opacity; iso, the distance from
+/// the eye along the ray in world units, NaN where nothing is hit; mip, the maximum, NaN where the box is
+/// missed; slice, the field, 0 outside the grid.
+RenderResult raycast_with_values(Device& device, const ResidentVolume& volume, const RenderOptions& options,
+                                 FloatImage& values);
+/// The field at the pixel centres of the slice picture, by sample_at on the host; NaN outside the grid.
+/// Throws InputError.
+FloatImage slice_values(const MixedVolume& volume, const RenderOptions& options);
 
 /// What the device's image3d sampler does to weights and constants (docs/error-bounds.md, section on
 /// samplers).

@@ -1,0 +1,77 @@
+#include "apps/vdvr/overlay.hpp"
+
+#include <fmt/format.h>
+
+#include "host/decorate.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+/// How much of what lies behind the volume is hidden, [y][x].
+std::vector<float> hidden_part(RenderMode mode, const FloatImage& values) {
+  std::vector<float> hidden;
+  hidden.reserve(values.values.size());
+  for (const float v : values.values) {
+    // A maximum hides nothing; where an iso-surface was hit its depth is a number.
+    if (mode == RenderMode::dvr) hidden.push_back(v);
+    else hidden.push_back(mode == RenderMode::iso && v == v ? 1.0f : 0.0f);
+  }
+  return hidden;
+}
+
+ColourBar colour_bar(const RenderOptions& o, const Scene& scene, bool certified) {
+  ColourBar bar;
+  if (o.mode == RenderMode::slice) {
+    const auto [lo, hi] = o.slice_range.value_or(std::pair{0.0, 1.0});
+    bar.points = {{lo, {0, 0, 0}, 1}, {hi, {1, 1, 1}, 1}};
+  } else {
+    bar.points = o.transfer.points;
+  }
+  bar.opacity = o.mode == RenderMode::dvr;
+  // Line integrals have no unit, so a certified density has one over length; of other volumes it is unknown.
+  if (certified) bar.unit = "1/" + scene.volume.grid.unit;
+  return bar;
+}
+
+std::vector<std::string> caption_lines(const RenderOptions& o, const Scene& scene, bool certified) {
+  if (!certified) return {"no certificate", outside_certificate(o)};
+  const Certificate& c = *scene.certificate;
+  return {fmt::format("|V - F| <= {:.4g} 1/{} ({:.3g} % of the range) at every covered point", c.epsilon_abs,
+                      scene.volume.grid.unit, 100 * c.epsilon),
+          "not certified: " + outside_certificate(o)};
+}
+
+}  // namespace
+
+void add_overlay(Arguments& args) {
+  args.group("Drawn over the picture")
+      .flag("axes", "directions of x, y and z, bottom left")
+      .flag("box", "edges of the grid: those in front over the volume, those behind show through it")
+      .flag("colorbar", "colours by density, with the opacity as a line across")
+      .flag("caption", "what is certified, and what lies outside the certificate");
+}
+
+Overlay overlay_options(const Arguments& args, RenderMode mode) {
+  Overlay o{args.has("axes"), args.has("box"), args.has("colorbar"), args.has("caption")};
+  if (mode == RenderMode::slice) refuse(args, {"axes", "box"}, "a slice has no camera");
+  if (mode == RenderMode::iso) refuse(args, {"colorbar"}, "an iso-surface has no transfer function");
+  if (mode == RenderMode::error)
+    refuse(args, {"axes", "box", "colorbar", "caption"}, "an error slice has its own caption");
+  return o;
+}
+
+RenderResult render_with_overlay(Device& device, const ResidentVolume& resident, const Scene& scene,
+                                 const RenderOptions& o, const Overlay& overlay, bool certified) {
+  if (!overlay.any()) return raycast(device, resident, o);
+  FloatImage values;
+  RenderResult r = raycast_with_values(device, resident, o, values);
+  if (overlay.box) draw_box(r.image, o.camera, resident.grid(), hidden_part(o.mode, values));
+  std::int64_t above = 0;
+  if (overlay.caption) above = draw_caption(r.image, caption_lines(o, scene, certified));
+  if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified), above);
+  if (overlay.axes) draw_axes(r.image, o.camera, above);
+  return r;
+}
+
+}  // namespace vdvr::cli

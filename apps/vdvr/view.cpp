@@ -1,0 +1,121 @@
+#include "apps/vdvr/view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+using Range = std::pair<double, double>;
+
+/// Where a preset lies by itself.
+Range preset_range(const std::string& name, const Brightness& b) {
+  if (name != "iso" && name != "marschner-lobb") return {b.lo, b.hi};
+  const double reach = std::min(b.threshold - b.lo, b.hi - b.threshold);
+  return {b.threshold - reach, b.threshold + reach};
+}
+
+bool is_file(const std::string& name) {
+  const std::filesystem::path path(name);
+  std::error_code error;
+  return path.extension() == ".json" || path.has_parent_path() ||
+         std::filesystem::is_regular_file(path, error);
+}
+
+void add_note(TransferFunction& f, const std::string& text) { f.note += (f.note.empty() ? "" : "; ") + text; }
+
+}  // namespace
+
+void add_transfer(Arguments& args) {
+  std::string names;
+  for (const auto& p : transfer_presets()) names += (names.empty() ? "" : ", ") + p.name;
+  args.value(
+          "tf", "FILE.json|NAME|list",
+          "transfer function: a preset (" + names +
+              "; `list` says what each is for), or a file of VDVR, 3D Slicer (.vp.json) or ParaView; without "
+              "it one that suits the volume")
+      .value("tf-range", "LO,HI|auto",
+             "stretch it over these values; auto: the bulk of the volume's (default: presets auto, files as "
+             "they "
+             "stand)");
+}
+
+std::string preset_table() {
+  std::string text;
+  for (const auto& p : transfer_presets()) text += fmt::format("  {:<16} {}\n", p.name, p.purpose);
+  return text;
+}
+
+TransferFunction transfer_for(const Arguments& args, const Brightness& b, const Grid& grid) {
+  std::optional<Range> range;
+  if (args.has("tf-range")) {
+    range = Range{b.lo, b.hi};
+    if (args.text("tf-range") != "auto") {
+      const auto given = args.numbers("tf-range", 2);
+      range = Range{(*given)[0], (*given)[1]};
+      if (!(range->first < range->second))
+        throw InputError(fmt::format("--tf-range: {} is not below {}", range->first, range->second));
+    }
+  }
+  if (!args.has("tf")) {
+    const TransferFunction f = two_material_transfer(b);
+    return range ? stretched(f, range->first, range->second) : f;
+  }
+  const std::string name = args.text("tf");
+  if (!is_file(name)) {
+    const Range r = range.value_or(preset_range(name, b));
+    return transfer_preset(name, r.first, r.second);
+  }
+  TransferFunction f = read_transfer_function(name);
+  if (range) f = stretched(std::move(f), range->first, range->second);
+  if (f.points.back().value < b.lo || f.points.front().value > b.hi)
+    add_note(
+        f, fmt::format("it spans {:.6g} to {:.6g}, the volume {:.6g} to {:.6g}: --tf-range auto stretches it",
+                       f.points.front().value, f.points.back().value, b.lo, b.hi));
+  return per_base_cell(std::move(f), grid);
+}
+
+void add_orbit(Arguments& args, const Orbit& fallback) {
+  args.value("azimuth", "DEG",
+             fmt::format("about z; 0 looks along -y with x to the right (default {})", fallback.azimuth))
+      .value("elevation", "DEG", fmt::format("towards view-up, -z (default {})", fallback.elevation))
+      .value("zoom", "Z", fmt::format("1 fits the volume (default {})", fallback.zoom));
+}
+
+Orbit orbit_options(const Arguments& args, const Orbit& fallback) {
+  return {args.number_or("azimuth", fallback.azimuth), args.number_or("elevation", fallback.elevation),
+          args.positive_or("zoom", fallback.zoom)};
+}
+
+void add_free_camera(Arguments& args) {
+  args.value("camera-position", "X,Y,Z", "the eye, instead of azimuth, elevation and zoom (default theirs)")
+      .value("camera-focal-point", "X,Y,Z", "default: the volume's centre")
+      .value(
+          "camera-view-up", "X,Y,Z",
+          "default 0,0,-1: detector row 0 is up; looking along z the y direction that leaves x to the right")
+      .value("camera-view-angle", "DEG", "vertical (default 30)");
+}
+
+const std::vector<std::string>& free_camera_options() {
+  static const std::vector<std::string> names{"camera-position", "camera-focal-point", "camera-view-up",
+                                              "camera-view-angle"};
+  return names;
+}
+
+bool has_free_camera(const Arguments& args) {
+  const auto& names = free_camera_options();
+  return std::any_of(names.begin(), names.end(), [&](const auto& name) { return args.has(name); });
+}
+
+Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit) {
+  const Camera camera = orbit_camera(grid, orbit.azimuth, orbit.elevation, orbit.zoom);
+  if (!has_free_camera(args)) return camera;
+  return look_at(args.vec3("camera-position").value_or(camera.position),
+                 args.vec3("camera-focal-point").value_or(camera.focal_point), args.vec3("camera-view-up"),
+                 args.positive_or("camera-view-angle", camera.view_angle_deg));
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,32 @@
+// How a volume is looked at: the options of transfer function and camera that `render` and `bench render`
+// share.
+#pragma once
+
+#include "apps/vdvr/pictures.hpp"
+
+namespace vdvr::cli {
+
+/// --tf, --tf-range.
+void add_transfer(Arguments& args);
+/// The names of the presets with what each is for, one a line.
+std::string preset_table();
+/// From --tf: a preset stretched over the volume's bulk (those with a surface in the middle around the
+/// threshold), a file as it stands, or without --tf one that suits the volume; --tf-range overrides.
+/// Opacities are those of one base cell of the grid. What a reader filled in stands in `note`.
+TransferFunction transfer_for(const Arguments& args, const Brightness& brightness, const Grid& grid);
+
+/// An orbit around the volume, as --azimuth, --elevation and --zoom say.
+struct Orbit {
+  double azimuth = 30, elevation = 20, zoom = 1;
+};
+/// Declares the three with `fallback` in their help.
+void add_orbit(Arguments& args, const Orbit& fallback);
+Orbit orbit_options(const Arguments& args, const Orbit& fallback);
+/// --camera-position, -focal-point, -view-up, -view-angle.
+void add_free_camera(Arguments& args);
+const std::vector<std::string>& free_camera_options();
+bool has_free_camera(const Arguments& args);
+/// The free camera where one of its options was given, else the orbit.
+Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit);
+
+}  // namespace vdvr::cli
