@@ -52,18 +52,6 @@ class Stopwatch {
 
 }  // namespace
 
-DeviceField::DeviceField(opencl::State& state, const MixedVolume& volume) : grid(sampler_grid(volume)) {
-  samples = opencl::DeviceArray<float>(state, sample_buffer_size(volume), "certified samples");
-  samples.write(volume.base, 0);
-  std::uint64_t offset = volume.base.size();
-  for (const auto& [triple, tiles] : volume.tiles) {
-    samples.write(tiles, offset);
-    offset += tiles.size();
-  }
-  bricks = opencl::DeviceArray<VdvrBrick>(state, std::span<const VdvrBrick>(brick_records(volume)),
-                                          "brick records");
-}
-
 GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
                        const FieldSups& sups, const GoldSettings& settings)
     : state_(state),
@@ -435,7 +423,7 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
                  cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
-      kernel(state_, "verify", "verify_nodes");
+      kernel(state_, "verify", "verify_nodes", field.defines);
   const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
   kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
          r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),

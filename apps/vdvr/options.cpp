@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "vdvr/error.hpp"
 
@@ -19,12 +20,29 @@ struct Limited {
   const char* help;
 };
 const std::vector<Limited> kBuildLimits{
-    {"closing", {"coarse", "paper", "none"}, {"coarse"}, "how bricks of different levels meet"},
+    {"closing",
+     {"coarse", "paper", "none"},
+     {"coarse", "paper", "none"},
+     "how bricks of different levels meet (default coarse; none is for comparison, never certified)"},
     {"coefficients", {"sampled", "midrange"}, {"sampled"}, "what the stored samples are"},
     {"levels", {"isotropic", "anisotropic"}, {"isotropic"}, "levels per brick or per axis"},
-    {"storage", {"auto", "f32", "u16", "u8"}, {"auto", "f32"}, "sample type of base and tiles"},
+    {"storage",
+     {"auto", "f32", "u16", "u8"},
+     {"auto", "f32", "u16", "u8"},
+     "sample type of base and tiles (default auto)"},
     {"terms", {"all", "grid"}, {"all"}, "error terms that are charged"},
     {"epsilon-of", {"range", "max"}, {"range"}, "what --epsilon is a fraction of"}};
+
+const std::map<std::string, Closing> kClosings{
+    {"coarse", Closing::coarse}, {"paper", Closing::paper}, {"none", Closing::none}};
+const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::automatic},
+                                                    {"f32", StorageChoice::f32},
+                                                    {"u16", StorageChoice::u16},
+                                                    {"u8", StorageChoice::u8}};
+template <class T>
+std::string name_in(const std::map<std::string, T>& names, T value) {
+  return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; })->first;
+}
 
 bool is_power_of_two(std::int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
@@ -173,6 +191,8 @@ BuildOptions build_options(const Arguments& args) {
   refuse(args, {"paper"}, "this version has only its own settings (closing coarse, coefficients sampled)");
   refuse(args, {"resume"}, "this version cannot resume; start again without it");
   BuildOptions build;
+  build.closing = kClosings.at(args.choice("closing", {"coarse", "paper", "none"}, "coarse"));
+  build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, "auto"));
   build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
   if (!is_power_of_two(build.granularity))
     throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", build.granularity));
@@ -194,10 +214,10 @@ std::string options_json(const Plan& plan, const BuildOptions& build, const Para
                          double center) {
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
-  j["closing"] = "coarse";
+  j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = "sampled";
   j["levels"] = "isotropic";
-  j["storage"] = "f32";
+  j["storage"] = name_in(kStorage, build.storage);
   j["terms"] = "all";
   j["epsilon_of"] = "range";
   j["upsampling"] = plan.upsampling_u;

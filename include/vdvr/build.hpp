@@ -12,10 +12,18 @@
 
 namespace vdvr {
 
+/// How bricks of different levels meet (docs/error-bounds.md, sections on closing). `none` leaves the field
+/// discontinuous: for comparison, never certified.
+enum class Closing { coarse, paper, none };
+/// Sample types of base and tiles (docs/file-format.md, storage).
+enum class StorageChoice { automatic, f32, u16, u8 };
+
 struct BuildOptions {
   int granularity = 4;
   std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify and count only bricks inside
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
+  Closing closing = Closing::coarse;
+  StorageChoice storage = StorageChoice::automatic;
 };
 
 struct BuildResult {
