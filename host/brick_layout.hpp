@@ -1,5 +1,6 @@
-// Where each brick's samples lie in one sample buffer: base first, then the tiles of each triple in map
-// order. Called by mixed_volume.cpp (sample_at), verify.cpp and resident_volume.cpp.
+// Where each brick's samples lie: in one sample buffer on the device (base first, then the tiles of each
+// triple in map order, each block at a multiple of 4 bytes), and in the host's own arrays. Called by
+// mixed_volume.cpp, device_field.cpp, resident_volume.cpp and whatever reads stored samples on the host.
 #pragma once
 
 #include <map>
@@ -8,6 +9,7 @@
 #include "vdvr/mixed_volume.hpp"
 
 #define VDVR_DIALECT_HOST
+#define VDVR_SAMPLE_TYPES 7
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"  // the shared headers are C99
 #include "shared/mixed_sampler.h"
@@ -15,18 +17,65 @@
 
 namespace vdvr {
 
+/// 1 << type over the types that base and tiles have: what kernels are compiled for.
+int sample_types(const MixedVolume& volume);
+
 VdvrGrid sampler_grid(const MixedVolume& volume);
 
-/// Offset of each triple's first tile in the sample buffer, in floats; base lies at 0.
+/// Offset of each triple's first tile in the sample buffer, in bytes; base lies at 0.
 std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& volume);
-/// Floats in the sample buffer.
-std::uint64_t sample_buffer_size(const MixedVolume& volume);
+/// Bytes of the sample buffer.
+std::uint64_t sample_buffer_bytes(const MixedVolume& volume);
 
-/// The record of brick (bx, by, bz); texel coordinates are left 0 (the image atlas fills them).
+/// The record of brick (bx, by, bz), unpacked; `base_around` is left 0.
 VdvrBrick brick_record(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz);
 
-/// All records, [bz][by][bx].
-std::vector<VdvrBrick> brick_records(const MixedVolume& volume);
+/// Two words per brick, three where the volume holds integers (mixed_sampler.h), [bz][by][bx][words].
+class PackedRecords {
+ public:
+  PackedRecords(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets);
+  void set_base_around(std::size_t brick) { words_[brick * count_ + 1] |= 1u << 9; }
+  /// Puts something else in the place of the first sample: a texel. Below 2^47.
+  void set_place(std::size_t brick, std::uint64_t place);
+  [[nodiscard]] const std::vector<std::uint32_t>& words() const { return words_; }
+  [[nodiscard]] std::size_t words_per_brick() const { return count_; }
+
+ private:
+  std::size_t count_;
+  std::vector<std::uint32_t> words_;
+};
+
+/// One brick's stored samples on the host.
+class BrickSamples {
+ public:
+  BrickSamples(const MixedVolume& volume, const Index3& brick);
+
+  /// The stored sample number x, y, z, decoded.
+  [[nodiscard]] float operator()(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    const auto i = static_cast<std::size_t>(static_cast<std::int64_t>(record_.place) + z * record_.stride_z +
+                                            y * record_.stride_y + x);
+    if (record_.type == VDVR_F32) return static_cast<const float*>(data_)[i];
+    const std::uint32_t stored = record_.type == VDVR_U16 ? static_cast<const std::uint16_t*>(data_)[i]
+                                                          : static_cast<const std::uint8_t*>(data_)[i];
+    return static_cast<float>(stored) * record_.scale + record_.bias;
+  }
+  /// The field at a cell coordinate of this brick, by the shared sampler; c may lie on its far faces.
+  [[nodiscard]] float at(float cx, float cy, float cz) const;
+  /// Levels along x, y, z.
+  [[nodiscard]] std::array<int, 3> level() const {
+    return {static_cast<int>(record_.level_x), static_cast<int>(record_.level_y),
+            static_cast<int>(record_.level_z)};
+  }
+  /// Number of the last sample along x, y, z that lies in the grid.
+  [[nodiscard]] const Index3& end() const { return end_; }
+  [[nodiscard]] const VdvrBrick& record() const { return record_; }
+
+ private:
+  VdvrGrid grid_;
+  Index3 brick_, end_{};
+  VdvrBrick record_;  // its place is relative to data_
+  const void* data_;
+};
 
 }  // namespace vdvr

@@ -71,11 +71,13 @@ class Builder {
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
     bricks_.rate = plan.gold_rate;
-    bricks_.base = plan.fitted.empty() ? plan.base.samples : plan.fitted;
+    bricks_.sampled = plan.settings.coefficients == "sampled";
+    choose_storage(options.storage);
+    closing_ = options.closing;
     selected_ = bricks_in_roi(bricks_, options.roi);
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
-    bricks_.gold.resize(selected_.size());
+    bricks_.samples.resize(selected_.size());
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
       throw InputError("--roi meets no brick of the grid");
 
@@ -93,6 +95,14 @@ class Builder {
     probe_ = probe_sampler(device);
     watch_.lap("probe");
   }
+
+  /// Puts the base on the lattice of integer samples; before it is measured.
+  void choose_storage(StorageChoice storage) {
+    bricks_.base = plan_.fitted.empty() ? plan_.base.samples : plan_.fitted;
+    bricks_.lattice = choose_lattice(bricks_.base, storage, most_rounding(plan_.epsilon_abs));
+    round_base(bricks_.base, bricks_.lattice);
+  }
+  bool rounds() const { return bricks_.lattice.step > 0; }
 
   // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
   double node_tolerance(const SamplerTerms& sampler) const {
@@ -148,12 +158,18 @@ class Builder {
 
   // Closes, packs, measures; raises bricks until every node is within the tolerance.
   MixedVolume close_and_measure(double tolerance) {
-    // Level 0 was measured on the base samples while classifying, and closing does not change those.
+    // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
+    // change those.
     std::vector<std::uint8_t> pending(bricks_.level.size());
-    for (std::size_t i = 0; i < pending.size(); ++i)
-      pending[i] = bricks_.involved[i] && bricks_.level[i] != LevelTriple{0, 0, 0};
+    MixedVolume before;
     for (int round = 0;; ++round) {
-      MixedVolume volume = close_boundaries(bricks_);
+      MixedVolume volume = close_boundaries(bricks_, closing_);
+      // Where integers round, a raised brick can change more than those it touches.
+      const std::vector<std::uint8_t> changed =
+          round > 0 ? changed_bricks(before, volume) : std::vector<std::uint8_t>(pending.size(), 1);
+      for (std::size_t i = 0; i < pending.size(); ++i)
+        pending[i] =
+            bricks_.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
       watch_.lap("close");
       const DeviceField field(state_, volume);
       const opencl::DeviceArray<std::uint8_t> device_pending(state_, std::span<const std::uint8_t>(pending),
@@ -178,7 +194,7 @@ class Builder {
           },
           progress_, "repair");
       watch_.lap("repair");
-      pending = with_neighbours(raised);
+      before = std::move(volume);
     }
   }
 
@@ -220,10 +236,10 @@ class Builder {
   void store(GoldStream::Batch& batch, const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
     const auto samples = batch.extract(tiles);
     auto next = samples.begin();
-    const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}};
+    const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}, 0};
     for (const auto& [brick, level] : tiles) {
       const auto end = next + shape.tile_size(level);
-      bricks_.gold[at(brick)].assign(next, end);
+      bricks_.samples[at(brick)].assign(next, end);
       next = end;
     }
   }
@@ -255,21 +271,11 @@ class Builder {
     return raise;
   }
 
-  std::vector<std::uint8_t> with_neighbours(const std::vector<std::uint8_t>& marked) const {
-    std::vector<std::uint8_t> out(marked.size(), 0);
-    for (std::size_t i = 0; i < marked.size(); ++i)
-      if (marked[i])
-        for (int part = 0; part < 27; ++part)
-          for (const std::int64_t j :
-               incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9}))
-            if (bricks_.involved[at(j)]) out[at(j)] = 1;
-    return out;
-  }
-
   opencl::State& state_;
   const Plan& plan_;
   const Progress& progress_;
   OpenBricks bricks_;
+  Closing closing_ = Closing::coarse;
   std::vector<std::uint8_t> selected_;
   std::map<std::string, double> seconds_;
   Stopwatch watch_;
@@ -357,12 +363,11 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
       options.granularity != 8)
     throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
   Builder builder(device, scan, plan, options, progress);
-  const std::int64_t atlas = longest_atlas(device.info());
-
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
   // more if that was short.
   const FieldSlopes base_slopes = field_slopes(as_mixed(plan.base));
-  SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), atlas);
+  SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), longest_atlas(device.info()),
+                                       plan.epsilon_abs, plan.gold_rate);
   const auto scale = [](SamplerTerms& t, double f) {
     t.buffer.value *= f;
     if (t.image3d) t.image3d->value *= f;
@@ -377,9 +382,21 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
     }
     builder.classify(tolerance);
     BuildResult result;
-    result.volume = builder.close_and_measure(tolerance);
+    try {
+      result.volume = builder.close_and_measure(tolerance);
+    } catch (ToleranceError& e) {
+      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
+      if (!builder.rounds()) throw;
+      if (options.storage != StorageChoice::automatic) {
+        e.add_context("integer samples round: --storage auto or f32 may do");
+        throw;
+      }
+      builder.choose_storage(StorageChoice::f32);
+      continue;
+    }
     const SamplerTerms sampler =
-        sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(), atlas);
+        sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(),
+                      atlas_length(device.info(), result.volume), plan.epsilon_abs, plan.gold_rate);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt == 2 || is_comparison(plan, options)) {

@@ -1,35 +1,34 @@
-// Boundary closing `coarse`: makes the field continuous across bricks of different levels without upgrading
-// any, and packs the result (docs/error-bounds.md, section on closing). Called by build.cpp.
+// Boundary closing: makes the field continuous across bricks of different levels, and packs the result into
+// the stored types (docs/error-bounds.md, sections on closing). Called by build.cpp.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "host/open_bricks.hpp"
 
 namespace vdvr {
 
-/// The bricks before closing: their levels, whether they take part (a brick wholly outside the covered
-/// region, or the region of interest, does not), and the gold samples of those above level 0.
-struct OpenBricks {
-  Grid grid;
-  int granularity = 4;
-  int rate = 8;
-  std::vector<float> base;               ///< [nz+1][ny+1][nx+1]
-  std::vector<LevelTriple> level;        ///< [bz][by][bx]
-  std::vector<std::uint8_t> involved;    ///< [bz][by][bx]
-  std::vector<std::vector<float>> gold;  ///< per brick: its tile's samples from gold; empty at level 0
-};
+/// Closes and packs.
+///
+/// coarse: each shared face, edge and corner takes, per axis, the lowest level of its incident bricks; the
+/// samples of finer bricks on it are interpolated from that one's, corners before edges before faces.
+/// paper: a brick rises to the highest level of its neighbours; shared parts hold the own samples of their
+/// finest brick, what is new inside is interpolated. Sampled coefficients and isotropic levels only, else
+/// InputError. none: every brick keeps its own samples.
+///
+/// With coarse and paper, samples that several bricks store are computed from one source and rounded to the
+/// coarsest of their steps, so that they hold the same bits. A base sample that only bricks which take no
+/// part read may take a tile's value; every other base sample stays. Cost: the tiles once, over all cores;
+/// with integer samples two or three times.
+MixedVolume close_boundaries(const OpenBricks& bricks, Closing closing = Closing::coarse);
 
-/// Each shared face, edge and corner takes, per axis, the lowest level of its incident bricks; the samples of
-/// finer bricks on it are interpolated from that one, edges before faces. Every sample that several bricks
-/// store is computed from one source, so that they hold the same bits. Cost: the tiles' boundaries, over all
-/// cores.
-MixedVolume close_boundaries(const OpenBricks& bricks);
+/// Bricks whose stored values or levels differ between two closings of the same grid.
+std::vector<std::uint8_t> changed_bricks(const MixedVolume& before, const MixedVolume& after);
 
-/// Bricks of the grid that share a part of a closed brick: side per axis x, y, z is 0 (low border), 1
-/// (inside) or 2 (high border). Only those that take part, the brick itself included.
-std::vector<std::int64_t> incident_bricks(const OpenBricks& bricks, std::int64_t brick,
-                                          const std::array<int, 3>& side);
+/// The tile of a brick as stored, before rounding inside it to its own step. Called by close_boundaries.
+std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick);
+std::vector<float> tile_by_paper(const StoredAs& stored, std::int64_t brick);
+/// The levels that bricks rise to under the paper's closing.
+std::vector<LevelTriple> levels_by_paper(const OpenBricks& bricks);
 
 }  // namespace vdvr

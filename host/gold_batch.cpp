@@ -18,18 +18,6 @@ std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 }  // namespace
 
-DeviceField::DeviceField(opencl::State& state, const MixedVolume& volume) : grid(sampler_grid(volume)) {
-  samples = opencl::DeviceArray<float>(state, sample_buffer_size(volume), "certified samples");
-  samples.write(volume.base, 0);
-  std::uint64_t offset = volume.base.size();
-  for (const auto& [triple, tiles] : volume.tiles) {
-    samples.write(tiles, offset);
-    offset += tiles.size();
-  }
-  bricks = opencl::DeviceArray<VdvrBrick>(state, std::span<const VdvrBrick>(brick_records(volume)),
-                                          "brick records");
-}
-
 // Mirrors TileRequest of kernels/classify.cl.
 struct GoldStream::Batch::TileRequest {
   cl_int block, node_x, node_y, node_z;
@@ -116,7 +104,7 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
                  cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
-      kernel(state_, "verify", "verify_nodes");
+      kernel(state_, "verify", "verify_nodes", field.defines);
   const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
   kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
          r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "host/back_project.hpp"
-#include "host/brick_layout.hpp"
 #include "host/coverage.hpp"
+#include "host/device_field.hpp"
 #include "host/fit_coefficients.hpp"
 #include "host/gold_settings.hpp"
 #include "host/node_slack.hpp"
@@ -49,14 +49,6 @@ struct GoldWork {
 struct GoldSpent {
   GoldWork work;
   double slab_seconds = 0, table_seconds = 0, block_seconds = 0;
-};
-
-/// A stored field on the device, for the verification kernel.
-struct DeviceField {
-  DeviceField(opencl::State& state, const MixedVolume& volume);
-  opencl::DeviceArray<float> samples;
-  opencl::DeviceArray<VdvrBrick> bricks;
-  VdvrGrid grid;
 };
 
 class GoldStream {

@@ -1,17 +1,62 @@
 // The certified volume on the host: brick records, sampling by the shared header, storage figures.
 #include "vdvr/mixed_volume.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 #include "host/brick_layout.hpp"
+#include "vdvr/error.hpp"
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrBrick) == 48 && offsetof(VdvrBrick, level_x) == 16 &&
-              offsetof(VdvrBrick, texel_x) == 32);
-static_assert(sizeof(VdvrGrid) == 32);
+static_assert(sizeof(VdvrGrid) == 32 && offsetof(VdvrGrid, step) == 28);
+static_assert(static_cast<int>(SampleType::f32) == VDVR_F32 &&
+              static_cast<int>(SampleType::u16) == VDVR_U16 && static_cast<int>(SampleType::u8) == VDVR_U8);
+
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+constexpr LevelTriple in_base{0, 0, 0};
+
+std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }
+
+const SampleBlock& block_of(const MixedVolume& v, const LevelTriple& level) {
+  return level == in_base ? v.base : v.tiles.at(level);
+}
+
+template <class T>
+void decode(const std::vector<T>& stored, const SampleBlock& b, double step, std::vector<float>& out) {
+  const std::size_t per_tile = b.offset.empty() ? 1 : stored.size() / b.offset.size();
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    const std::size_t tile = i / per_tile;
+    out.push_back(static_cast<float>(
+        step * (static_cast<double>(b.offset.at(tile)) + std::ldexp(stored[i], b.shift.at(tile)))));
+  }
+}
+
+}  // namespace
+
+const char* text_of(SampleType type) {
+  return type == SampleType::f32 ? "f32" : type == SampleType::u16 ? "u16" : "u8";
+}
+
+std::vector<float> decoded(const SampleBlock& b, double step) {
+  if (b.type == SampleType::f32) return b.f32;
+  std::vector<float> out;
+  out.reserve(b.size());
+  if (b.type == SampleType::u16) decode(b.u16, b, step, out);
+  else decode(b.u8, b, step, out);
+  return out;
+}
+
+int sample_types(const MixedVolume& v) {
+  int types = 1 << static_cast<int>(v.base.type);
+  for (const auto& [triple, block] : v.tiles) types |= 1 << static_cast<int>(block.type);
+  return types;
+}
 
 VdvrGrid sampler_grid(const MixedVolume& v) {
   const Index3 b = v.bricks();
@@ -23,58 +68,109 @@ VdvrGrid sampler_grid(const MixedVolume& v) {
           i32(b[0]),
           i32(b[1]),
           i32(b[2]),
-          0};
+          static_cast<float>(v.step)};
 }
 
 std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& v) {
   std::map<LevelTriple, std::uint64_t> offsets;
-  std::uint64_t next = static_cast<std::uint64_t>(v.grid.sample_count());
-  for (const auto& [triple, samples] : v.tiles) {
+  std::uint64_t next = aligned(v.base.bytes());
+  for (const auto& [triple, block] : v.tiles) {
     offsets[triple] = next;
-    next += samples.size();
+    next += aligned(block.bytes());
   }
   return offsets;
 }
 
-std::uint64_t sample_buffer_size(const MixedVolume& v) {
-  std::uint64_t n = static_cast<std::uint64_t>(v.grid.sample_count());
-  for (const auto& [triple, samples] : v.tiles) n += samples.size();
+std::uint64_t sample_buffer_bytes(const MixedVolume& v) {
+  std::uint64_t n = aligned(v.base.bytes());
+  for (const auto& [triple, block] : v.tiles) n += aligned(block.bytes());
   return n;
 }
 
-VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
-                       std::int64_t bx, std::int64_t by, std::int64_t bz) {
-  const Index3 bricks = v.bricks(), samples = v.grid.samples();
-  const auto index = static_cast<std::size_t>((bz * bricks[1] + by) * bricks[0] + bx);
-  const LevelTriple level = v.level[index];
-  VdvrBrick r{};
-  r.level_z = level[0];
-  r.level_y = level[1];
-  r.level_x = level[2];
-  if (level == LevelTriple{0, 0, 0}) {
-    const std::int64_t g = v.granularity;
-    r.offset = static_cast<std::uint64_t>((bz * g * samples[1] + by * g) * samples[0] + bx * g);
-    r.stride_y = static_cast<std::uint32_t>(samples[0]);
-    r.stride_z = static_cast<std::uint32_t>(samples[0] * samples[1]);
-  } else {
-    const auto shape = v.tile_shape(level);
-    r.offset = offsets.at(level) +
-               static_cast<std::uint64_t>(v.tile[index]) * static_cast<std::uint64_t>(v.tile_size(level));
-    r.stride_y = static_cast<std::uint32_t>(shape[2]);
-    r.stride_z = static_cast<std::uint32_t>(shape[2] * shape[1]);
-  }
+namespace {
+
+// What a record says in its bits and its lattice offset, without its place.
+struct RecordBits {
+  std::uint32_t bits = 0;
+  std::int32_t offset = 0;
+};
+RecordBits record_bits(const MixedVolume& v, std::size_t brick) {
+  const LevelTriple level = v.level[brick];
+  const SampleBlock& block = block_of(v, level);
+  const std::size_t tile = level == in_base ? 0 : v.tile[brick];
+  RecordBits r;
+  r.bits = level[2] | static_cast<std::uint32_t>(level[1]) << 3 | static_cast<std::uint32_t>(level[0]) << 6 |
+           static_cast<std::uint32_t>(block.type) << 10;
+  if (block.type == SampleType::f32) return r;
+  r.bits |= static_cast<std::uint32_t>(block.shift.at(tile)) << 12;
+  r.offset = block.offset.at(tile);
   return r;
 }
 
-std::vector<VdvrBrick> brick_records(const MixedVolume& v) {
-  const auto offsets = tile_offsets(v);
+std::uint64_t place_of(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
+                       std::int64_t bx, std::int64_t by, std::int64_t bz) {
+  const Index3 bricks = v.bricks(), samples = v.grid.samples();
+  const std::size_t brick = at((bz * bricks[1] + by) * bricks[0] + bx);
+  const LevelTriple level = v.level[brick];
+  const std::int64_t g = v.granularity;
+  if (level == in_base)
+    return static_cast<std::uint64_t>((bz * g * samples[1] + by * g) * samples[0] + bx * g);
+  return offsets.at(level) / v.tiles.at(level).sample_bytes() +
+         std::uint64_t{v.tile[brick]} * static_cast<std::uint64_t>(v.tile_size(level));
+}
+
+}  // namespace
+
+VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
+                       std::int64_t bx, std::int64_t by, std::int64_t bz) {
   const Index3 b = v.bricks();
-  std::vector<VdvrBrick> records;
-  records.reserve(static_cast<std::size_t>(v.brick_count()));
+  const RecordBits r = record_bits(v, at((bz * b[1] + by) * b[0] + bx));
+  const std::uint64_t place = place_of(v, offsets, bx, by, bz);
+  return vdvr_unpack(static_cast<std::uint32_t>(place),
+                     r.bits | static_cast<std::uint32_t>(place >> 32) << 17, r.offset, sampler_grid(v));
+}
+
+PackedRecords::PackedRecords(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets)
+    : count_(sample_types(v) == 1 << VDVR_F32 ? 2 : 3), words_(v.level.size() * count_) {
+  const Index3 b = v.bricks();
+  std::size_t brick = 0;
   for (std::int64_t z = 0; z < b[2]; ++z)
     for (std::int64_t y = 0; y < b[1]; ++y)
-      for (std::int64_t x = 0; x < b[0]; ++x) records.push_back(brick_record(v, offsets, x, y, z));
-  return records;
+      for (std::int64_t x = 0; x < b[0]; ++x, ++brick) {
+        const RecordBits r = record_bits(v, brick);
+        words_[brick * count_ + 1] = r.bits;
+        if (count_ == 3) words_[brick * count_ + 2] = static_cast<std::uint32_t>(r.offset);
+        set_place(brick, place_of(v, offsets, x, y, z));
+      }
+}
+
+void PackedRecords::set_place(std::size_t brick, std::uint64_t place) {
+  if (place >> 47 != 0)
+    throw InputError(
+        fmt::format("a brick's samples lie at place {}, beyond 2^47: the volume is too large", place));
+  std::uint32_t& bits = words_[brick * count_ + 1];
+  words_[brick * count_] = static_cast<std::uint32_t>(place);
+  bits = (bits & 0x1ffffu) | static_cast<std::uint32_t>(place >> 32) << 17;
+}
+
+BrickSamples::BrickSamples(const MixedVolume& v, const Index3& brick)
+    : grid_(sampler_grid(v)), brick_(brick) {
+  const Index3 b = v.bricks();
+  const LevelTriple level = v.level[static_cast<std::size_t>((brick[2] * b[1] + brick[1]) * b[0] + brick[0])];
+  record_ = brick_record(v, {{level, 0}}, brick[0], brick[1], brick[2]);
+  data_ = block_of(v, level).data();
+  for (std::size_t a = 0; a < 3; ++a)
+    end_[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity)
+              << level[2 - a];
+}
+
+float BrickSamples::at(float cx, float cy, float cz) const {
+  const auto local = [&](float c, std::size_t a, std::uint32_t level, std::int32_t cells) {
+    return vdvr_local(c, static_cast<std::int32_t>(brick_[a]), level, grid_.granularity, cells);
+  };
+  return vdvr_sample_in_brick(data_, record_, local(cx, 0, record_.level_x, grid_.cells_x),
+                              local(cy, 1, record_.level_y, grid_.cells_y),
+                              local(cz, 2, record_.level_z, grid_.cells_z));
 }
 
 MixedVolume as_mixed(const Volume& volume, int granularity) {
@@ -112,22 +208,10 @@ Index3 brick_at(const MixedVolume& v, const Vec3& point) {
 float sample_at(const MixedVolume& v, const Vec3& point) {
   const VdvrGrid grid = sampler_grid(v);
   const std::array<float, 3> c = in_cells(v, point);
-  const std::int32_t bx = vdvr_brick_of(c[0], grid.granularity, grid.bricks_x);
-  const std::int32_t by = vdvr_brick_of(c[1], grid.granularity, grid.bricks_y);
-  const std::int32_t bz = vdvr_brick_of(c[2], grid.granularity, grid.bricks_z);
-  const auto index = (static_cast<std::size_t>(bz) * static_cast<std::size_t>(grid.bricks_y) +
-                      static_cast<std::size_t>(by)) *
-                         static_cast<std::size_t>(grid.bricks_x) +
-                     static_cast<std::size_t>(bx);
-  const LevelTriple level = v.level[index];
-  const bool in_base = level == LevelTriple{0, 0, 0};
-  // Offsets relative to this brick's own array, so that nothing has to be packed for one sample.
-  const VdvrBrick r = brick_record(v, {{level, 0}}, bx, by, bz);
-  const float* first = (in_base ? v.base.data() : v.tiles.at(level).data()) + r.offset;
-  return vdvr_sample_in_brick(first, r.stride_y, r.stride_z,
-                              vdvr_local(c[0], bx, r.level_x, grid.granularity, grid.cells_x),
-                              vdvr_local(c[1], by, r.level_y, grid.granularity, grid.cells_y),
-                              vdvr_local(c[2], bz, r.level_z, grid.granularity, grid.cells_z));
+  const Index3 brick{vdvr_brick_of(c[0], grid.granularity, grid.bricks_x),
+                     vdvr_brick_of(c[1], grid.granularity, grid.bricks_y),
+                     vdvr_brick_of(c[2], grid.granularity, grid.bricks_z)};
+  return BrickSamples(v, brick).at(c[0], c[1], c[2]);
 }
 
 namespace {
@@ -146,14 +230,18 @@ bool is_interior(const MixedVolume& v, const Index3& brick) {
 
 Storage storage_of(const MixedVolume& v, bool interior) {
   const Index3 b = v.bricks();
-  double base = 0, index = 0, tiles = 0;
+  double base = 0, index = 0, tiles = 0, tile_bytes = 0;
   for (std::int64_t z = 0; z < b[2]; ++z)
     for (std::int64_t y = 0; y < b[1]; ++y)
       for (std::int64_t x = 0; x < b[0]; ++x) {
         if (interior && !is_interior(v, {x, y, z})) continue;
-        const LevelTriple level = v.level[static_cast<std::size_t>((z * b[1] + y) * b[0] + x)];
+        const LevelTriple level = v.level[at((z * b[1] + y) * b[0] + x)];
         index += 1;
-        if (level != LevelTriple{0, 0, 0}) tiles += static_cast<double>(v.tile_size(level));
+        if (level != in_base) {
+          tiles += static_cast<double>(v.tile_size(level));
+          tile_bytes +=
+              static_cast<double>(v.tile_size(level)) * static_cast<double>(v.tiles.at(level).sample_bytes());
+        }
         double cells = 1;
         for (std::size_t a = 0; a < 3; ++a) {
           const std::int64_t first = (a == 0 ? x : a == 1 ? y : z) * v.granularity;
@@ -165,8 +253,9 @@ Storage storage_of(const MixedVolume& v, bool interior) {
   if (!interior) base = static_cast<double>(v.grid.sample_count());
   if (base == 0) return s;
   s.samples_ratio = (base + index + tiles) / base;
-  // Resident: float32 samples, and per brick a 4-byte tile number and 3 bytes of levels.
-  const double bytes = 4 * (base + tiles) + 7 * index;
+  // Resident: samples, the bricks' records, and per brick a byte of distance by which rays leap.
+  const double record = sample_types(v) == 1 << VDVR_F32 ? 8 : 12;
+  const double bytes = static_cast<double>(v.base.sample_bytes()) * base + tile_bytes + (record + 1) * index;
   s.bytes_ratio = bytes / (4 * base);
   s.device_bytes = static_cast<std::uint64_t>(bytes);
   return s;

@@ -21,25 +21,52 @@ namespace {
 using opencl::DeviceArray;
 
 constexpr std::uint32_t kSide = 64;
+const opencl::Defines kDefines{{"VDVR_SAMPLE_TYPES", "1"}};  // the rates are those of float32
 
 struct ProbePoint {
   std::array<std::uint32_t, 3> cell{};
   std::array<double, 3> fraction{};
 };
 
-cl::Image3D make_image(opencl::State& state, const std::vector<float>& values, std::uint64_t side) {
-  const DeviceArray<float> staged(state, std::span<const float>(values), "probe tile");
+// A cube of samples, as the device reads them.
+struct Tile {
+  std::vector<double> truth;
+  cl::Image3D image;
+};
+
+template <class T>
+cl::Image3D make_image(opencl::State& state, const std::vector<T>& values, cl_channel_type format) {
+  const DeviceArray<T> staged(state, std::span<const T>(values), "probe tile");
   try {
-    const auto n = static_cast<cl::size_type>(side);
-    cl::Image3D image(state.context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, CL_FLOAT), n, n, n);
+    cl::Image3D image(state.context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, format), kSide, kSide, kSide);
     state.queue.enqueueCopyBufferToImage(staged.buffer(), image, 0, cl::array<cl::size_type, 3>{0, 0, 0},
-                                         cl::array<cl::size_type, 3>{n, n, n});
+                                         cl::array<cl::size_type, 3>{kSide, kSide, kSide});
     state.queue.finish();
     return image;
   } catch (const cl::Error& e) {
-    throw DeviceError(fmt::format("probe image of {}^3 texels on '{}': {} {}", side, state.info.name,
+    throw DeviceError(fmt::format("probe image of {}^3 texels on '{}': {} {}", kSide, state.info.name,
                                   e.what(), opencl::code_name(e.err())));
   }
+}
+
+// Values in [0, 1], rounded to what a normalised format holds.
+template <class T>
+Tile make_normalised(opencl::State& state, const std::vector<float>& values, cl_channel_type format) {
+  constexpr double most = std::numeric_limits<T>::max();
+  Tile tile;
+  std::vector<T> codes;
+  for (const float v : values) {
+    codes.push_back(static_cast<T>(std::lround(std::clamp(static_cast<double>(v), 0.0, 1.0) * most)));
+    tile.truth.push_back(codes.back() / most);
+  }
+  tile.image = make_image(state, codes, format);
+  return tile;
+}
+
+Tile make_tile(opencl::State& state, const std::vector<float>& values, SampleType type) {
+  if (type == SampleType::u16) return make_normalised<std::uint16_t>(state, values, CL_UNORM_INT16);
+  if (type == SampleType::u8) return make_normalised<std::uint8_t>(state, values, CL_UNORM_INT8);
+  return {{values.begin(), values.end()}, make_image(state, values, CL_FLOAT)};
 }
 
 std::vector<float> cube(const std::function<double(double, double, double)>& f) {
@@ -61,7 +88,8 @@ std::vector<float> read_points(opencl::State& state, const cl::Image3D& image,
   }
   const DeviceArray<cl_float4> in(state, std::span<const cl_float4>(where), "probe points");
   const DeviceArray<float> out(state, points.size(), "probe values");
-  opencl::Kernel<cl::Image3D, cl::Buffer, cl_uint, cl::Buffer> kernel(state, "probe_sampler", "read_points");
+  opencl::Kernel<cl::Image3D, cl::Buffer, cl_uint, cl::Buffer> kernel(state, "probe_sampler", "read_points",
+                                                                      kDefines);
   kernel({{points.size(), 1, 1}, {64, 1, 1}}, image, in.buffer(), static_cast<cl_uint>(points.size()),
          out.buffer());
   return out.to_host();
@@ -93,12 +121,12 @@ std::vector<ProbePoint> scattered_points() {
 }
 
 // The weight itself: a comb of 0 and 1 along one axis, constant along the others. Returns the largest error.
-double measure_weights(opencl::State& state, std::size_t axis) {
+double measure_weights(opencl::State& state, std::size_t axis, SampleType type) {
   const auto tile = cube([axis](double x, double y, double z) {
     return std::fmod(axis == 0 ? x : axis == 1 ? y : z, 2.0);
   });
   const auto points = weight_points(axis);
-  const auto values = read_points(state, make_image(state, tile, kSide), points);
+  const auto values = read_points(state, make_tile(state, tile, type).image, points);
   double worst = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double f = points[i].fraction[axis], truth = points[i].cell[axis] % 2 == 0 ? f : 1 - f;
@@ -110,7 +138,7 @@ double measure_weights(opencl::State& state, std::size_t axis) {
 }
 
 // The exact trilinear value and the cell's largest neighbour difference per axis, summed.
-std::pair<double, double> trilinear(const std::vector<float>& tile, const ProbePoint& p) {
+std::pair<double, double> trilinear(const std::vector<double>& tile, const ProbePoint& p) {
   const auto at = [&](std::uint32_t dx, std::uint32_t dy, std::uint32_t dz) -> double {
     return tile[((p.cell[2] + dz) * kSide + p.cell[1] + dy) * kSide + p.cell[0] + dx];
   };
@@ -133,52 +161,68 @@ std::pair<double, double> trilinear(const std::vector<float>& tile, const ProbeP
   return {value, difference};
 }
 
-// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude; on
-// constant, affine and random tiles. Units that round products of weights err even where all samples are
-// equal.
-double measure_constants(opencl::State& state, double delta) {
+// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude, or to
+// the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
+// weights err even where all samples are equal.
+double measure_constants(opencl::State& state, double delta, SampleType type) {
   std::mt19937 random(7);
-  std::uniform_real_distribution<double> uniform(-1, 1);
+  const bool normalised = type != SampleType::f32;
+  std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
+  // Normalised formats hold 0 to 1 only.
+  const double offset = normalised ? 0 : 100, slope = normalised ? 0.01 : 1;
   const std::vector<std::vector<float>> tiles{
-      cube([](double, double, double) { return 1.2345678; }),
-      cube([](double, double, double) { return -777.77; }),
-      cube([](double x, double y, double z) { return 100 + 0.31 * x - 0.17 * y + 0.23 * z; }),
+      cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; }),
+      cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; }),
+      cube([&](double x, double y, double z) {
+        return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
+      }),
       cube([&](double, double, double) { return uniform(random); })};
   const auto points = scattered_points();
   double rho = 0;
-  for (const auto& tile : tiles) {
-    const auto values = read_points(state, make_image(state, tile, kSide), points);
-    double magnitude = 0;
-    for (const float v : tile) magnitude = std::max(magnitude, static_cast<double>(std::abs(v)));
+  for (const auto& values : tiles) {
+    const Tile tile = make_tile(state, values, type);
+    const auto read = read_points(state, tile.image, points);
+    double magnitude = normalised ? 1 : 0;
+    for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto [truth, difference] = trilinear(tile, points[i]);
-      const double beyond =
-          (std::abs(static_cast<double>(values[i]) - truth) - delta * difference) / magnitude;
+      const auto [truth, difference] = trilinear(tile.truth, points[i]);
+      const double beyond = (std::abs(static_cast<double>(read[i]) - truth) - delta * difference) / magnitude;
       if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
     }
   }
   return rho;
 }
 
-void charge(SamplerProbe& p) {
+// Charges delta; says for which class.
+std::string charge(FilterProbe& p) {
   // A unit that rounds to 8 fraction bits may add a few ulp of its own; 2^-20 keeps it in its class.
   constexpr double slack = 0x1p-20;
   double least = 0;
+  std::string note;
   if (p.weight_error <= 0x1p-22) {
     least = 0x1p-22;
-    p.note = "weights in fp32";
+    note = "weights in fp32";
   } else if (p.weight_error <= 0x1p-9 + slack) {
     least = 0x1p-9;
-    p.note = "weights rounded to 8 fraction bits or better";
+    note = "weights rounded to 8 fraction bits or better";
   } else if (p.weight_error <= 0x1p-8 + slack) {
     least = 0x1p-8;
-    p.note = "weights truncated to 8 fraction bits";
+    note = "weights truncated to 8 fraction bits";
   } else {
     least = 1.5 * p.weight_error;
-    p.note = fmt::format("weights err by {:.3g}, more than truncation to 8 bits; 1.5 times that is charged",
-                         p.weight_error);
+    note = fmt::format("weights err by {:.3g}, more than truncation to 8 bits; 1.5 times that is charged",
+                       p.weight_error);
   }
   p.delta = std::max(least, p.weight_error);
+  return note;
+}
+
+std::string measure_filter(opencl::State& state, FilterProbe& p, SampleType type) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    p.weight_error = std::max(p.weight_error, measure_weights(state, axis, type));
+  std::string note = charge(p);
+  p.constant_error = measure_constants(state, p.delta, type);
+  return note;
 }
 
 // Samples per second: the best of three runs after one that compiles and warms up.
@@ -208,7 +252,7 @@ SamplerProbe measure(opencl::State& state) {
   const DeviceArray<float> samples(state, std::span<const float>(tile), "probe samples");
   const DeviceArray<float> sums(state, 1u << 14, "probe sums");
   opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(state, "probe_sampler",
-                                                                                  "rate_buffer");
+                                                                                  "rate_buffer", kDefines);
   p.buffer_rate = measure_rate(state, buffer_kernel, samples.buffer(), sums);
   p.chosen = "buffer";
   p.image3d = state.info.linear_float_image;
@@ -216,13 +260,14 @@ SamplerProbe measure(opencl::State& state) {
     p.note = "no CL_R / CL_FLOAT 3D image with the linear filter";
     return p;
   }
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    p.weight_error = std::max(p.weight_error, measure_weights(state, axis));
-  charge(p);
-  p.constant_error = measure_constants(state, p.delta);
+  p.note = measure_filter(state, p, SampleType::f32);
+  p.u16.image3d = state.info.linear_u16_image;
+  p.u8.image3d = state.info.linear_u8_image;
+  if (p.u16.image3d) measure_filter(state, p.u16, SampleType::u16);
+  if (p.u8.image3d) measure_filter(state, p.u8, SampleType::u8);
   opencl::Kernel<cl::Image3D, cl_uint, cl_uint, cl_uint, cl::Buffer> image_kernel(state, "probe_sampler",
-                                                                                  "rate_image");
-  p.image3d_rate = measure_rate(state, image_kernel, make_image(state, tile, kSide), sums);
+                                                                                  "rate_image", kDefines);
+  p.image3d_rate = measure_rate(state, image_kernel, make_tile(state, tile, SampleType::f32).image, sums);
   if (p.image3d_rate > p.buffer_rate && std::isfinite(p.weight_error)) p.chosen = "image3d";
   return p;
 }

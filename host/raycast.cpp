@@ -173,7 +173,8 @@ void update_distance(Impl& v, const RenderOptions& o, const Table& table, float 
   if (key == v.frame.distance_key) return;
   const auto occupied = o.mode == RenderMode::dvr ? opaque_bricks(v, table, slack)
                                                   : bricks_reaching(v, static_cast<float>(o.iso), slack);
-  const Index3 n{v.sampler_grid.bricks_x, v.sampler_grid.bricks_y, v.sampler_grid.bricks_z};
+  const VdvrGrid& g = v.field->grid;
+  const Index3 n{g.bricks_x, g.bricks_y, g.bricks_z};
   const auto distance = distance_to_occupied(occupied, n);
   if (v.frame.distance.size() != distance.size())
     v.frame.distance = DeviceArray<cl_uchar>(*v.state, distance.size(), "distances to occupied bricks");
@@ -288,17 +289,19 @@ std::pair<SamplerKind, std::string> choose_sampler(Device& device, const Residen
 // twice.
 float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
   const double magnitude = std::max(std::abs(v.value_range.first), std::abs(v.value_range.second));
-  double relative = 0x1p-20;
-  if (sampler == SamplerKind::image3d) relative += 2 * probe_sampler(device).constant_error;
-  return static_cast<float>(relative * magnitude);
+  double slack = 0x1p-20 * magnitude;
+  if (sampler == SamplerKind::image3d)
+    slack += (2 * probe_sampler(device).largest_constant_error() + 0x1p-20) * static_cast<double>(v.largest);
+  return static_cast<float>(slack);
 }
 
 opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
-  return {{"VDVR_GRANULARITY", std::to_string(v.sampler_grid.granularity)},
+  return {{"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
           {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
-          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"}};
+          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"},
+          v.field->defines.front()};
 }
 
 void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
@@ -316,28 +319,28 @@ void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
   f.table.write(table.entries);
 }
 
-template <class FieldBuffer>
-void launch(Impl& v, const FieldBuffer& field, const RenderOptions& o, const opencl::Defines& defines,
-            const RaycastTuning& tuning, const Table& table, float slack) {
+// `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
+template <class... Field>
+void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
+            const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
   const opencl::Range range{
       {static_cast<std::uint64_t>(o.width), static_cast<std::uint64_t>(o.height), 1},
       {static_cast<std::uint64_t>(tuning.group_x), static_cast<std::uint64_t>(tuning.group_y), 1}};
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
-    opencl::Kernel<FieldBuffer, cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer> kernel(*v.state, "raycast",
-                                                                                    "slice", defines);
-    kernel(range, field, v.bricks.buffer(), v.sampler_grid, make_slice(v, o), picture);
+    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer> kernel(*v.state, "raycast", "slice",
+                                                                                 defines);
+    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture);
     return;
   }
   const char* name = o.mode == RenderMode::dvr   ? "raycast_dvr"
                      : o.mode == RenderMode::iso ? "raycast_iso"
                                                  : "raycast_mip";
   // dvr and iso leap by distances, mip by the bricks' maxima.
-  const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges.buffer() : v.frame.distance.buffer();
-  opencl::Kernel<FieldBuffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
-                 cl::Buffer>
+  const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : v.frame.distance.buffer();
+  opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer, cl::Buffer>
       kernel(*v.state, "raycast", name, defines);
-  kernel(range, field, v.bricks.buffer(), v.sampler_grid, guide, v.frame.table.buffer(),
+  kernel(range, field..., bricks, v.field->grid, guide, v.frame.table.buffer(),
          make_params(v, o, table, slack), picture, v.frame.row_samples.buffer());
 }
 
@@ -365,8 +368,12 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   if (image) v.atlas();
   opencl::finish(*v.state, "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
-  if (image) launch(v, v.atlas(), o, defines, tuning, table, slack);
-  else launch(v, v.samples.buffer(), o, defines, tuning, table, slack);
+  if (image) {
+    const auto& atlas = v.atlas();
+    launch(v, o, defines, tuning, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
+  } else {
+    launch(v, o, defines, tuning, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
+  }
   result.pixels = v.frame.picture.to_host();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const cl_uint n : v.frame.row_samples.to_host()) result.samples += n;

@@ -22,108 +22,87 @@ std::vector<std::uint64_t> candidates(std::uint64_t least, std::uint64_t most) {
   return sizes;
 }
 
-// Shelves for a given width and depth; size[1] follows.
-AtlasLayout lay_out(const MixedVolume& v, std::uint64_t width, std::uint64_t depth) {
-  AtlasLayout l;
-  const Index3 base = v.grid.samples();
-  std::uint64_t y = static_cast<std::uint64_t>(base[1]);
-  for (const auto& [triple, samples] : v.tiles) {
+struct AtlasImage {
+  Size3 size{0, 0, 0};
+  std::map<LevelTriple, AtlasShelves> shelves;
+  [[nodiscard]] std::uint64_t texels() const { return size[0] * size[1] * size[2]; }
+};
+
+// Shelves of one type's samples for a given width and depth; size[1] follows.
+AtlasImage lay_out(const MixedVolume& v, SampleType type, std::uint64_t width, std::uint64_t depth) {
+  AtlasImage image;
+  std::uint64_t y = v.base.type == type ? static_cast<std::uint64_t>(v.grid.samples()[1]) : 0;
+  for (const auto& [triple, block] : v.tiles) {
+    if (block.type != type) continue;
     const auto shape = v.tile_shape(triple);
     AtlasShelves s;
     for (std::size_t a = 0; a < 3; ++a) s.tile[a] = static_cast<std::uint64_t>(shape[2 - a]);
-    s.tiles = samples.size() / static_cast<std::uint64_t>(v.tile_size(triple));
+    s.tiles = block.size() / static_cast<std::uint64_t>(v.tile_size(triple));
     s.first_y = y;
     s.columns_per_shelf = width / s.tile[0];
     s.tiles_per_column = depth / s.tile[2];
     const std::uint64_t columns = (s.tiles + s.tiles_per_column - 1) / s.tiles_per_column;
     y += (columns + s.columns_per_shelf - 1) / s.columns_per_shelf * s.tile[1];
-    l.shelves[triple] = s;
+    image.shelves[triple] = s;
   }
-  l.size = {width, y, depth};
-  return l;
+  image.size = {width, y, depth};
+  return image;
 }
 
-// Width and depth no smaller than the base and any tile.
-Size3 least_size(const MixedVolume& v) {
+// Width and depth no smaller than the base and any tile; 0 where the type does not occur.
+Size3 least_size(const MixedVolume& v, SampleType type) {
   const Index3 base = v.grid.samples();
-  Size3 least{static_cast<std::uint64_t>(base[0]), static_cast<std::uint64_t>(base[1]),
-              static_cast<std::uint64_t>(base[2])};
-  for (const auto& [triple, samples] : v.tiles) {
+  Size3 least{0, 0, 0};
+  if (v.base.type == type)
+    for (std::size_t a = 0; a < 3; ++a) least[a] = static_cast<std::uint64_t>(base[a]);
+  for (const auto& [triple, block] : v.tiles) {
+    if (block.type != type) continue;
     const auto shape = v.tile_shape(triple);
-    least[0] = std::max(least[0], static_cast<std::uint64_t>(shape[2]));
-    least[2] = std::max(least[2], static_cast<std::uint64_t>(shape[0]));
+    for (std::size_t a = 0; a < 3; ++a)
+      least[a] = std::max(least[a], static_cast<std::uint64_t>(shape[2 - a]));
   }
   return least;
 }
 
-cl_float2 range_of(const float* first, const VdvrBrick& r, const std::array<std::int64_t, 3>& count) {
+std::string text_of(const Size3& s) { return fmt::format("{} x {} x {}", s[0], s[1], s[2]); }
+
+// Coordinates are packed into 15, 16 and 16 bits.
+constexpr Size3 kLongest{1u << 15, 1u << 16, 1u << 16};
+
+cl_float2 range_of(const BrickSamples& stored) {
   float lo = std::numeric_limits<float>::infinity(), hi = -lo;
-  for (std::int64_t z = 0; z < count[2]; ++z)
-    for (std::int64_t y = 0; y < count[1]; ++y) {
-      const float* row =
-          first + static_cast<std::uint64_t>(z) * r.stride_z + static_cast<std::uint64_t>(y) * r.stride_y;
-      for (std::int64_t x = 0; x < count[0]; ++x) {
-        lo = std::min(lo, row[x]);
-        hi = std::max(hi, row[x]);
+  const Index3& end = stored.end();
+  for (std::int64_t z = 0; z <= end[2]; ++z)
+    for (std::int64_t y = 0; y <= end[1]; ++y)
+      for (std::int64_t x = 0; x <= end[0]; ++x) {
+        const float s = stored(x, y, z);
+        lo = std::min(lo, s);
+        hi = std::max(hi, s);
       }
-    }
   return {{lo, hi}};
 }
 
-std::vector<cl_float2> brick_ranges(const MixedVolume& v, const std::vector<VdvrBrick>& records,
-                                    const std::map<LevelTriple, std::uint64_t>& offsets) {
+Index3 position_of(const MixedVolume& v, std::size_t brick) {
   const Index3 b = v.bricks();
-  std::vector<cl_float2> ranges(records.size());
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const VdvrBrick& r = records[i];
-    const auto n = static_cast<std::int64_t>(i);
-    const Index3 at{n % b[0], n / b[0] % b[1], n / (b[0] * b[1])};
-    const std::array<std::uint32_t, 3> level{r.level_x, r.level_y, r.level_z};
-    std::array<std::int64_t, 3> count{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::int64_t cells =
-          std::min<std::int64_t>(v.granularity, v.grid.cells[a] - at[a] * v.granularity);
-      count[a] = (cells << level[a]) + 1;
-    }
-    const LevelTriple triple = v.level[i];
-    const bool in_base = triple == LevelTriple{0, 0, 0};
-    const float* first =
-        in_base ? v.base.data() + r.offset : v.tiles.at(triple).data() + (r.offset - offsets.at(triple));
-    ranges[i] = range_of(first, r, count);
-  }
-  return ranges;
-}
-
-void set_texels(const MixedVolume& v, const AtlasLayout& layout, std::vector<VdvrBrick>& records) {
-  const Index3 b = v.bricks();
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const auto n = static_cast<std::int64_t>(i);
-    const std::int64_t g = v.granularity;
-    Size3 origin{static_cast<std::uint64_t>(n % b[0] * g), static_cast<std::uint64_t>(n / b[0] % b[1] * g),
-                 static_cast<std::uint64_t>(n / (b[0] * b[1]) * g)};
-    if (v.level[i] != LevelTriple{0, 0, 0}) origin = layout.shelves.at(v.level[i]).origin(v.tile[i]);
-    records[i].texel_x = static_cast<float>(origin[0]) + 0.5f;
-    records[i].texel_y = static_cast<float>(origin[1]) + 0.5f;
-    records[i].texel_z = static_cast<float>(origin[2]) + 0.5f;
-  }
+  const auto n = static_cast<std::int64_t>(brick);
+  return {n % b[0], n / b[0] % b[1], n / (b[0] * b[1])};
 }
 
 // Marks bricks that read the base, as those across their faces do. Kernels address the base by 32-bit offsets
 // there.
-void mark_base_around(const MixedVolume& v, std::vector<VdvrBrick>& records) {
+void mark_base_around(const MixedVolume& v, PackedRecords& records) {
   if (v.grid.sample_count() > std::numeric_limits<std::int32_t>::max()) return;
   const Index3 b = v.bricks();
   const auto reads_base = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
     const bool inside = x >= 0 && x < b[0] && y >= 0 && y < b[1] && z >= 0 && z < b[2];
     return !inside || v.level[static_cast<std::size_t>((z * b[1] + y) * b[0] + x)] == LevelTriple{0, 0, 0};
   };
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const auto n = static_cast<std::int64_t>(i);
-    const std::int64_t x = n % b[0], y = n / b[0] % b[1], z = n / (b[0] * b[1]);
+  for (std::size_t i = 0; i < v.level.size(); ++i) {
+    const auto [x, y, z] = position_of(v, i);
     const bool all = reads_base(x, y, z) && reads_base(x - 1, y, z) && reads_base(x + 1, y, z) &&
                      reads_base(x, y - 1, z) && reads_base(x, y + 1, z) && reads_base(x, y, z - 1) &&
                      reads_base(x, y, z + 1);
-    records[i].base_around = all ? 1 : 0;
+    if (all) records.set_base_around(i);
   }
 }
 
@@ -148,38 +127,70 @@ void check_sizes(const MixedVolume& v) {
 }  // namespace
 
 ImageLimits image_limits(const DeviceInfo& info, std::uint64_t memory_left) {
-  return {info.linear_float_image,
+  return {{info.linear_float_image, info.linear_u16_image, info.linear_u8_image},
           {info.image3d_max[0], info.image3d_max[1], info.image3d_max[2]},
-          std::min(info.max_allocation, memory_left)};
+          info.max_allocation,
+          memory_left};
+}
+
+std::uint64_t AtlasLayout::bytes() const {
+  const auto texels = [&](SampleType t) {
+    const Size3& s = size[static_cast<std::size_t>(t)];
+    return s[0] * s[1] * s[2];
+  };
+  return 4 * texels(SampleType::f32) + 2 * texels(SampleType::u16) + texels(SampleType::u8);
+}
+
+std::uint64_t AtlasLayout::longest() const {
+  std::uint64_t longest = 0;
+  for (const Size3& s : size) longest = std::max(longest, *std::max_element(s.begin(), s.end()));
+  return longest;
 }
 
 AtlasLayout pack_atlas(const MixedVolume& v, const ImageLimits& limits) {
-  AtlasLayout best;
-  if (!limits.linear_float) {
-    best.reason = "the device has no CL_R / CL_FLOAT 3D image that it can read with the linear filter";
-    return best;
-  }
-  const Size3 least = least_size(v);
-  for (const std::uint64_t width : candidates(least[0], limits.size[0]))
-    for (const std::uint64_t depth : candidates(least[2], limits.size[2])) {
-      AtlasLayout l = lay_out(v, width, depth);
-      if (l.size[1] > limits.size[1]) continue;
-      if (best.fits && l.bytes() >= best.bytes()) continue;
-      best = std::move(l);
-      best.fits = true;
+  AtlasLayout layout;
+  Size3 most{};
+  for (std::size_t a = 0; a < 3; ++a) most[a] = std::min(limits.size[a], kLongest[a]);
+  for (const SampleType type : {SampleType::f32, SampleType::u16, SampleType::u8}) {
+    const Size3 least = least_size(v, type);
+    if (least[0] == 0) continue;
+    const auto t = static_cast<std::size_t>(type);
+    if (!limits.linear[t]) {
+      layout.reason =
+          fmt::format("the device has no CL_R / {} 3D image that it can read with the linear filter",
+                      type == SampleType::f32   ? "CL_FLOAT"
+                      : type == SampleType::u16 ? "CL_UNORM_INT16"
+                                                : "CL_UNORM_INT8");
+      return layout;
     }
-  const auto text = [](const Size3& s) { return fmt::format("{} x {} x {}", s[0], s[1], s[2]); };
-  if (!best.fits) {
-    best.reason = fmt::format("base volume ({}) and tiles ({} floats) do not fit a 3D image of {} texels",
-                              text(least), sample_buffer_size(v) - v.base.size(), text(limits.size));
-  } else if (best.bytes() > limits.bytes) {
-    best.fits = false;
-    best.reason = fmt::format("an atlas of {} texels needs {} bytes, {} are left", text(best.size),
-                              best.bytes(), limits.bytes);
-  } else {
-    best.reason = fmt::format("an atlas of {} texels, {} bytes", text(best.size), best.bytes());
+    std::optional<AtlasImage> best;
+    for (const std::uint64_t width : candidates(least[0], most[0]))
+      for (const std::uint64_t depth : candidates(least[2], most[2])) {
+        AtlasImage image = lay_out(v, type, width, depth);
+        if (image.size[1] <= most[1] && (!best || image.texels() < best->texels())) best = std::move(image);
+      }
+    if (!best) {
+      layout.reason =
+          fmt::format("base volume and tiles of type {} (each up to {}) do not fit a 3D image of {} texels",
+                      vdvr::text_of(type), text_of(least), text_of(most));
+      return layout;
+    }
+    layout.size[t] = best->size;
+    layout.shelves.merge(best->shelves);
+    const std::uint64_t bytes = best->texels() * (type == SampleType::f32   ? 4
+                                                  : type == SampleType::u16 ? 2
+                                                                            : 1);
+    if (bytes > limits.image_bytes || layout.bytes() > limits.bytes) {
+      layout.reason = fmt::format("an atlas of {} texels needs {} bytes, {} are left", text_of(best->size),
+                                  bytes, std::min(limits.image_bytes, limits.bytes));
+      return layout;
+    }
+    layout.reason += fmt::format("{}an atlas of {} texels of type {}", layout.reason.empty() ? "" : ", ",
+                                 text_of(best->size), vdvr::text_of(type));
   }
-  return best;
+  layout.fits = true;
+  layout.reason += fmt::format(", {} bytes", layout.bytes());
+  return layout;
 }
 
 std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& occupied, const Index3& n) {
@@ -215,29 +226,36 @@ std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& 
 }
 
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
-    : state(&device.state()), grid(v.grid), sampler_grid(vdvr::sampler_grid(v)) {
+    : state(&device.state()), grid(v.grid) {
   check_sizes(v);
   offsets_ = tile_offsets(v);
-  samples = opencl::DeviceArray<float>(*state, sample_buffer_size(v), "samples of the volume");
-  samples.write(v.base);
-  for (const auto& [triple, values] : v.tiles) samples.write(values, offsets_.at(triple));
-
-  std::vector<VdvrBrick> records = brick_records(v);
+  types_[{0, 0, 0}] = v.base.type;
+  for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
+  PackedRecords records(v, offsets_);
+  mark_base_around(v, records);
+  field.emplace(*state, v, records);
   ImageLimits left = limits;
   left.bytes = std::min(left.bytes, state->memory.left());
   layout = pack_atlas(v, left);
-  if (layout.fits) set_texels(v, layout, records);
-  mark_base_around(v, records);
-  bricks = opencl::DeviceArray<VdvrBrick>(*state, std::span<const VdvrBrick>(records), "brick records");
-
-  host_ranges = brick_ranges(v, records, offsets_);
-  ranges =
-      opencl::DeviceArray<cl_float2>(*state, std::span<const cl_float2>(host_ranges), "ranges of bricks");
+  if (layout.fits) {
+    set_texels(v, records);
+    texel_records_ = records.words();
+  }
+  for (std::size_t i = 0; i < v.level.size(); ++i) {
+    const BrickSamples stored(v, position_of(v, i));
+    host_ranges.push_back(range_of(stored));
+    const VdvrBrick& r = stored.record();
+    if (r.type == VDVR_F32) continue;
+    // Beside a tile's own samples a texel can decode to anything that its type can hold.
+    const float top = (r.type == VDVR_U16 ? 65535.0f : 255.0f) * r.scale;
+    largest = std::max({largest, std::abs(r.bias), top, std::abs(r.bias + top)});
+  }
   value_range = {host_ranges.front().s[0], host_ranges.front().s[1]};
   for (const auto& r : host_ranges) {
     value_range.first = std::min(value_range.first, r.s[0]);
     value_range.second = std::max(value_range.second, r.s[1]);
   }
+  largest = std::max({largest, std::abs(value_range.first), std::abs(value_range.second)});
   // Last, because a constructor that throws runs no destructor to give it back.
   state->memory.take(host_ranges.size() * sizeof(cl_float2), "ranges of bricks");
 }
@@ -247,34 +265,67 @@ ResidentVolume::Impl::~Impl() {
   if (atlas_) state->memory.give(layout.bytes());
 }
 
-const cl::Image3D& ResidentVolume::Impl::atlas() {
+// The texel of each brick's first sample, in 15, 16 and 16 bits.
+void ResidentVolume::Impl::set_texels(const MixedVolume& v, PackedRecords& records) const {
+  for (std::size_t i = 0; i < v.level.size(); ++i) {
+    const Index3 p = position_of(v, i);
+    Size3 origin{};
+    if (v.level[i] == LevelTriple{0, 0, 0})
+      for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<std::uint64_t>(p[a] * v.granularity);
+    else origin = layout.shelves.at(v.level[i]).origin(v.tile[i]);
+    records.set_place(i, origin[0] | origin[1] << 15 | origin[2] << 31);
+  }
+}
+
+void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type) {
+  const auto region = [](const Size3& s) {
+    return cl::array<cl::size_type, 3>{static_cast<cl::size_type>(s[0]), static_cast<cl::size_type>(s[1]),
+                                       static_cast<cl::size_type>(s[2])};
+  };
+  const cl::Buffer& samples = field->samples.buffer();
+  // Texels beside a tile weigh 0, but 0 times NaN would be NaN.
+  state->queue.enqueueFillImage(image, cl_float4{{0, 0, 0, 0}}, region({0, 0, 0}),
+                                region(layout.size[static_cast<std::size_t>(type)]));
+  const Index3 base = grid.samples();
+  if (types_.at({0, 0, 0}) == type)
+    state->queue.enqueueCopyBufferToImage(
+        samples, image, 0, region({0, 0, 0}),
+        region({static_cast<std::uint64_t>(base[0]), static_cast<std::uint64_t>(base[1]),
+                static_cast<std::uint64_t>(base[2])}));
+  const std::uint64_t sample_bytes = type == SampleType::f32 ? 4 : type == SampleType::u16 ? 2 : 1;
+  for (const auto& [triple, s] : layout.shelves) {
+    if (types_.at(triple) != type) continue;
+    for (std::uint64_t i = 0; i < s.tiles; i += s.tiles_per_column) {
+      const std::uint64_t count = std::min(s.tiles_per_column, s.tiles - i);
+      state->queue.enqueueCopyBufferToImage(
+          samples, image, offsets_.at(triple) + i * s.tile[0] * s.tile[1] * s.tile[2] * sample_bytes,
+          region(s.origin(i)), region({s.tile[0], s.tile[1], count * s.tile[2]}));
+    }
+  }
+}
+
+const std::array<cl::Image3D, 3>& ResidentVolume::Impl::atlas() {
   if (atlas_) return *atlas_;
   if (!layout.fits)
     throw ResourceError("the image3d sampler cannot be used: " + layout.reason + "; use --sampler buffer");
+  atlas_bricks_ = opencl::DeviceArray<std::uint32_t>(*state, std::span<const std::uint32_t>(texel_records_),
+                                                     "brick records of the atlas");
   state->memory.take(layout.bytes(), "image3d atlas");
   try {
-    cl::Image3D image(state->context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, CL_FLOAT), layout.size[0],
-                      layout.size[1], layout.size[2]);
-    const auto region = [](const Size3& s) {
-      return cl::array<cl::size_type, 3>{static_cast<cl::size_type>(s[0]), static_cast<cl::size_type>(s[1]),
-                                         static_cast<cl::size_type>(s[2])};
-    };
-    // Texels beside a tile weigh 0, but 0 times NaN would be NaN.
-    state->queue.enqueueFillImage(image, cl_float4{{0, 0, 0, 0}}, region({0, 0, 0}), region(layout.size));
-    const Index3 base = grid.samples();
-    state->queue.enqueueCopyBufferToImage(
-        samples.buffer(), image, 0, region({0, 0, 0}),
-        region({static_cast<std::uint64_t>(base[0]), static_cast<std::uint64_t>(base[1]),
-                static_cast<std::uint64_t>(base[2])}));
-    for (const auto& [triple, s] : layout.shelves)
-      for (std::uint64_t i = 0; i < s.tiles; i += s.tiles_per_column) {
-        const std::uint64_t count = std::min(s.tiles_per_column, s.tiles - i);
-        const std::uint64_t first = offsets_.at(triple) + i * s.tile[0] * s.tile[1] * s.tile[2];
-        state->queue.enqueueCopyBufferToImage(samples.buffer(), image, first * sizeof(float),
-                                              region(s.origin(i)),
-                                              region({s.tile[0], s.tile[1], count * s.tile[2]}));
-      }
-    atlas_ = std::move(image);
+    constexpr std::array<cl_channel_type, 3> formats{CL_FLOAT, CL_UNORM_INT16, CL_UNORM_INT8};
+    std::array<cl::Image3D, 3> images;
+    cl::Image3D any;
+    for (std::size_t t = 0; t < 3; ++t) {
+      const Size3& size = layout.size[t];
+      if (size[0] == 0) continue;
+      images[t] = cl::Image3D(state->context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, formats[t]), size[0],
+                              size[1], size[2]);
+      fill_image(images[t], static_cast<SampleType>(t));
+      any = images[t];
+    }
+    for (std::size_t t = 0; t < 3; ++t)
+      if (layout.size[t][0] == 0) images[t] = any;
+    atlas_ = std::move(images);
   } catch (const cl::Error& e) {
     state->memory.give(layout.bytes());
     throw ResourceError(fmt::format("image3d atlas, {}: {} on '{}': {}; use --sampler buffer", layout.reason,
@@ -283,9 +334,16 @@ const cl::Image3D& ResidentVolume::Impl::atlas() {
   return *atlas_;
 }
 
+const cl::Buffer& ResidentVolume::Impl::ranges() {
+  if (ranges_.size() == 0)
+    ranges_ =
+        opencl::DeviceArray<cl_float2>(*state, std::span<const cl_float2>(host_ranges), "ranges of bricks");
+  return ranges_.buffer();
+}
+
 std::uint64_t ResidentVolume::Impl::bytes() const {
-  return samples.size() * sizeof(float) + bricks.size() * (sizeof(VdvrBrick) + sizeof(cl_float2)) +
-         (atlas_ ? layout.bytes() : 0);
+  return field->samples.size() + (field->bricks.size() + atlas_bricks_.size()) * sizeof(std::uint32_t) +
+         ranges_.size() * sizeof(cl_float2) + frame.distance.size() + (atlas_ ? layout.bytes() : 0);
 }
 
 ResidentVolume::ResidentVolume(Device& device, const MixedVolume& volume)

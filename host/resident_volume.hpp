@@ -1,9 +1,10 @@
-// What ResidentVolume holds on the device, and how tiles are regrouped into one 3D image.
+// What ResidentVolume holds on the device, and how tiles are regrouped into 3D images.
 //
-// Atlas: image texel[z][y][x] of CL_R / CL_FLOAT. The base volume lies at (0, 0, 0). The tiles of a triple
-// stand on one another along z in columns of sx x sy texels; because a triple's tiles are contiguous in the
-// sample buffer, one buffer-to-image copy fills a column. Columns of one triple fill shelves along x; shelves
-// follow one another along y, below the base. Called by: raycast.cpp, verify.cpp (samples, bricks, grid).
+// Atlas: one image texel[z][y][x] per sample type, CL_R of CL_FLOAT, CL_UNORM_INT16 or CL_UNORM_INT8. The
+// base volume lies at (0, 0, 0) of its type's. The tiles of a triple stand on one another along z in columns
+// of sx x sy texels; because a triple's tiles are contiguous in the sample buffer, one buffer-to-image copy
+// fills a column. Columns of one triple fill shelves along x; shelves follow one another along y, below the
+// base. So tiles of any size fit any device's limits on each axis. Called by: raycast.cpp, sampler_terms.cpp.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +14,17 @@
 #include <utility>
 #include <vector>
 
-#include "host/brick_layout.hpp"
-#include "host/opencl/array.hpp"
+#include "host/device_field.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {
 
 /// What a device allows for the atlas; tests pass small ones.
 struct ImageLimits {
-  bool linear_float = false;
-  std::array<std::uint64_t, 3> size{0, 0, 0};  ///< texels, x, y, z
-  std::uint64_t bytes = 0;                     ///< of one image
+  std::array<bool, 3> linear{false, false, false};  ///< by SampleType: readable with the linear filter
+  std::array<std::uint64_t, 3> size{0, 0, 0};       ///< texels, x, y, z
+  std::uint64_t image_bytes = 0;                    ///< of one image
+  std::uint64_t bytes = 0;                          ///< of all
 };
 ImageLimits image_limits(const DeviceInfo& info, std::uint64_t memory_left);
 
@@ -43,10 +44,13 @@ struct AtlasShelves {
 
 struct AtlasLayout {
   bool fits = false;
-  std::string reason;                          ///< why it does not, or its size
-  std::array<std::uint64_t, 3> size{0, 0, 0};  ///< texels, x, y, z
-  std::map<LevelTriple, AtlasShelves> shelves;
-  [[nodiscard]] std::uint64_t bytes() const { return size[0] * size[1] * size[2] * sizeof(float); }
+  std::string reason;  ///< why it does not, or its size
+  /// Texels x, y, z of the image of each SampleType; 0 where the volume has no such samples.
+  std::array<std::array<std::uint64_t, 3>, 3> size{};
+  std::map<LevelTriple, AtlasShelves> shelves;  ///< in the image of the triple's type
+  [[nodiscard]] std::uint64_t bytes() const;
+  /// The longest side of any image.
+  [[nodiscard]] std::uint64_t longest() const;
 };
 /// The smallest atlas found within the limits. Host only; microseconds to milliseconds.
 AtlasLayout pack_atlas(const MixedVolume& volume, const ImageLimits& limits);
@@ -62,18 +66,20 @@ struct ResidentVolume::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  /// The atlas, built on first use. Throws ResourceError when the device has no room for it any more.
-  const cl::Image3D& atlas();
+  /// The atlas by SampleType, built on first use; types that do not occur share another's image. Throws
+  /// ResourceError when the device has no room for it any more.
+  const std::array<cl::Image3D, 3>& atlas();
+  /// Brick records whose places are texels; after atlas().
+  const cl::Buffer& atlas_bricks() const { return atlas_bricks_.buffer(); }
+  /// [bz][by][bx] min, max over the samples of the closed brick; on the device from the first call on.
+  const cl::Buffer& ranges();
   [[nodiscard]] std::uint64_t bytes() const;  ///< on the device, between frames
 
   opencl::State* state;
   Grid grid;
-  VdvrGrid sampler_grid;
-  opencl::DeviceArray<float> samples;     ///< host/brick_layout.hpp
-  opencl::DeviceArray<VdvrBrick> bricks;  ///< [bz][by][bx]
-  opencl::DeviceArray<cl_float2> ranges;  ///< [bz][by][bx] min, max over the samples of the closed brick
-  std::vector<cl_float2> host_ranges;     ///< the same
+  std::vector<cl_float2> host_ranges;  ///< what ranges() holds
   std::pair<float, float> value_range{0, 0};
+  float largest = 0;  ///< that a texel can decode to, in magnitude
   AtlasLayout layout;
 
   /// Kept between frames so that a frame allocates nothing but its picture.
@@ -85,9 +91,18 @@ struct ResidentVolume::Impl {
     std::vector<cl_float4> table_values;
   } frame;
 
+  std::optional<DeviceField> field;
+
  private:
+  void set_texels(const MixedVolume& volume, PackedRecords& records) const;
+  void fill_image(const cl::Image3D& image, SampleType type);
+
   std::map<LevelTriple, std::uint64_t> offsets_;
-  std::optional<cl::Image3D> atlas_;
+  std::map<LevelTriple, SampleType> types_;  ///< of the tiles; base under 000
+  std::vector<std::uint32_t> texel_records_;
+  std::optional<std::array<cl::Image3D, 3>> atlas_;
+  opencl::DeviceArray<std::uint32_t> atlas_bricks_;
+  opencl::DeviceArray<cl_float2> ranges_;
 };
 
 }  // namespace vdvr

@@ -16,19 +16,26 @@ struct FieldSlopes {
   struct Brick {
     std::array<double, 3> per_sample{0, 0, 0};  ///< at its own spacing
     double magnitude = 0;                       ///< largest |sample|
+    SampleType type = SampleType::f32;
+    double scale = 0;  ///< integers: what the type's whole range decodes to
   };
   std::vector<Brick> bricks;
   std::array<double, 3> per_cell{0, 0, 0};  ///< over all bricks, per base cell
+  bool integers = false;                    ///< base or some tiles are integers
 };
 /// Cost: one pass over all samples that a brick can interpolate, over all cores.
 FieldSlopes field_slopes(const MixedVolume& volume);
 
 /// The largest over the bricks. buffer: fp32 rounding of the coordinate and of seven interpolations. image3d:
-/// the texture unit's weights and products, as probed; absent where the device has no such sampler.
+/// the texture unit's weights and products, as probed; absent where the device has no such sampler or
+/// `atlas_length` is 0. `node_error`: what |V - F| may be at the gold nodes, and `rate`: theirs; both are
+/// used where bricks meet with integer samples.
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
-                           std::int64_t atlas_length);
+                           std::int64_t atlas_length, double node_error, int rate);
 
-/// The longest side of the image atlas that a volume may be packed into.
+/// The longest side of an image atlas that a volume may be packed into.
 std::int64_t longest_atlas(const DeviceInfo& device);
+/// The longest side of the volume's own atlas on a device; 0 where it does not fit its images.
+std::int64_t atlas_length(const DeviceInfo& device, const MixedVolume& volume);
 
 }  // namespace vdvr

@@ -27,7 +27,12 @@ namespace h5 = io::hdf5_file;
 static_assert(std::endian::native == std::endian::little,
               "content_sha256 hashes memory, which must be little-endian");
 
-constexpr int newest_version = 1;
+// Version 2 is version 1 with integer samples; files without any are still written as 1.
+constexpr int newest_version = 2;
+// Below and above, products of the step with a stored integer would leave the normal numbers of fp32.
+constexpr double smallest_step = 0x1p-126, largest_step = 0x1p103;
+constexpr int largest_shift = 24;
+constexpr std::int64_t code_limit = std::int64_t{1} << 24;  // integers below are exact in fp32
 constexpr int largest_rate = 64;
 // Cell coordinates are fp32 in the sampler: beyond 2^24 neighbouring cells are no longer told apart.
 constexpr std::int64_t most_cells = std::int64_t{1} << 24;
@@ -144,6 +149,48 @@ std::optional<Problem> sample_problem(const std::string& where, const std::vecto
                  fmt::format("sample {} is {}, expected finite numbers", first - samples.begin(), *first)};
 }
 
+template <class T>
+std::optional<Problem> code_problem(const std::string& where, const SampleBlock& b,
+                                    const std::vector<T>& stored) {
+  const std::size_t tiles = b.offset.size(), per_tile = tiles == 0 ? 0 : stored.size() / tiles;
+  for (std::size_t t = 0; t < tiles; ++t) {
+    const int shift = b.shift[t];
+    if (shift > largest_shift)
+      return Problem{where,
+                     fmt::format("the shift of tile {} is {}, expected at most {}", t, shift, largest_shift)};
+    const std::int64_t offset = b.offset[t];
+    if (offset % (std::int64_t{1} << shift) != 0)
+      return Problem{where, fmt::format("offset {} of tile {} is no multiple of 2^{}", offset, t, shift)};
+    const auto first = stored.begin() + static_cast<std::ptrdiff_t>(t * per_tile);
+    const std::int64_t most = *std::max_element(first, first + static_cast<std::ptrdiff_t>(per_tile));
+    if (offset <= -code_limit || offset + (most << shift) >= code_limit)
+      return Problem{where,
+                     fmt::format("tile {} holds integers from {} to {}, expected below 2^24 in magnitude", t,
+                                 offset, offset + (most << shift))};
+  }
+  return std::nullopt;
+}
+
+/// What is wrong with the samples of a block whose vectors have the right sizes.
+std::optional<Problem> block_problem(const std::string& where, const SampleBlock& b) {
+  if (b.type == SampleType::f32) return sample_problem(where, b.f32);
+  return b.type == SampleType::u16 ? code_problem(where, b, b.u16) : code_problem(where, b, b.u8);
+}
+
+bool has_integers(const MixedVolume& v) {
+  bool any = v.base.type != SampleType::f32;
+  for (const auto& [triple, block] : v.tiles) any = any || block.type != SampleType::f32;
+  return any;
+}
+
+std::optional<Problem> step_problem(const MixedVolume& v) {
+  int exponent = 0;
+  const bool fits = v.step >= smallest_step && v.step <= largest_step && std::frexp(v.step, &exponent) == 0.5;
+  if (fits) return std::nullopt;
+  return Problem{"attribute 'step' of /",
+                 fmt::format("is {}, expected a power of two from 2^-126 to 2^103", v.step)};
+}
+
 std::optional<Problem> size_problem(const std::string& where, std::uint64_t have, std::uint64_t expected) {
   if (have == expected) return std::nullopt;
   return Problem{where, fmt::format("holds {} elements, the grid needs {}", have, expected)};
@@ -158,6 +205,16 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
   if (auto p = size_problem("/level", v.level.size(), bricks)) return p;
   if (auto p = size_problem("/tile", v.tile.size(), bricks)) return p;
   std::map<LevelTriple, std::uint64_t> counts;
+  const auto tables_problem = [](const std::string& where, const SampleBlock& b,
+                                 std::uint64_t tiles) -> std::optional<Problem> {
+    if (b.type == SampleType::f32) tiles = 0;
+    if (b.offset.size() == tiles && b.shift.size() == tiles) return std::nullopt;
+    return Problem{where, fmt::format("has {} offsets and {} shifts for {} tiles of integers",
+                                      b.offset.size(), b.shift.size(), tiles)};
+  };
+  if (auto p = tables_problem("/base", v.base, 1)) return p;
+  if (has_integers(v))
+    if (auto p = step_problem(v)) return p;
   for (const auto& [triple, samples] : v.tiles) {
     if (triple == in_base) return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
     if (*std::max_element(triple.begin(), triple.end()) > 6)
@@ -165,12 +222,13 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
     const auto size = static_cast<std::uint64_t>(v.tile_size(triple));
     if (samples.size() % size != 0)
       return Problem{path_of(triple), fmt::format("{} samples are no whole number of tiles", samples.size())};
-    if (!samples.empty()) counts[triple] = samples.size() / size;
+    if (auto p = tables_problem(path_of(triple), samples, samples.size() / size)) return p;
+    if (samples.size() != 0) counts[triple] = samples.size() / size;
   }
   if (auto p = index_problem(v, counts)) return p;
-  if (auto p = sample_problem("/base", v.base)) return p;
+  if (auto p = block_problem("/base", v.base)) return p;
   for (const auto& [triple, samples] : v.tiles)
-    if (auto p = sample_problem(path_of(triple), samples)) return p;
+    if (auto p = block_problem(path_of(triple), samples)) return p;
   return std::nullopt;
 }
 
@@ -193,6 +251,21 @@ void write_index(h5::Writer& file, const MixedVolume& v) {
   file.dataset("/level", shape_of({b[2], b[1], b[0], 3}),
                std::span<const std::uint8_t>(v.level.data()->data(), 3 * v.level.size()));
   file.dataset("/tile", shape_of({b[2], b[1], b[0]}), std::span<const std::uint32_t>(v.tile));
+}
+
+/// Samples, and offset and shift of each tile where they are integers.
+void write_block(h5::Writer& file, const std::string& path, const h5::Shape& shape, const SampleBlock& b) {
+  if (b.type == SampleType::f32) file.dataset(path, shape, std::span<const float>(b.f32));
+  else if (b.type == SampleType::u16) file.dataset(path, shape, std::span<const std::uint16_t>(b.u16));
+  else file.dataset(path, shape, std::span<const std::uint8_t>(b.u8));
+  if (b.type == SampleType::f32) return;
+  if (path == "/base") {
+    file.attribute(path, "offset", std::int64_t{b.offset.front()});
+    file.attribute(path, "shift", std::int64_t{b.shift.front()});
+    return;
+  }
+  file.dataset(path + "_offset", {b.offset.size()}, std::span<const std::int32_t>(b.offset));
+  file.dataset(path + "_shift", {b.shift.size()}, std::span<const std::uint8_t>(b.shift));
 }
 
 // --- reading
@@ -231,21 +304,15 @@ void read_grid(const h5::Reader& file, MixedVolume& v) {
 }
 
 /// A dataset of the right type and shape; a zero in `shape` stands for any extent.
-h5::Dataset expect(const h5::Reader& file, const std::string& path, h5::Element element,
+h5::Dataset expect(const h5::Reader& file, const std::string& path, const std::vector<h5::Element>& elements,
                    const h5::Shape& shape) {
   h5::Dataset d = file.dataset(path);
-  if (d.element != element) {
-    const bool integer_samples =
-        element == h5::Element::f32 && (d.element == h5::Element::u8 || d.element == h5::Element::u16);
-    if (integer_samples)
-      file.refuse(path,
-                  fmt::format("holds {} samples, which this version does not read: build with --storage f32",
-                              d.element == h5::Element::u8 ? "uint8" : "uint16"));
+  if (std::find(elements.begin(), elements.end(), d.element) == elements.end())
     file.refuse(path, fmt::format("elements are of the wrong type, expected {}",
-                                  element == h5::Element::f32  ? "float32"
-                                  : element == h5::Element::u8 ? "uint8"
-                                                               : "uint32"));
-  }
+                                  elements.size() > 1                    ? "float32, uint16 or uint8"
+                                  : elements.front() == h5::Element::u8  ? "uint8"
+                                  : elements.front() == h5::Element::i32 ? "int32"
+                                                                         : "uint32"));
   bool fits = d.shape.size() == shape.size();
   for (std::size_t a = 0; fits && a < shape.size(); ++a) fits = shape[a] == 0 || d.shape[a] == shape[a];
   if (!fits) {
@@ -266,34 +333,57 @@ LevelTriple triple_of(const h5::Reader& file, const std::string& name) {
   return l;
 }
 
+const std::vector<h5::Element> kSampleElements{h5::Element::f32, h5::Element::u16, h5::Element::u8};
+
 /// All datasets of one file, checked but not yet read.
 struct Contents {
   h5::Dataset base, level, tile;
-  std::map<LevelTriple, h5::Dataset> tiles;
+  std::map<LevelTriple, h5::Dataset> tiles, offsets, shifts;
   std::map<LevelTriple, std::uint64_t> counts;
 };
+
+/// Offsets and shifts go with integer tiles, and with no others.
+void open_tables(const h5::Reader& file, Contents& c) {
+  for (const auto& [l, d] : c.tiles) {
+    const std::string offset = path_of(l) + "_offset", shift = path_of(l) + "_shift";
+    if (d.element == h5::Element::f32) continue;
+    for (const std::string& path : {offset, shift})
+      if (!file.has(path))
+        file.refuse(path, fmt::format("is missing beside the integer tiles of {}", path_of(l)));
+    c.offsets[l] = expect(file, offset, {h5::Element::i32}, {c.counts[l]});
+    c.shifts[l] = expect(file, shift, {h5::Element::u8}, {c.counts[l]});
+  }
+}
 
 Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
   const Index3 b = v.bricks();
   Contents c;
-  c.base = expect(file, "/base", h5::Element::f32, base_shape(v));
-  c.level = expect(file, "/level", h5::Element::u8, shape_of({b[2], b[1], b[0], 3}));
-  c.tile = expect(file, "/tile", h5::Element::u32, shape_of({b[2], b[1], b[0]}));
+  c.base = expect(file, "/base", kSampleElements, base_shape(v));
+  c.level = expect(file, "/level", {h5::Element::u8}, shape_of({b[2], b[1], b[0], 3}));
+  c.tile = expect(file, "/tile", {h5::Element::u32}, shape_of({b[2], b[1], b[0]}));
   if (!file.has("/tiles")) return c;
   file.require_group("/tiles");
   const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
+  std::vector<std::string> tables;
   for (const std::string& name : file.members("/tiles")) {
-    if (name.ends_with("_offset") || name.ends_with("_shift"))
-      file.refuse("/tiles/" + name,
-                  "belongs to integer tiles, which this version does not read: build with --storage f32");
+    if (name.ends_with("_offset") || name.ends_with("_shift")) {
+      tables.push_back(name.substr(0, name.find('_')));
+      continue;
+    }
     const LevelTriple l = triple_of(file, name);
     if (*std::max_element(l.begin(), l.end()) > finest)
       file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate, finest));
     const auto side = v.tile_shape(l);
-    c.tiles[l] = expect(file, path_of(l), h5::Element::f32, shape_of({0, side[0], side[1], side[2]}));
+    c.tiles[l] = expect(file, path_of(l), kSampleElements, shape_of({0, side[0], side[1], side[2]}));
     c.counts[l] = c.tiles[l].shape.front();
     if (c.counts[l] > c.tile.count)
       file.refuse(path_of(l), fmt::format("{} tiles for {} bricks", c.counts[l], c.tile.count));
+  }
+  open_tables(file, c);
+  for (const std::string& name : tables) {
+    const auto found = c.offsets.find(triple_of(file, name));
+    if (found == c.offsets.end())
+      file.refuse("/tiles/" + name + "_offset or _shift", "belongs to no integer tiles of that name");
   }
   return c;
 }
@@ -303,10 +393,11 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
                   std::uint64_t max_memory_bytes) {
   std::uint64_t stored = c.base.stored_bytes + c.level.stored_bytes + c.tile.stored_bytes;
   std::uint64_t needed = c.base.bytes + c.level.bytes + c.tile.bytes + c.tile.count / 8;
-  for (const auto& [triple, d] : c.tiles) {
-    stored += d.stored_bytes;
-    needed += d.bytes;
-  }
+  for (const auto* datasets : {&c.tiles, &c.offsets, &c.shifts})
+    for (const auto& [triple, d] : *datasets) {
+      stored += d.stored_bytes;
+      needed += d.bytes;
+    }
   if (stored > file.file_bytes())
     file.refuse(
         "/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
@@ -316,10 +407,30 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
                     max_memory_bytes));
 }
 
-void read_samples(const h5::Reader& file, const h5::Dataset& d, std::vector<float>& samples) {
-  samples.resize(d.count);
-  file.read(d, samples.data());
-  if (const auto p = sample_problem(d.path, samples)) file.refuse(p->where, p->what);
+void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) {
+  const auto into = [&](auto& samples) {
+    samples.resize(d.count);
+    file.read(d, samples.data());
+  };
+  b.type = d.element == h5::Element::f32   ? SampleType::f32
+           : d.element == h5::Element::u16 ? SampleType::u16
+                                           : SampleType::u8;
+  if (b.type == SampleType::f32) into(b.f32);
+  else if (b.type == SampleType::u16) into(b.u16);
+  else into(b.u8);
+}
+
+/// The base's offset and shift, as attributes of any integer type.
+void read_base_table(const h5::Reader& file, SampleBlock& b) {
+  const auto value = [&](const char* name, std::int64_t most) {
+    const std::int64_t n = file.integer("/base", name);
+    if (n < (name[0] == 'o' ? -most : 0) || n > most)
+      file.refuse(fmt::format("attribute '{}' of /base", name),
+                  fmt::format("is {}, expected at most {}", n, most));
+    return n;
+  };
+  b.offset = {static_cast<std::int32_t>(value("offset", code_limit))};
+  b.shift = {static_cast<std::uint8_t>(value("shift", largest_shift))};
 }
 
 void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v) {
@@ -329,7 +440,32 @@ void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v)
   file.read(c.tile, v.tile.data());
   if (const auto p = index_problem(v, c.counts)) file.refuse(p->where, p->what);
   read_samples(file, c.base, v.base);
-  for (const auto& [triple, d] : c.tiles) read_samples(file, d, v.tiles[triple]);
+  if (v.base.type != SampleType::f32) read_base_table(file, v.base);
+  for (const auto& [triple, d] : c.tiles) {
+    SampleBlock& b = v.tiles[triple];
+    read_samples(file, d, b);
+    if (b.type == SampleType::f32) continue;
+    b.offset.resize(c.counts.at(triple));
+    b.shift.resize(c.counts.at(triple));
+    file.read(c.offsets.at(triple), b.offset.data());
+    file.read(c.shifts.at(triple), b.shift.data());
+  }
+  if (const auto p = block_problem("/base", v.base)) file.refuse(p->where, p->what);
+  for (const auto& [triple, block] : v.tiles)
+    if (const auto p = block_problem(path_of(triple), block)) file.refuse(p->where, p->what);
+}
+
+/// The step, which goes with integer samples and with no others.
+void read_step(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+  bool integers = c.base.element != h5::Element::f32;
+  for (const auto& [triple, d] : c.tiles) integers = integers || d.element != h5::Element::f32;
+  const char* where = "attribute 'step' of /";
+  if (integers != file.has_attribute("/", "step"))
+    file.refuse(where,
+                integers ? "is missing beside integer samples" : "stands in a file without integer samples");
+  if (!integers) return;
+  v.step = file.reals("/", "step", 1).front();
+  if (const auto p = step_problem(v)) file.refuse(p->where, p->what);
 }
 
 Certificate read_certificate(const std::string& path, const std::string& json) {
@@ -367,10 +503,23 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
 std::string content_sha256(const MixedVolume& v) {
   Sha256 hash;
   add_grid(hash, v);
-  add(hash, std::span<const float>(v.base));
+  const bool integers = has_integers(v);
+  if (integers) hash.update(&v.step, sizeof v.step);
+  hash.update(v.base.data(), v.base.bytes());
   add(hash, std::span<const LevelTriple>(v.level));
   add(hash, std::span<const std::uint32_t>(v.tile));
-  for (const auto& [triple, samples] : v.tiles) add(hash, std::span<const float>(samples));
+  for (const auto& [triple, block] : v.tiles) hash.update(block.data(), block.bytes());
+  // The base's offset and shift are attributes: 64 bits.
+  if (v.base.type != SampleType::f32) {
+    const std::array<std::int64_t, 1> offset{v.base.offset.front()};
+    add(hash, std::span<const std::int64_t>(offset));
+  }
+  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::int32_t>(block.offset));
+  if (v.base.type != SampleType::f32) {
+    const std::array<std::int64_t, 1> shift{v.base.shift.front()};
+    add(hash, std::span<const std::int64_t>(shift));
+  }
+  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::uint8_t>(block.shift));
   return hash.hex();
 }
 
@@ -385,18 +534,18 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
   {
     h5::Writer file(target.temporary(), path);
     file.attribute("/", "format", std::string("vdvr"));
-    file.attribute("/", "format_version", std::int64_t{newest_version});
+    file.attribute("/", "format_version", std::int64_t{has_integers(v) ? 2 : 1});
     file.attribute("/", "generator", std::string("vdvr " VDVR_VERSION));
+    if (has_integers(v)) file.attribute("/", "step", v.step);
     write_grid(file, v);
-    file.dataset("/base", base_shape(v), std::span<const float>(v.base));
+    write_block(file, "/base", base_shape(v), v.base);
     write_index(file, v);
     file.group("/tiles");
     for (const auto& [triple, samples] : v.tiles) {
-      if (samples.empty()) continue;
+      if (samples.size() == 0) continue;
       const auto side = v.tile_shape(triple);
       const auto count = static_cast<std::int64_t>(samples.size()) / v.tile_size(triple);
-      file.dataset(path_of(triple), shape_of({count, side[0], side[1], side[2]}),
-                   std::span<const float>(samples));
+      write_block(file, path_of(triple), shape_of({count, side[0], side[1], side[2]}), samples);
     }
     file.text("/certificate", json);
     file.close();
@@ -411,10 +560,8 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
   result.format_version = read_version(file);
   result.generator = file.text_attribute("/", "generator");
   read_grid(file, result.volume);
-  if (file.has_attribute("/", "step"))
-    file.refuse("attribute 'step' of /",
-                "belongs to integer tiles, which this version does not read: build with --storage f32");
   const Contents contents = open_contents(file, result.volume);
+  read_step(file, contents, result.volume);
   check_memory(file, path.string(), contents, max_memory_bytes);
   result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
   result.certificate = read_certificate(path.string(), result.certificate_json);

@@ -90,34 +90,29 @@ std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate&
 SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int64_t brick,
                          const Index3& cell) {
   const Index3 b = place_of(v, brick);
-  const VdvrBrick record = brick_record(v, tile_offsets(v), b[0], b[1], b[2]);
+  const BrickSamples stored(v, b);
   SamplePlace p;
   p.brick = brick;
   p.brick_at = b;
   p.level = v.level[at(brick)];
   const bool base = p.level == LevelTriple{0, 0, 0};
-  const float* samples =
-      base ? v.base.data() + record.offset
-           : v.tiles.at(p.level).data() + static_cast<std::int64_t>(v.tile[at(brick)]) * v.tile_size(p.level);
-  const std::array<std::uint32_t, 3> levels{record.level_x, record.level_y, record.level_z};
+  const std::array<int, 3> levels = stored.level();
   std::vector<Vec3> points;
   std::vector<double> values;
   std::vector<Index3> nodes;
   for (std::int64_t corner = 0; corner < 8; ++corner) {
-    std::array<VdvrLocal, 3> local{};
+    std::array<float, 3> at_cell{};
     Vec3 world{};
     Index3 node{};
     for (std::size_t a = 0; a < 3; ++a) {
       node[a] = cell[a] + (corner >> a & 1);
       const double c = static_cast<double>(b[a] * v.granularity) + static_cast<double>(node[a]) / v.rate;
-      local[a] = vdvr_local(static_cast<float>(c), static_cast<vdvr_i32>(b[a]), levels[a], v.granularity,
-                            static_cast<vdvr_i32>(v.grid.cells[a]));
+      at_cell[a] = static_cast<float>(c);
       world[a] = v.grid.origin[a] + c * v.grid.spacing[a];
     }
     nodes.push_back(node);
     points.push_back(world);
-    values.push_back(static_cast<double>(
-        vdvr_sample_in_brick(samples, record.stride_y, record.stride_z, local[0], local[1], local[2])));
+    values.push_back(static_cast<double>(stored.at(at_cell[0], at_cell[1], at_cell[2])));
   }
   const std::vector<double> F = field.at(points);
   std::size_t worst = 0;
@@ -175,7 +170,8 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   } const give{state, bytes};
   const ExactField exact(scan, stored.field, progress);
   const SamplerTerms sampler =
-      sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device), longest_atlas(device.info()));
+      sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device),
+                    atlas_length(device.info(), volume), stored.epsilon_abs, volume.rate);
 
   VerifyResult result;
   result.epsilon_abs = stored.epsilon_abs;

@@ -248,15 +248,8 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
       coverage_(field.geometry()),
       h_(volume.grid.spacing),
       sups_(view_sups(field.coefficients(), field.geometry(), progress)),
-      samples_(state, sample_buffer_size(volume), "certified samples"),
-      bricks_(state, std::span<const VdvrBrick>(brick_records(volume)), "brick records") {
+      stored_(state, volume) {
   for (double& h : h_) h /= static_cast<double>(volume.rate);
-  samples_.write(volume.base, 0);
-  std::uint64_t offset = volume.base.size();
-  for (const auto& [triple, tiles] : volume.tiles) {
-    samples_.write(tiles, offset);
-    offset += tiles.size();
-  }
   // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on.
   const ParallelGeometry& g = field.geometry();
   pad_ = static_cast<std::int64_t>(
@@ -471,7 +464,7 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
                                                     "view positions");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int>
-      kernel(state_, "verify_field", "verify_field");
+      kernel(state_, "verify_field", "verify_field", stored_.defines);
   for (std::int64_t first = 0; first < g.views(); first += table.views) {
     fill(table, s, first);
     kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
@@ -521,13 +514,13 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int>
-      errors(state_, "verify_field", "verify_errors");
+      errors(state_, "verify_field", "verify_errors", stored_.defines);
   errors({{count(side), count(side), count(n)}, {count(side), 1, 1}}, error.buffer(), values.buffer(),
-         samples_.buffer(), bricks_.buffer(), grid, items.buffer(), first.buffer(), rate, nx, nx, z_padded,
-         to_int(s.error_padded), to_int(n));
+         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), rate, nx,
+         nx, z_padded, to_int(s.error_padded), to_int(n));
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int,
                  cl_int, cl_int>
-      fourths(state_, "verify_field", "verify_fourth");
+      fourths(state_, "verify_field", "verify_fourth", stored_.defines);
   fourths({{count(side), count(n), 1}, {1, 1, 1}}, fourth.buffer(), values.buffer(), tested.buffer(), grid,
           items.buffer(), first.buffer(), rate, nx, nx, z_padded, to_int(n));
 
@@ -557,7 +550,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer,
                  cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float,
                  cl_float, cl_float, cl_int>
-      cells(state_, "verify_field", "verify_cells");
+      cells(state_, "verify_field", "verify_cells", stored_.defines);
   cells({{count(s.cells), count(s.cells), count(n)}, {count(s.cells), 1, 1}}, columns.buffer(), bits.buffer(),
         error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
         device_widening.buffer(), rate, nx, nx, z_padded, to_int(s.error_padded), to_int(s.words),

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "host/brick_layout.hpp"
 #include "host/coverage.hpp"
+#include "host/device_field.hpp"
 #include "host/opencl/array.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/mixed_volume.hpp"
@@ -100,8 +100,7 @@ class VerifyField {
   Coverage coverage_;
   Vec3 h_;  // gold spacing
   ViewSups sups_;
-  opencl::DeviceArray<float> samples_;
-  opencl::DeviceArray<VdvrBrick> bricks_;
+  DeviceField stored_;
   std::int64_t pad_ = 0, columns_ = 0;  // fine columns
   double arithmetic_ = 0;
 };

@@ -75,7 +75,8 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
   p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
 }
 
-// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
+// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the
+// block.
 __kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
                            int cells_z, int rate, int stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
@@ -107,10 +108,11 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
     low = fmin(low, v);                 \
     high = fmax(high, v);               \
   }
-#define CORNERS(M)                                                                  \
-  M(at)                                                                             \
-  M(at + 1) M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) \
-      M(at + row + gold_stride) M(at + row + gold_stride + 1)
+#define CORNERS(M)                                                                                  \
+  M(at)                                                                                             \
+  M(at + 1)                                                                                         \
+  M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
+      M(at + row + gold_stride + 1)
 
 // Slack of each gold cell: (larger signed sum of the largest second differences at the cell's corners) / 8
 // plus `addend`, which is 2.5 P + the remainder of T by base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the

@@ -1,5 +1,5 @@
 // Measures the image3d sampler: what it returns at given texel coordinates, and how fast both samplers run.
-// Called by: probe_sampler() in host/probe_sampler.cpp. Calls: vdvr_trilinear of mixed_sampler.h.
+// Called by: probe_sampler() in host/probe_sampler.cpp. Calls: vdvr_sample_in_brick of mixed_sampler.h.
 #include "shared/mixed_sampler.h"
 
 // A device without images cannot compile image arguments.
@@ -47,7 +47,8 @@ __kernel void rate_buffer(__global const float* restrict samples, uint side, uin
     const float3 c = walk_at(i, k, side, steps);
     // One brick of the whole cube, at level 0: the arithmetic of the certified field, without the index.
     const int cells = (int)side - 1;
-    sum += vdvr_sample_in_brick(samples, side, side * side, vdvr_local(c.x, 0, 0, cells, cells),
+    const VdvrBrick cube = {0, side, side * side, 0, 0, 0, 0, VDVR_F32, 1.0f, 0.0f};
+    sum += vdvr_sample_in_brick(samples, cube, vdvr_local(c.x, 0, 0, cells, cells),
                                 vdvr_local(c.y, 0, 0, cells, cells), vdvr_local(c.z, 0, 0, cells, cells));
   }
   sums[i] = sum;

@@ -40,12 +40,15 @@
 #include "shared/mixed_image.h"
 #include "shared/raycast_params.h"
 
+// One image per sample type; the launcher binds any to those that do not occur. THE_FIELD hands it on.
 #ifdef VDVR_SAMPLER_IMAGE3D
-#define FIELD __read_only image3d_t field
+#define FIELD __read_only image3d_t field_f32, __read_only image3d_t field_u16, __read_only image3d_t field_u8
+#define THE_FIELD field_f32, field_u16, field_u8
 #else
-#define FIELD __global const float* restrict field
+#define FIELD __global const uchar* restrict field
+#define THE_FIELD field
 #endif
-#define BRICKS __global const VdvrBrick* restrict bricks
+#define BRICKS __global const uint* restrict bricks
 
 // Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
 #define LEAST(a, b) ((a) < (b) ? (a) : (b))
@@ -95,9 +98,9 @@ RAY_INLINE ulong brick_index(VdvrGrid grid, int x, int y, int z) {
 
 RAY_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c) {
 #ifdef VDVR_SAMPLER_IMAGE3D
-  return vdvr_image_sample_in_brick(field, &b->record, grid, b->x, b->y, b->z, c.x, c.y, c.z);
+  return vdvr_image_sample_in_brick(THE_FIELD, &b->record, grid, b->x, b->y, b->z, c.x, c.y, c.z);
 #else
-  return vdvr_sample_in_brick(field + b->record.offset, b->record.stride_y, b->record.stride_z,
+  return vdvr_sample_in_brick(field, b->record,
                               vdvr_local(c.x, b->x, b->record.level_x, grid.granularity, grid.cells_x),
                               vdvr_local(c.y, b->y, b->record.level_y, grid.granularity, grid.cells_y),
                               vdvr_local(c.z, b->z, b->record.level_z, grid.granularity, grid.cells_z));
@@ -115,7 +118,7 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
   o.x = b.x;
   o.y = b.y;
   o.z = b.z;
-  o.record = bricks[brick_index(grid, b.x, b.y, b.z)];
+  o.record = vdvr_brick(bricks, grid, brick_index(grid, b.x, b.y, b.z));
   o.low = convert_float3(b * grid.granularity);
   o.high = o.low + (float)grid.granularity;
   // The last brick of an axis is closed, and wider than the grid where the cells do not divide by the
@@ -135,14 +138,14 @@ RAY_INLINE int is_inside(const OpenBrick* b, float3 c) {
 RAY_INLINE float sample_anywhere(FIELD, BRICKS, VdvrGrid grid, float3 c) {
 #ifdef VDVR_SAMPLER_IMAGE3D
   const OpenBrick b = open_brick(bricks, grid, brick_at(grid, c));
-  return sample_open(field, &b, grid, c);
+  return sample_open(THE_FIELD, &b, grid, c);
 #else
   return vdvr_sample(field, bricks, grid, c.x, c.y, c.z);
 #endif
 }
 
 RAY_INLINE float sample_near(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c) {
-  return is_inside(b, c) ? sample_open(field, b, grid, c) : sample_anywhere(field, bricks, grid, c);
+  return is_inside(b, c) ? sample_open(THE_FIELD, b, grid, c) : sample_anywhere(THE_FIELD, bricks, grid, c);
 }
 
 #if VDVR_WIDE_GRADIENT && defined(VDVR_SAMPLER_BUFFER)
@@ -158,16 +161,26 @@ RAY_INLINE int8 local8(float8 c, float first, float scale, int last, float8* fra
   return i;
 }
 
-RAY_INLINE float8 load6(__global const float* s, int8 i) {
-  return (float8)(s[i.s0], s[i.s1], s[i.s2], s[i.s3], s[i.s4], s[i.s5], 0.0f, 0.0f);
+#define LOAD6(TYPE, s, i) (TYPE)((s)[i.s0], (s)[i.s1], (s)[i.s2], (s)[i.s3], (s)[i.s4], (s)[i.s5], 0, 0)
+// Samples number first + i of the buffer, decoded as in mixed_sampler.h.
+RAY_INLINE float8 load6(FIELD, const VdvrBrick* b, ulong first, int8 i) {
+  if (VDVR_HOLDS(*b, VDVR_F32)) {
+    __global const float* s = (__global const float*)field + first;
+    return LOAD6(float8, s, i);
+  }
+  if (VDVR_HOLDS(*b, VDVR_U16)) {
+    __global const ushort* s = (__global const ushort*)field + first;
+    return convert_float8(LOAD6(ushort8, s, i)) * b->scale + b->bias;
+  }
+  __global const uchar* s = field + first;
+  return convert_float8(LOAD6(uchar8, s, i)) * b->scale + b->bias;
 }
 
 RAY_INLINE float8 lerp8(float8 a, float8 b, float8 t) { return (1.0f - t) * a + t * b; }
 
 // vdvr_trilinear at six points (lanes 0 to 5) of one region: an open brick, or, where the bricks around read
 // the base too, the whole base, whose cells give the same bits in global coordinates as in the brick's.
-RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, const OpenBrick* b, float8 x,
-                          float8 y, float8 z) {
+RAY_INLINE float8 sample6(FIELD, VdvrGrid grid, const OpenBrick* b, float8 x, float8 y, float8 z) {
   const int base = (int)b->record.base_around;
   const int fx = base ? 0 : b->x * grid.granularity, fy = base ? 0 : b->y * grid.granularity;
   const int fz = base ? 0 : b->z * grid.granularity;
@@ -179,12 +192,12 @@ RAY_INLINE float8 sample6(__global const float* restrict field, VdvrGrid grid, c
   const int8 iz = local8(z, (float)fz, (float)(1 << lz), min(grid.cells_z - fz, wide) << lz, &tz);
   const int sy = (int)b->record.stride_y, sz = (int)b->record.stride_z;
   const int8 i = iz * sz + iy * sy + ix;
-  __global const float* s = field + (base ? 0 : b->record.offset);
-  __global const float* t = s + sz;
-  const float8 p =
-      lerp8(lerp8(load6(s, i), load6(s + 1, i), tx), lerp8(load6(s + sy, i), load6(s + sy + 1, i), tx), ty);
-  const float8 q =
-      lerp8(lerp8(load6(t, i), load6(t + 1, i), tx), lerp8(load6(t + sy, i), load6(t + sy + 1, i), tx), ty);
+  const VdvrBrick* r = &b->record;
+  const ulong s = base ? 0 : r->place, t = s + (ulong)sz;
+  const float8 p = lerp8(lerp8(load6(field, r, s, i), load6(field, r, s + 1, i), tx),
+                         lerp8(load6(field, r, s + sy, i), load6(field, r, s + sy + 1, i), tx), ty);
+  const float8 q = lerp8(lerp8(load6(field, r, t, i), load6(field, r, t + 1, i), tx),
+                         lerp8(load6(field, r, t + sy, i), load6(field, r, t + sy + 1, i), tx), ty);
   return lerp8(p, q, tz);
 }
 #else
@@ -204,12 +217,12 @@ RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, 
     return ((float3)(v.s1, v.s3, v.s5) - (float3)(v.s0, v.s2, v.s4)) / (hi - lo) * cells_per_length;
   }
 #endif
-  const float3 before = (float3)(sample_near(field, bricks, grid, b, (float3)(lo.x, c.y, c.z)),
-                                 sample_near(field, bricks, grid, b, (float3)(c.x, lo.y, c.z)),
-                                 sample_near(field, bricks, grid, b, (float3)(c.x, c.y, lo.z)));
-  const float3 after = (float3)(sample_near(field, bricks, grid, b, (float3)(hi.x, c.y, c.z)),
-                                sample_near(field, bricks, grid, b, (float3)(c.x, hi.y, c.z)),
-                                sample_near(field, bricks, grid, b, (float3)(c.x, c.y, hi.z)));
+  const float3 before = (float3)(sample_near(THE_FIELD, bricks, grid, b, (float3)(lo.x, c.y, c.z)),
+                                 sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, lo.y, c.z)),
+                                 sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, c.y, lo.z)));
+  const float3 after = (float3)(sample_near(THE_FIELD, bricks, grid, b, (float3)(hi.x, c.y, c.z)),
+                                sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, hi.y, c.z)),
+                                sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, c.y, hi.z)));
   return (after - before) / (hi - lo) * cells_per_length;
 }
 
@@ -306,13 +319,13 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       const OpenBrick brick = open_brick(bricks, grid, b);
       do {
-        const float4 e = look_up(table, &p, sample_open(field, &brick, grid, c));
+        const float4 e = look_up(table, &p, sample_open(THE_FIELD, &brick, grid, c));
         ++samples;
         if (e.w > 0.0f) {
           float3 rgb = e.xyz;
           const float weight = (1.0f - alpha) * e.w;
           if (p.shading && weight > SHADED_WEIGHT * p.step)
-            rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world,
+            rgb = shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length), ray.world,
                         p.gradient_full);
           colour += weight * rgb;
           alpha += weight;
@@ -355,7 +368,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       const OpenBrick brick = open_brick(bricks, grid, b);
       do {
-        const int inside = sample_open(field, &brick, grid, c) >= p.iso;
+        const int inside = sample_open(THE_FIELD, &brick, grid, c) >= p.iso;
         ++samples;
         if (k > 0 && inside != was_inside) {
           hit = 1;
@@ -375,7 +388,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
   if (hit) {
     for (int i = 0; i < BISECTIONS; ++i) {
       const float middle = 0.5f * (before + behind);
-      const int inside = sample_anywhere(field, bricks, grid, position_at(&ray, grid, middle)) >= p.iso;
+      const int inside = sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)) >= p.iso;
       if (inside == was_inside) before = middle;
       else behind = middle;
     }
@@ -386,7 +399,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       const OpenBrick brick = open_brick(bricks, grid, brick_at(grid, c));
       const float3 cells_per_length =
           (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-      rgb = shade(rgb, gradient_at(field, bricks, grid, &brick, c, cells_per_length), ray.world, 0.0f);
+      rgb = shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length), ray.world, 0.0f);
     }
     depth = (ray.first + t) * p.length_unit;
   }
@@ -417,7 +430,7 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       const OpenBrick brick = open_brick(bricks, grid, b);
       do {
-        largest = MOST(largest, sample_open(field, &brick, grid, c));
+        largest = MOST(largest, sample_open(THE_FIELD, &brick, grid, c));
         ++samples;
         ++k;
         c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
@@ -440,7 +453,7 @@ __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice s, __globa
   float4 e = (float4)(0.02f, 0.02f, 0.02f, 0.0f);
   if (c[0] >= 0.0f && c[0] <= (float)grid.cells_x && c[1] >= 0.0f && c[1] <= (float)grid.cells_y &&
       c[2] >= 0.0f && c[2] <= (float)grid.cells_z) {
-    const float value = sample_anywhere(field, bricks, grid, (float3)(c[0], c[1], c[2]));
+    const float value = sample_anywhere(THE_FIELD, bricks, grid, (float3)(c[0], c[1], c[2]));
     const float grey = clamp((value - s.window_lo) * s.window_scale, 0.0f, 1.0f);
     e = (float4)(grey, grey, grey, value);
   }

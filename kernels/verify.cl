@@ -22,7 +22,7 @@ inline float largest_of(float8 v) {
 
 __kernel void verify_nodes(volatile __global int* total, volatile __global int* error,
                            volatile __global int* slack_max, volatile __global int* violated,
-                           __global const float* samples, __global const VdvrBrick* bricks, VdvrGrid grid,
+                           __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
                            __global const float* gold, __global const float* slack,
                            __global const float* margin, __global const int4* first_brick,
                            __global const uchar* selected, float lowest, int nx, int ny, int halo,
@@ -52,10 +52,9 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
     const size_t brick = ((size_t)bz * grid.bricks_y + by) * grid.bricks_x + bx;
     if (bz >= grid.bricks_z || !selected[brick]) continue;
     const int last_z = min(g, grid.cells_z - bz * g) * rate;
-    const VdvrBrick b = bricks[brick];
+    const VdvrBrick b = vdvr_brick(bricks, grid, brick);
     const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x),
                     y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
-    __global const float* corner = samples + b.offset + (size_t)y.index * b.stride_y + x.index;
     __global const float* gold_column = gold_start + brick_z * g * rate;
     __global const float* slack_column = slack_start + brick_z * g * rate;
     const float interval = (float)(1 << b.level_z) / (float)rate;
@@ -65,10 +64,8 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
     // between them, and the nodes' fractions are the dyadic ones vdvr_local gives.
     const int per_interval = rate >> b.level_z;
     for (int index = 0; index * per_interval < last_z; ++index) {
-      const float low =
-          vdvr_bilinear(corner + (size_t)index * b.stride_z, b.stride_y, x.fraction, y.fraction);
-      const float high =
-          vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, x.fraction, y.fraction);
+      const float low = vdvr_sample_in_plane(samples, b, x, y, index);
+      const float high = vdvr_sample_in_plane(samples, b, x, y, index + 1);
       const int first_node = index * per_interval,
                 nodes = first_node + per_interval == last_z ? per_interval + 1 : per_interval;
       int i = 0;

@@ -78,8 +78,8 @@ inline __global const float* field_column(__global const float* field, int4 item
   return field + (((size_t)item.w * ny + by) * nx + bx) * z_padded + (item.z - first.z) * cells + RADIUS;
 }
 
-__kernel void verify_errors(__global float* error, __global const float* field, __global const float* samples,
-                            __global const VdvrBrick* bricks, VdvrGrid grid, __global const int4* items,
+__kernel void verify_errors(__global float* error, __global const float* field, __global const uchar* samples,
+                            __global const uint* bricks, VdvrGrid grid, __global const int4* items,
                             __global const int4* first, int rate, int nx, int ny, int z_padded,
                             int error_padded, int count) {
   const int g = grid.granularity, cells = g * rate, side = cells + 1;
@@ -88,22 +88,21 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
   const int4 item = items[i];
   if (x > min(g, grid.cells_x - item.x * g) * rate || y > min(g, grid.cells_y - item.y * g) * rate) return;
   const int last_z = min(g, grid.cells_z - item.z * g) * rate;
-  const VdvrBrick b = bricks[((size_t)item.z * grid.bricks_y + item.y) * grid.bricks_x + item.x];
+  const VdvrBrick b =
+      vdvr_brick(bricks, grid, ((ulong)item.z * grid.bricks_y + item.y) * grid.bricks_x + item.x);
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const VdvrLocal lx = vdvr_local((float)(item.x * g) + (float)x / (float)rate, item.x, b.level_x, g,
                                   grid.cells_x),
                   ly = vdvr_local((float)(item.y * g) + (float)y / (float)rate, item.y, b.level_y, g,
                                   grid.cells_y);
-  __global const float* corner = samples + b.offset + (size_t)ly.index * b.stride_y + lx.index;
   __global const float* f = field_column(field, item, first[item.w], x, y, cells, nx, ny, z_padded);
   __global float* out = error + (((size_t)i * side + y) * side + x) * error_padded;
   // vdvr_trilinear, its two faces kept for all nodes between them.
   const int per_interval = rate >> b.level_z;
   const float step = 1.0f / (float)per_interval;
-  float low = vdvr_bilinear(corner, b.stride_y, lx.fraction, ly.fraction);
+  float low = vdvr_sample_in_plane(samples, b, lx, ly, 0);
   for (int index = 0, k = 0; index * per_interval < last_z; ++index) {
-    const float high =
-        vdvr_bilinear(corner + (size_t)(index + 1) * b.stride_z, b.stride_y, lx.fraction, ly.fraction);
+    const float high = vdvr_sample_in_plane(samples, b, lx, ly, index + 1);
     const int nodes = k + per_interval == last_z ? per_interval + 1 : per_interval;
     for (int n = 0; n < nodes; ++n, ++k) {
       const float e = fabs(vdvr_lerp(low, high, (float)n * step) - f[k]);

@@ -42,10 +42,10 @@ BOOST_AUTO_TEST_CASE(buffer_sampler_stays_within_its_term) {
         for (std::size_t i = 0; i < s.size(); ++i) s[i] = constant ? 1.9999999f : i % 2 == 0 ? 1.0f : -1.0f;
       };
       if (kind != std::string("random")) {
-        comb(v.base);
-        for (auto& [level, tile] : v.tiles) comb(tile);
+        comb(v.base.f32);
+        for (auto& [level, tile] : v.tiles) comb(tile.f32);
       }
-      const double bound = sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1).buffer.value;
+      const double bound = sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1, 0, 1).buffer.value;
       for (int i = 0; i < 4000; ++i) {
         Vec3 cell{}, p{};
         for (std::size_t a = 0; a < 3; ++a) {
@@ -152,7 +152,7 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
                                                          "all bricks");
         const DeviceField field(device().state(), v);
         const double others =
-            stream.arithmetic() + sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1).buffer.value;
+            stream.arithmetic() + sampler_terms(field_slopes(v), grid, SamplerProbe{}, 1, 0, 1).buffer.value;
         std::vector<double> total(v.level.size(), -1.0);
         stream.run(
             all,
@@ -198,7 +198,7 @@ BOOST_AUTO_TEST_CASE(stored_nan_never_passes_verification) {
   grid.origin[2] = -0.8;
   MixedVolume v =
       support::sampled_mixed(grid, 2, 4, {{1, 1, 1}}, 1, [](double, double, double) { return 0.0; });
-  v.tiles.begin()->second[7] = std::numeric_limits<float>::quiet_NaN();
+  v.tiles.begin()->second.f32[7] = std::numeric_limits<float>::quiet_NaN();
   Certificate stored;
   stored.epsilon_abs = 1e6;  // anything finite passes
   stored.upsampling_u = 4;

@@ -39,6 +39,12 @@ Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   return {std::move(plan), std::move(result)};
 }
 
+BuildOptions f32_storage() {
+  BuildOptions options;
+  options.storage = StorageChoice::f32;
+  return options;
+}
+
 Grid grid_of(const ProjectionSet& scan, const Index3& size, double spacing, std::optional<Vec3> origin = {}) {
   GridOptions options;
   options.size = size;
@@ -224,14 +230,14 @@ BOOST_AUTO_TEST_CASE(window_certifies_what_lies_in_it_with_fewer_tiles) {
 
 BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {
   const ProjectionSet scan = noise_scan(19, 9, 33, 10);
-  const Built built = build_of(scan, {grid_of(scan, {8, 8, 8}, 0.9), 0.05});
+  const Built built = build_of(scan, {grid_of(scan, {8, 8, 8}, 0.9), 0.05, {}, f32_storage()});
   const Certificate& c = built.result.certificate;
   BOOST_REQUIRE(verifies(scan, built.result.volume, c));
   BOOST_REQUIRE(!built.result.volume.tiles.empty());
   for (const auto& [triple, tiles] : built.result.volume.tiles) {
     MixedVolume altered = built.result.volume;
     // The middle of a tile lies in its brick's inside.
-    altered.tiles.at(triple)[static_cast<std::size_t>(altered.tile_size(triple) / 2)] +=
+    altered.tiles.at(triple).f32[static_cast<std::size_t>(altered.tile_size(triple) / 2)] +=
         static_cast<float>(1.5 * c.epsilon_abs);
     BOOST_TEST(!verifies(scan, altered, c));
   }
@@ -239,7 +245,7 @@ BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {
 
 BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
   const ProjectionSet scan = simulated(sphere(10, 1), 33, 17, 30);  // smooth enough for bricks of level 0
-  const Built built = build_of(scan, {grid_of(scan, {16, 16, 8}, 1.0), 0.3});
+  const Built built = build_of(scan, {grid_of(scan, {16, 16, 8}, 1.0), 0.3, {}, f32_storage()});
   // The first sample inside a brick that reads the base.
   MixedVolume altered = built.result.volume;
   const auto coarse = std::find(altered.level.begin(), altered.level.end(), LevelTriple{0, 0, 0});
@@ -247,7 +253,7 @@ BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
   const Index3 n = altered.bricks(), samples = altered.grid.samples();
   const std::int64_t i = coarse - altered.level.begin(), g = altered.granularity;
   const Index3 inside{i % n[0] * g + 1, i / n[0] % n[1] * g + 1, i / n[0] / n[1] * g + 1};
-  altered.base[static_cast<std::size_t>((inside[2] * samples[1] + inside[1]) * samples[0] + inside[0])] +=
+  altered.base.f32[static_cast<std::size_t>((inside[2] * samples[1] + inside[1]) * samples[0] + inside[0])] +=
       static_cast<float>(2.5 * built.plan.epsilon_abs);
   BOOST_TEST(!verifies(scan, altered, built.result.certificate));
   BOOST_TEST(!verifies(noise_scan(30, 17, 33, 12), built.result.volume, built.result.certificate));

@@ -2,6 +2,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <cmath>
+#include <cstring>
 #include <random>
 
 #include "host/brick_layout.hpp"
@@ -163,21 +164,42 @@ BOOST_AUTO_TEST_CASE(a_point_outside_is_clamped_to_the_box) {
 }
 
 BOOST_AUTO_TEST_CASE(one_sampler_for_packed_records_and_for_single_points) {
-  const MixedVolume v = support::random_mixed(grid_of({9, 5, 7}), 4, 8, mixed_triples, 21);
-  std::vector<float> samples = v.base;
-  for (const auto& [triple, tiles] : v.tiles) samples.insert(samples.end(), tiles.begin(), tiles.end());
-  BOOST_TEST(samples.size() == sample_buffer_size(v));
-  const auto records = brick_records(v);
-  std::mt19937 random(4);
-  std::uniform_real_distribution<float> unit(0, 1);
-  int wrong = 0;
-  for (int i = 0; i < 5000; ++i) {
-    const float x = 9 * unit(random), y = 5 * unit(random), z = 7 * unit(random);
-    const float packed = vdvr_sample(samples.data(), records.data(), sampler_grid(v), x, y, z);
-    const Vec3 cell{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
-    if (packed != sample_at(v, world(v.grid, cell))) ++wrong;
+  for (const auto& types :
+       {std::vector{SampleType::f32}, std::vector{SampleType::u16}, std::vector{SampleType::u8},
+        std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
+    const MixedVolume v =
+        support::in_types(support::random_mixed(grid_of({9, 5, 7}), 4, 8, mixed_triples, 21), types);
+    BOOST_TEST(v.level.size() > 1u);
+    const auto offsets = tile_offsets(v);
+    std::vector<std::uint8_t> samples(sample_buffer_bytes(v));
+    std::memcpy(samples.data(), v.base.data(), v.base.bytes());
+    for (const auto& [triple, block] : v.tiles)
+      std::memcpy(samples.data() + offsets.at(triple), block.data(), block.bytes());
+    const PackedRecords records(v, offsets);
+    const Index3 bricks = v.bricks();
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> unit(0, 1);
+    int wrong = 0;
+    for (int i = 0; i < 5000; ++i) {
+      const float x = 9 * unit(random), y = 5 * unit(random), z = 7 * unit(random);
+      const VdvrGrid grid = sampler_grid(v);
+      const std::array<std::int32_t, 3> b{vdvr_brick_of(x, grid.granularity, grid.bricks_x),
+                                          vdvr_brick_of(y, grid.granularity, grid.bricks_y),
+                                          vdvr_brick_of(z, grid.granularity, grid.bricks_z)};
+      const std::uint32_t* words =
+          records.words().data() +
+          records.words_per_brick() * static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0]);
+      const VdvrBrick r = vdvr_unpack(
+          words[0], words[1], records.words_per_brick() == 3 ? static_cast<std::int32_t>(words[2]) : 0, grid);
+      const float packed = vdvr_sample_in_brick(
+          samples.data(), r, vdvr_local(x, b[0], r.level_x, grid.granularity, grid.cells_x),
+          vdvr_local(y, b[1], r.level_y, grid.granularity, grid.cells_y),
+          vdvr_local(z, b[2], r.level_z, grid.granularity, grid.cells_z));
+      const Vec3 cell{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+      if (packed != sample_at(v, world(v.grid, cell))) ++wrong;
+    }
+    BOOST_TEST(wrong == 0);
   }
-  BOOST_TEST(wrong == 0);
 }
 
 BOOST_AUTO_TEST_CASE(a_uniform_volume_becomes_a_mixed_one_without_tiles) {
@@ -190,7 +212,7 @@ BOOST_AUTO_TEST_CASE(a_uniform_volume_becomes_a_mixed_one_without_tiles) {
   BOOST_TEST((v.bricks() == Index3{3, 2, 2}));
   BOOST_TEST(v.level.size() == 12u);
   BOOST_TEST(v.tile == std::vector<std::uint32_t>(12, 0));
-  BOOST_TEST(v.base == volume.samples);
+  BOOST_TEST(v.base.f32 == volume.samples);
   BOOST_TEST(sample_at(v, world(v.grid, {4, 3, 2})) == static_cast<float>(4 + 6 * (3 + 5 * 2)));
 }
 
@@ -204,21 +226,22 @@ BOOST_AUTO_TEST_CASE(tiles_have_the_shape_of_their_triple) {
 
 BOOST_AUTO_TEST_CASE(storage_of_a_uniform_volume_is_its_samples_and_its_index) {
   const MixedVolume v = support::random_mixed(grid_of({8, 8, 8}), 4, 1, {{0, 0, 0}}, 1);
-  const Storage s = storage_of(v, false);  // 9^3 = 729 samples, 8 index entries of 7 bytes
+  const Storage s =
+      storage_of(v, false);  // 9^3 = 729 samples, 8 index entries of 8 bytes and one of distance
   BOOST_TEST(s.samples_ratio == (729.0 + 8.0) / 729.0);
-  BOOST_TEST(s.device_bytes == 729u * 4 + 8 * 7);
-  BOOST_TEST(s.bytes_ratio == (729.0 * 4 + 8 * 7) / (729.0 * 4));
+  BOOST_TEST(s.device_bytes == 729u * 4 + 8 * 9);
+  BOOST_TEST(s.bytes_ratio == (729.0 * 4 + 8 * 9) / (729.0 * 4));
 }
 
 BOOST_AUTO_TEST_CASE(storage_counts_tiles_whole_even_beyond_the_grid) {
   MixedVolume v = support::empty_mixed(grid_of({5, 4, 4}), 4, 4, {{0, 0, 0}}, 1);  // two bricks along x
   v.level = {{0, 2, 1}, {1, 1, 1}};
-  v.tiles[{0, 2, 1}].assign(5 * 17 * 9, 0.0f);
-  v.tiles[{1, 1, 1}].assign(729, 0.0f);
+  v.tiles[{0, 2, 1}].f32.assign(5 * 17 * 9, 0.0f);
+  v.tiles[{1, 1, 1}].f32.assign(729, 0.0f);
   const double base = 6 * 5 * 5, tiles = 5 * 17 * 9 + 729;
   const Storage s = storage_of(v, false);
   BOOST_TEST(s.samples_ratio == (base + 2 + tiles) / base);
-  BOOST_TEST(s.bytes_ratio == (4 * (base + tiles) + 7 * 2) / (4 * base));
+  BOOST_TEST(s.bytes_ratio == (4 * (base + tiles) + 9 * 2) / (4 * base));
 }
 
 BOOST_AUTO_TEST_CASE(interior_storage_counts_bricks_within_seven_eighths_in_x_and_y) {
@@ -227,8 +250,43 @@ BOOST_AUTO_TEST_CASE(interior_storage_counts_bricks_within_seven_eighths_in_x_an
   v.level[0] = {1, 1, 1};          // a corner: not counted
   v.level[1 + 4 * 1] = {1, 1, 1};  // brick x = 1, y = 1, z = 0: counted
   v.tile[1 + 4 * 1] = 1;
-  v.tiles[{1, 1, 1}].assign(2 * 729, 0.0f);
+  v.tiles[{1, 1, 1}].f32.assign(2 * 729, 0.0f);
   const Storage s = storage_of(v, true);
   BOOST_TEST(s.samples_ratio == (512.0 + 8 + 729) / 512.0);
-  BOOST_TEST(s.bytes_ratio == (4.0 * (512 + 729) + 7 * 8) / (4.0 * 512));
+  BOOST_TEST(s.bytes_ratio == (4.0 * (512 + 729) + 9 * 8) / (4.0 * 512));
+}
+
+BOOST_AUTO_TEST_CASE(integer_samples_are_decoded_exactly_on_the_host) {
+  for (const SampleType type : {SampleType::u16, SampleType::u8}) {
+    const MixedVolume v = support::in_types(
+        support::random_mixed(grid_of({9, 5, 7}), 4, 4, {{0, 0, 0}, {1, 1, 1}, {0, 2, 1}}, 6), {type});
+    const std::vector<float> base = decoded(v.base, v.step);
+    for (std::size_t i = 0; i < base.size(); ++i)
+      BOOST_REQUIRE(static_cast<double>(base[i]) == reference::sample_of(v, v.base, i));
+    for (const auto& [triple, block] : v.tiles) {
+      const std::vector<float> tile = decoded(block, v.step);
+      for (std::size_t i = 0; i < tile.size(); ++i)
+        BOOST_REQUIRE(static_cast<double>(tile[i]) == reference::sample_of(v, block, i));
+    }
+    const Index3 bricks = v.bricks();
+    for (std::int64_t b = 0; b < v.brick_count(); ++b) {
+      const Index3 brick{b % bricks[0], b / bricks[0] % bricks[1], b / bricks[0] / bricks[1]};
+      const BrickSamples samples(v, brick);
+      for (std::int64_t z = 0; z <= samples.end()[2]; ++z)
+        for (std::int64_t y = 0; y <= samples.end()[1]; ++y)
+          for (std::int64_t x = 0; x <= samples.end()[0]; ++x)
+            BOOST_REQUIRE(static_cast<double>(samples(x, y, z)) ==
+                          reference::stored_sample(v, brick, {x, y, z}));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(storage_counts_integers_by_their_bytes_and_a_longer_record) {
+  const MixedVolume v =
+      support::in_types(support::random_mixed(grid_of({8, 8, 8}), 4, 2, {{1, 1, 1}}, 1), {SampleType::u8});
+  const Storage s =
+      storage_of(v, false);  // 9^3 base samples, 8 tiles, 8 records of 12 bytes and one of distance
+  BOOST_TEST(s.device_bytes == 729u + 8 * 729 + 8 * 13);
+  BOOST_TEST(s.bytes_ratio == (729.0 + 8 * 729 + 8 * 13) / (729.0 * 4));
+  BOOST_TEST(s.samples_ratio == (729.0 + 8 + 8 * 729) / 729.0);
 }

@@ -8,6 +8,7 @@
 #include "host/resident_volume.hpp"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/fields.hpp"
+#include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
@@ -209,31 +210,56 @@ BOOST_AUTO_TEST_CASE(wide_gradients_change_no_bit) {
 }
 
 BOOST_AUTO_TEST_CASE(samplers_agree_within_the_probe) {
-  const ResidentVolume v(device(), mixed_blob());
-  if (!v.has_image3d()) return;
   const SamplerProbe probe = probe_sampler(device());
-  for (const RenderMode mode : {RenderMode::dvr, RenderMode::mip, RenderMode::slice}) {
-    RenderOptions o = options_for(v.grid(), mode);
-    o.sampler = SamplerKind::buffer;
-    const auto by_buffer = raycast_float(device(), v, o);
-    const auto buffer_image = raycast(device(), v, o).image;
-    o.sampler = SamplerKind::image3d;
-    const auto by_image = raycast_float(device(), v, o);
-    const auto image_image = raycast(device(), v, o).image;
-    BOOST_TEST((by_image.sampler == SamplerKind::image3d));
-    // The field differs by delta per axis and unit difference, plus coordinate rounding in the atlas (2 n
-    // 2^-24 texels); neighbours differ by 0.4 at most here, values are at most 1.
-    const double n =
-        static_cast<double>(*std::max_element(v.impl().layout.size.begin(), v.impl().layout.size.end()));
-    const double field = 3 * (probe.delta + 2 * n * u) * 0.4 + probe.constant_error + 14 * u;
-    if (mode != RenderMode::dvr)
-      for (std::size_t i = 0; i < by_buffer.pixels.size(); ++i)
-        BOOST_REQUIRE(!(std::abs(static_cast<double>(by_buffer.pixels[i].s[3]) -
-                                 static_cast<double>(by_image.pixels[i].s[3])) > field));
-    int levels = 0;
-    for (std::size_t i = 0; i < buffer_image.rgb.size(); ++i)
-      levels = std::max(levels, std::abs(int{buffer_image.rgb[i]} - int{image_image.rgb[i]}));
-    if (probe.delta <= 0x1p-22) BOOST_TEST(levels <= 1);
+  for (const auto& types :
+       {std::vector{SampleType::f32}, std::vector{SampleType::u16}, std::vector{SampleType::u8},
+        std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
+    const ResidentVolume v(device(), support::in_types(mixed_blob(), types));
+    if (!v.has_image3d()) continue;
+    for (const RenderMode mode : {RenderMode::dvr, RenderMode::mip, RenderMode::slice}) {
+      RenderOptions o = options_for(v.grid(), mode);
+      o.sampler = SamplerKind::buffer;
+      const auto by_buffer = raycast_float(device(), v, o);
+      const auto buffer_image = raycast(device(), v, o).image;
+      o.sampler = SamplerKind::image3d;
+      const auto by_image = raycast_float(device(), v, o);
+      const auto image_image = raycast(device(), v, o).image;
+      BOOST_TEST((by_image.sampler == SamplerKind::image3d));
+      // The field differs by delta per axis and unit difference, plus coordinate rounding in the atlas (2 n
+      // 2^-24 texels); neighbours differ by 0.4 at most here, values are at most 1.
+      const auto n = static_cast<double>(v.impl().layout.longest());
+      const double delta = std::max({probe.delta, probe.u16.delta, probe.u8.delta});
+      const double field = 3 * (delta + 2 * n * u) * 0.4 + 14 * u +
+                           (probe.largest_constant_error() + 4 * u) * static_cast<double>(v.impl().largest);
+      if (mode != RenderMode::dvr)
+        for (std::size_t i = 0; i < by_buffer.pixels.size(); ++i)
+          BOOST_REQUIRE(!(std::abs(static_cast<double>(by_buffer.pixels[i].s[3]) -
+                                   static_cast<double>(by_image.pixels[i].s[3])) > field));
+      int levels = 0;
+      for (std::size_t i = 0; i < buffer_image.rgb.size(); ++i)
+        levels = std::max(levels, std::abs(int{buffer_image.rgb[i]} - int{image_image.rgb[i]}));
+      if (delta <= 0x1p-22) BOOST_TEST(levels <= 1);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(integer_samples_give_the_picture_of_their_decoded_values_to_the_bit) {
+  for (const auto& types : {std::vector{SampleType::u16}, std::vector{SampleType::u8},
+                            std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
+    const MixedVolume integers = support::in_types(mixed_blob(), types);
+    MixedVolume floats = integers;
+    floats.base = decoded(integers.base, integers.step);
+    for (auto& [triple, block] : floats.tiles) block = decoded(block, integers.step);
+    const ResidentVolume a(device(), integers), b(device(), floats);
+    BOOST_TEST(a.bytes() < b.bytes());
+    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+      for (const bool wide : {false, true}) {
+        RenderOptions o = options_for(a.grid(), mode);
+        o.iso = 0.5;
+        o.sampler = SamplerKind::buffer;
+        BOOST_TEST(same_bits(raycast_float(device(), a, o, {8, 8, wide}).pixels,
+                             raycast_float(device(), b, o, {8, 8, wide}).pixels));
+      }
   }
 }
 

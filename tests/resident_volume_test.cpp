@@ -5,6 +5,7 @@
 
 #include "host/resident_volume.hpp"
 #include "tests/support/fields.hpp"
+#include "tests/support/mixed_volumes.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
@@ -41,42 +42,55 @@ bool are_disjoint(const Box& a, const Box& b) {
   return false;
 }
 
-std::vector<Box> boxes_of(const MixedVolume& v, const AtlasLayout& l) {
+// What lies in the image of one type.
+std::vector<Box> boxes_of(const MixedVolume& v, const AtlasLayout& l, SampleType type) {
   const Index3 base = v.grid.samples();
-  std::vector<Box> boxes(1);
-  for (std::size_t a = 0; a < 3; ++a) boxes[0].hi[a] = static_cast<std::uint64_t>(base[a]);
-  for (const auto& [triple, s] : l.shelves)
+  std::vector<Box> boxes;
+  if (v.base.type == type) {
+    boxes.emplace_back();
+    for (std::size_t a = 0; a < 3; ++a) boxes[0].hi[a] = static_cast<std::uint64_t>(base[a]);
+  }
+  for (const auto& [triple, s] : l.shelves) {
+    if (v.tiles.at(triple).type != type) continue;
     for (std::uint64_t i = 0; i < s.tiles; ++i) {
       Box b{s.origin(i), {}};
       for (std::size_t a = 0; a < 3; ++a) b.hi[a] = b.lo[a] + s.tile[a];
       boxes.push_back(b);
     }
+  }
   return boxes;
 }
 
 ImageLimits limits(std::uint64_t x, std::uint64_t y, std::uint64_t z, std::uint64_t bytes = 1u << 30) {
-  return {true, {x, y, z}, bytes};
+  return {{true, true, true}, {x, y, z}, bytes, bytes};
 }
 
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(packed_tiles_are_disjoint_and_inside_tiny_limits) {
-  const MixedVolume v = many_tiles();
-  for (const auto& limit :
-       {limits(2048, 2048, 2048), limits(17, 400, 17), limits(14, 11 + 500, 20), limits(64, 64, 64)}) {
-    const AtlasLayout l = pack_atlas(v, limit);
-    BOOST_TEST_CONTEXT(l.reason) {
-      BOOST_REQUIRE(l.fits);
-      const auto boxes = boxes_of(v, l);
-      std::size_t tiles = 0;
-      for (const auto& [triple, samples] : v.tiles)
-        tiles += samples.size() / static_cast<std::size_t>(v.tile_size(triple));
-      BOOST_TEST(boxes.size() == tiles + 1);
-      for (std::size_t i = 0; i < boxes.size(); ++i) {
-        for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(boxes[i].hi[a] <= l.size[a]);
-        for (std::size_t j = 0; j < i; ++j) BOOST_TEST(are_disjoint(boxes[i], boxes[j]));
+  for (const auto& types : {std::vector{SampleType::f32}, std::vector{SampleType::u8},
+                            std::vector{SampleType::u8, SampleType::u16, SampleType::f32}}) {
+    const MixedVolume v = support::in_types(many_tiles(), types);
+    for (const auto& limit :
+         {limits(2048, 2048, 2048), limits(17, 400, 17), limits(14, 11 + 500, 20), limits(64, 64, 64)}) {
+      const AtlasLayout l = pack_atlas(v, limit);
+      BOOST_TEST_CONTEXT(l.reason) {
+        BOOST_REQUIRE(l.fits);
+        std::size_t placed = 0, tiles = 0;
+        for (const auto& [triple, samples] : v.tiles)
+          tiles += samples.size() / static_cast<std::size_t>(v.tile_size(triple));
+        for (const SampleType type : {SampleType::f32, SampleType::u16, SampleType::u8}) {
+          const auto boxes = boxes_of(v, l, type);
+          const auto& size = l.size[static_cast<std::size_t>(type)];
+          placed += boxes.size();
+          for (std::size_t i = 0; i < boxes.size(); ++i) {
+            for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(boxes[i].hi[a] <= size[a]);
+            for (std::size_t j = 0; j < i; ++j) BOOST_TEST(are_disjoint(boxes[i], boxes[j]));
+          }
+          for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(size[a] <= limit.size[a]);
+        }
+        BOOST_TEST(placed == tiles + 1);
       }
-      for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(l.size[a] <= limit.size[a]);
     }
   }
 }
@@ -92,7 +106,7 @@ BOOST_AUTO_TEST_CASE(what_does_not_fit_is_said_with_the_reason) {
   BOOST_TEST(!heavy.fits);
   BOOST_TEST(heavy.reason.find("bytes") != std::string::npos);
   ImageLimits none = limits(2048, 2048, 2048);
-  none.linear_float = false;
+  none.linear[0] = false;
   BOOST_TEST(pack_atlas(v, none).reason.find("linear") != std::string::npos);
 }
 

@@ -56,7 +56,7 @@ MixedVolume gold_volume(const ExactField& field, const Grid& grid, int granulari
   v.grid = grid;
   v.granularity = granularity;
   v.rate = rate;
-  v.base.assign(at(grid.sample_count()), 0.0f);
+  v.base.f32.assign(at(grid.sample_count()), 0.0f);
   const auto top = static_cast<std::uint8_t>(std::countr_zero(static_cast<unsigned>(rate)));
   const Index3 n = v.bricks();
   std::vector<Vec3> points;
@@ -75,7 +75,7 @@ MixedVolume gold_volume(const ExactField& field, const Grid& grid, int granulari
     }
   }
   const auto values = field.at(points);
-  auto& tiles = v.tiles[{top, top, top}];
+  auto& tiles = v.tiles[{top, top, top}].f32;
   tiles.assign(values.begin(), values.end());
   return v;
 }
@@ -87,8 +87,9 @@ struct Made {
 };
 
 Made made(const ProjectionSet& scan, const Index3& size, double epsilon, const RateOptions& rates = {},
-          const BuildOptions& options = {}) {
+          BuildOptions options = {}) {
   Device device;
+  options.storage = StorageChoice::f32;  // tests alter single samples
   GridOptions grid;
   grid.size = size;
   grid.spacing = 0.9;
@@ -123,7 +124,7 @@ std::size_t brick_with_tile(const MixedVolume& v) {
 
 float& middle_sample(MixedVolume& v, std::size_t brick) {
   const LevelTriple l = v.level[brick];
-  return v.tiles.at(l)[at(v.tile[brick] * v.tile_size(l) + v.tile_size(l) / 2)];
+  return v.tiles.at(l).f32[at(v.tile[brick] * v.tile_size(l) + v.tile_size(l) / 2)];
 }
 
 }  // namespace
@@ -166,7 +167,7 @@ BOOST_AUTO_TEST_CASE(bound_of_every_column_of_cells_covers_the_interpolation_err
       }
       VerifyField field(device.state(), exact, v, {}, {});
       double magnitude = 0;
-      for (const float s : v.tiles.begin()->second)
+      for (const float s : v.tiles.begin()->second.f32)
         magnitude = std::max(magnitude, std::abs(static_cast<double>(s)));
       const double sampler = 14 * tolerance::unit_roundoff * magnitude;  // docs/error-bounds.md, section 8
       std::int64_t compared = 0;
@@ -291,7 +292,7 @@ BOOST_AUTO_TEST_CASE(every_sample_that_errs_by_more_than_epsilon_is_found) {
     MixedVolume altered = m.volume;
     auto entry = std::next(altered.tiles.begin(), trial % static_cast<int>(altered.tiles.size()));
     const std::size_t i = random() % entry->second.size();
-    entry->second[i] += static_cast<float>((trial % 2 == 0 ? 2 : -2) * m.certificate.epsilon_abs);
+    entry->second.f32[i] += static_cast<float>((trial % 2 == 0 ? 2 : -2) * m.certificate.epsilon_abs);
     BOOST_TEST(!verify(device, m.scan, altered, m.certificate, {true, 0.1, 3}).holds);
   }
 }
@@ -314,7 +315,7 @@ BOOST_AUTO_TEST_CASE(difference_on_a_shared_face_is_found_within_epsilon) {
   MixedVolume altered = m.volume;
   const std::size_t brick = brick_with_tile(altered);
   const LevelTriple l = altered.level[brick];
-  float& corner = altered.tiles.at(l)[at(altered.tile[brick] * altered.tile_size(l))];
+  float& corner = altered.tiles.at(l).f32[at(altered.tile[brick] * altered.tile_size(l))];
   corner = std::nextafter(corner, INFINITY);
   BOOST_TEST(compare_seams(m.volume).different == 0);
   BOOST_TEST(compare_seams(altered).different > 0);

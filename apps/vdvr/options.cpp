@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "vdvr/error.hpp"
 
@@ -22,12 +23,32 @@ const std::vector<Limited> kBuildLimits{
     {"closing",
      {"coarse", "paper", "none"},
      {"coarse", "paper", "none"},
-     "how bricks of different levels meet"},
-    {"coefficients", {"midrange", "sampled"}, {"midrange", "sampled"}, "what the stored samples are"},
+     "how bricks of different levels meet (default coarse; none is for comparison, never certified)"},
+    {"coefficients",
+     {"midrange", "sampled"},
+     {"midrange", "sampled"},
+     "samples fitted to the trilinear filter, or F at the nodes (default midrange)"},
     {"levels", {"isotropic", "anisotropic"}, {"isotropic"}, "levels per brick or per axis"},
-    {"storage", {"auto", "f32", "u16", "u8"}, {"auto", "f32"}, "sample type of base and tiles"},
-    {"terms", {"all", "grid"}, {"all", "grid"}, "error terms that are charged"},
-    {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of"}};
+    {"storage",
+     {"auto", "f32", "u16", "u8"},
+     {"auto", "f32", "u16", "u8"},
+     "sample type of base and tiles (default auto)"},
+    {"terms",
+     {"all", "grid"},
+     {"all", "grid"},
+     "error terms that are charged (default all; grid is for comparison, never certified)"},
+    {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of (default range)"}};
+
+const std::map<std::string, Closing> kClosings{
+    {"coarse", Closing::coarse}, {"paper", Closing::paper}, {"none", Closing::none}};
+const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::automatic},
+                                                    {"f32", StorageChoice::f32},
+                                                    {"u16", StorageChoice::u16},
+                                                    {"u8", StorageChoice::u8}};
+template <class T>
+std::string name_in(const std::map<std::string, T>& names, T value) {
+  return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; })->first;
+}
 
 bool is_power_of_two(std::int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
@@ -185,7 +206,9 @@ BuildOptions build_options(const Arguments& args) {
   refuse(args, {"resume"}, "this version cannot resume; start again without it");
   const bool paper = args.has("paper");
   BuildOptions build;
-  build.closing = args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse");
+  build.closing =
+      kClosings.at(args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse"));
+  build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
   build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
   if (!is_power_of_two(build.granularity))
     throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", build.granularity));
@@ -210,7 +233,7 @@ PlanSettings plan_settings(const Arguments& args) {
       args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
   settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
   settings.granularity = build_options(args).granularity;
-  if (settings.coefficients == "midrange" && build_options(args).closing == "paper")
+  if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
         "coarse");
@@ -221,10 +244,10 @@ std::string options_json(const Plan& plan, const BuildOptions& build, bool epsil
                          const ParallelGeometry& geometry, double center) {
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
-  j["closing"] = build.closing;
+  j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = plan.settings.coefficients;
   j["levels"] = "isotropic";
-  j["storage"] = "f32";
+  j["storage"] = name_in(kStorage, build.storage);
   j["terms"] = plan.settings.terms;
   j["epsilon_of"] = epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.upsampling_u;

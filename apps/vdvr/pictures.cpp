@@ -22,7 +22,8 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
       // The base samples alone are an ordinary volume; the certificate says nothing about their
       // interpolation.
       if (method == "dvr")
-        return {as_mixed({file.volume.grid, std::move(file.volume.base)}), std::nullopt, false};
+        return {as_mixed({file.volume.grid, decoded(file.volume.base, file.volume.step)}), std::nullopt,
+                false};
       return {std::move(file.volume), std::move(file.certificate), !unverified};
     }
     case InputKind::volume:
@@ -73,27 +74,27 @@ std::size_t quantile_bin(const Histogram& histogram, double q) {
   return bin;
 }
 
-Vec3 centroid_above(const MixedVolume& volume, double threshold) {
-  const Index3 n = volume.grid.samples();
+Vec3 centroid_above(const Grid& grid, const std::vector<float>& base, double threshold) {
+  const Index3 n = grid.samples();
   std::array<double, 3> sum{};
   double count = 0;
   std::size_t i = 0;
   for (std::int64_t z = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x, ++i) {
-        if (!(static_cast<double>(volume.base[i]) >= threshold)) continue;
-        const Vec3 p = volume.grid.position({x, y, z});
+        if (!(static_cast<double>(base[i]) >= threshold)) continue;
+        const Vec3 p = grid.position({x, y, z});
         for (std::size_t a = 0; a < 3; ++a) sum[a] += p[a];
         count += 1;
       }
-  if (count == 0) return volume.grid.position({n[0] / 2, n[1] / 2, n[2] / 2});
+  if (count == 0) return grid.position({n[0] / 2, n[1] / 2, n[2] / 2});
   return {sum[0] / count, sum[1] / count, sum[2] / count};
 }
 
 }  // namespace
 
 Brightness brightness_of(const MixedVolume& volume) {
-  const auto& base = volume.base;
+  const std::vector<float> base = decoded(volume.base, volume.step);
   const auto [least, largest] = std::minmax_element(base.begin(), base.end());
   const double lo = static_cast<double>(*least), hi = static_cast<double>(*largest);
   Brightness b{lo, hi, lo, hi, 0.5 * (lo + hi), lo, {}};
@@ -112,7 +113,7 @@ Brightness brightness_of(const MixedVolume& volume) {
     b.grey_hi = std::max(value(quantile_bin(histogram, 0.99)), b.soft);
     if (!(b.grey_hi > b.grey_lo)) b.grey_hi = hi;
   }
-  b.dense_center = centroid_above(volume, b.threshold);
+  b.dense_center = centroid_above(volume.grid, base, b.threshold);
   return b;
 }
 

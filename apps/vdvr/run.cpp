@@ -144,7 +144,7 @@ int run_command(Arguments& args) {
   const CommonOptions common = common_options(args);
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;
-  if (options.plan.terms != "all" || options.build.closing == "none")
+  if (options.plan.terms != "all" || options.build.closing == Closing::none)
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto input = args.path("IN"), output = args.path("output");
   kind_of(input, args);

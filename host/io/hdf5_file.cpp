@@ -82,6 +82,7 @@ Element element_of(hid_t type) {
   const H5T_class_t c = H5Tget_class(type);
   const std::size_t size = H5Tget_size(type);
   if (c == H5T_FLOAT && H5Tequal(type, H5T_IEEE_F32LE) > 0) return Element::f32;
+  if (c == H5T_INTEGER && H5Tequal(type, H5T_STD_I32LE) > 0) return Element::i32;
   if (c != H5T_INTEGER || H5Tget_sign(type) != H5T_SGN_NONE) return Element::other;
   if (size == 1) return Element::u8;
   if (H5Tget_order(type) != H5T_ORDER_LE) return Element::other;
@@ -107,6 +108,8 @@ hid_t native_type(Element e) {
       return H5T_NATIVE_UINT8;
     case Element::u16:
       return H5T_NATIVE_UINT16;
+    case Element::i32:
+      return H5T_NATIVE_INT32;
     default:
       return H5T_NATIVE_UINT32;
   }
@@ -208,6 +211,11 @@ void Writer::attribute(const std::string& object, const std::string& name,
                    values.data());
 }
 
+void Writer::attribute(const std::string& object, const std::string& name, double value) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  create_attribute(object, name, H5T_IEEE_F64LE, space.get(), H5T_NATIVE_DOUBLE, &value);
+}
+
 void Writer::attribute(const std::string& object, const std::string& name, std::span<const double> values) {
   create_attribute(object, name, H5T_IEEE_F64LE, simple_space({values.size()}).get(), H5T_NATIVE_DOUBLE,
                    values.data());
@@ -241,6 +249,12 @@ void Writer::dataset(const std::string& path, const Shape& shape, std::span<cons
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint8_t> values) {
   create_dataset(path, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, 1, values.data());
+}
+void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint16_t> values) {
+  create_dataset(path, shape, H5T_STD_U16LE, H5T_NATIVE_UINT16, 2, values.data());
+}
+void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::int32_t> values) {
+  create_dataset(path, shape, H5T_STD_I32LE, H5T_NATIVE_INT32, 4, values.data());
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint32_t> values) {
   create_dataset(path, shape, H5T_STD_U32LE, H5T_NATIVE_UINT32, 4, values.data());

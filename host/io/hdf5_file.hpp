@@ -61,11 +61,14 @@ class Writer {
 
   void group(const std::string& path);
   void attribute(const std::string& object, const std::string& name, std::int64_t value);
+  void attribute(const std::string& object, const std::string& name, double value);
   void attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values);
   void attribute(const std::string& object, const std::string& name, std::span<const double> values);
   void attribute(const std::string& object, const std::string& name, const std::string& text);
   void dataset(const std::string& path, const Shape& shape, std::span<const float> values);
   void dataset(const std::string& path, const Shape& shape, std::span<const std::uint8_t> values);
+  void dataset(const std::string& path, const Shape& shape, std::span<const std::uint16_t> values);
+  void dataset(const std::string& path, const Shape& shape, std::span<const std::int32_t> values);
   void dataset(const std::string& path, const Shape& shape, std::span<const std::uint32_t> values);
   /// A scalar string kept in its object header, where HDF5's checksum covers it; longer than 60,000 bytes,
   /// where a header cannot hold it, a string dataset of one element under Fletcher32.
@@ -85,7 +88,7 @@ class Writer {
   Handle file_;
 };
 
-enum class Element { f32, u8, u16, u32, other };
+enum class Element { f32, u8, u16, u32, i32, other };
 
 /// A dataset whose declaration was checked: chunked, Fletcher32 alone, every chunk stored, shape without a
 /// zero.

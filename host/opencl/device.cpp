@@ -80,12 +80,12 @@ namespace {
 
 using Found = std::vector<std::pair<cl::Device, DeviceInfo>>;
 
-bool has_linear_float_image(const cl::Device& device) {
+bool has_linear_image(const cl::Device& device, cl_channel_type type) {
   const cl::Context context(device);
   std::vector<cl::ImageFormat> formats;
   context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
-  return std::any_of(formats.begin(), formats.end(), [](const cl::ImageFormat& f) {
-    return f.image_channel_order == CL_R && f.image_channel_data_type == CL_FLOAT;
+  return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
+    return f.image_channel_order == CL_R && f.image_channel_data_type == type;
   });
 }
 
@@ -115,7 +115,9 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int 
     d.image3d_max[0] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_WIDTH>();
     d.image3d_max[1] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_HEIGHT>();
     d.image3d_max[2] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_DEPTH>();
-    d.linear_float_image = has_linear_float_image(device);
+    d.linear_float_image = has_linear_image(device, CL_FLOAT);
+    d.linear_u16_image = has_linear_image(device, CL_UNORM_INT16);
+    d.linear_u8_image = has_linear_image(device, CL_UNORM_INT8);
   }
   return d;
 }

@@ -12,16 +12,23 @@
 
 namespace vdvr {
 
+/// How bricks of different levels meet (docs/error-bounds.md, sections on closing). `none` leaves the field
+/// discontinuous: for comparison, never certified.
+enum class Closing { coarse, paper, none };
+/// Sample types of base and tiles (docs/file-format.md, storage).
+enum class StorageChoice { automatic, f32, u16, u8 };
+
 struct BuildOptions {
   int granularity = 4;
   std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify and count only bricks inside
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
-  std::string closing = "coarse";                   ///< coarse | paper | none
+  Closing closing = Closing::coarse;
+  StorageChoice storage = StorageChoice::automatic;
 };
 
 /// Whether these options make a volume to compare with, which no certificate goes with.
 inline bool is_comparison(const Plan& plan, const BuildOptions& options) {
-  return plan.settings.terms != "all" || options.closing == "none";
+  return plan.settings.terms != "all" || options.closing == Closing::none;
 }
 
 struct BuildResult {

@@ -18,6 +18,8 @@ struct DeviceInfo {
   bool is_gpu = false, is_cpu = false;
   bool images = false;              ///< 3D images at all
   bool linear_float_image = false;  ///< CL_R / CL_FLOAT 3D image readable with the linear filter
+  bool linear_u16_image = false;    ///< the same for CL_R / CL_UNORM_INT16
+  bool linear_u8_image = false;     ///< the same for CL_R / CL_UNORM_INT8
   std::uint64_t global_memory = 0, max_allocation = 0, local_memory = 0;
   std::uint32_t compute_units = 0, max_work_group = 0;
   std::uint64_t image3d_max[3] = {0, 0, 0};

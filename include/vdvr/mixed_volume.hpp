@@ -1,14 +1,15 @@
 // The certified volume: base samples, an index of bricks, and tiles per level triple (docs/file-format.md).
 //
 // A brick is granularity^3 base cells. Its level triple (lz, ly, lx) sets the spacing spacing / 2^l per axis.
-// A brick of level (0,0,0) reads `base`; any other reads tile number `tile` of its triple: float
+// A brick of level (0,0,0) reads `base`; any other reads tile number `tile` of its triple:
 // tile[g*2^lz+1][g*2^ly+1][g*2^lx+1], on the brick's closed box. Beyond the grid a tile repeats its last
-// plane, which is never read.
+// plane, which is never read. Base and tiles are float32, or integers on one lattice.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "vdvr/grid.hpp"
@@ -18,14 +19,47 @@ namespace vdvr {
 /// Levels per axis in file order: z, y, x.
 using LevelTriple = std::array<std::uint8_t, 3>;
 
+enum class SampleType : std::uint8_t { f32, u16, u8 };  // the order of kernels/shared/mixed_sampler.h
+/// "f32", "u16", "u8".
+const char* text_of(SampleType type);
+
+/// Stored samples of equal tiles (the base volume is one tile) in the vector that `type` names; the others
+/// are empty. An integer stands for step * (offset + stored * 2^shift), offset and shift those of its tile:
+/// |offset + stored * 2^shift| < 2^24 and step is a power of two, so that every sample is exact in fp32.
+struct SampleBlock {
+  SampleType type = SampleType::f32;
+  std::vector<float> f32;
+  std::vector<std::uint16_t> u16;
+  std::vector<std::uint8_t> u8;
+  std::vector<std::int32_t> offset;  ///< per tile, a multiple of 2^shift; integers only
+  std::vector<std::uint8_t> shift;   ///< per tile, at most 24; integers only
+
+  SampleBlock() = default;
+  SampleBlock(std::vector<float> samples) : f32(std::move(samples)) {}
+  [[nodiscard]] std::uint64_t size() const {
+    return type == SampleType::f32 ? f32.size() : type == SampleType::u16 ? u16.size() : u8.size();
+  }
+  [[nodiscard]] std::uint64_t sample_bytes() const {
+    return type == SampleType::f32 ? sizeof(float) : type == SampleType::u16 ? 2 : 1;
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return size() * sample_bytes(); }  ///< without offset and shift
+  [[nodiscard]] const void* data() const {
+    if (type == SampleType::f32) return f32.data();
+    return type == SampleType::u16 ? static_cast<const void*>(u16.data()) : u8.data();
+  }
+};
+/// All samples of a block as floats, exactly. `step` as in MixedVolume.
+std::vector<float> decoded(const SampleBlock& block, double step);
+
 struct MixedVolume {
   Grid grid;
   int granularity = 4;
-  int rate = 1;                                     ///< gold rate: no level is finer than log2(rate)
-  std::vector<float> base;                          ///< [nz+1][ny+1][nx+1]
-  std::vector<LevelTriple> level;                   ///< [bz][by][bx]
-  std::vector<std::uint32_t> tile;                  ///< [bz][by][bx]
-  std::map<LevelTriple, std::vector<float>> tiles;  ///< per triple: [count][sz][sy][sx]
+  int rate = 1;                              ///< gold rate: no level is finer than log2(rate)
+  SampleBlock base;                          ///< [nz+1][ny+1][nx+1]
+  std::vector<LevelTriple> level;            ///< [bz][by][bx]
+  std::vector<std::uint32_t> tile;           ///< [bz][by][bx]
+  std::map<LevelTriple, SampleBlock> tiles;  ///< per triple: [count][sz][sy][sx]
+  double step = 0;                           ///< of the lattice of integer samples; 0 where there are none
 
   /// ceil(cells / granularity) per axis x, y, z.
   [[nodiscard]] Index3 bricks() const {

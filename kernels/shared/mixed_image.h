@@ -1,7 +1,8 @@
-// The field of mixed_sampler.h read through the texture unit: one 3D image (the atlas) holds the base volume
-// and all tiles, a brick's first sample at texel centre (texel_x, texel_y, texel_z). Same bricks, same local
-// coordinates, same weights up to the unit's own precision, which the certificate charges as its image3d
-// sampler term (docs/error-bounds.md). OpenCL only, with VDVR_SAMPLER_IMAGE3D. Included by raycast.cl.
+// The field of mixed_sampler.h read through the texture unit: one 3D image (atlas) per sample type holds the
+// base volume and tiles of that type. A brick's record names the texel of its first sample. Same bricks, same
+// local coordinates, same weights up to the unit's own precision, which the certificate charges as its
+// image3d sampler term (docs/error-bounds.md). OpenCL only, with VDVR_SAMPLER_IMAGE3D. Included by
+// raycast.cl.
 #ifndef VDVR_MIXED_IMAGE_H
 #define VDVR_MIXED_IMAGE_H
 #if defined(VDVR_DIALECT_OPENCL) && defined(VDVR_SAMPLER_IMAGE3D)
@@ -21,13 +22,23 @@ VDVR_INLINE float vdvr_texel(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 granu
   return texel + (r < 0.0f ? 0.0f : (r > last ? last : r));
 }
 
-VDVR_INLINE float vdvr_image_sample_in_brick(__read_only image3d_t atlas, const VdvrBrick* b, VdvrGrid grid,
+// The texel of a brick's first sample, packed into its place: 15 bits x, 16 bits y, 16 bits z.
+VDVR_INLINE float vdvr_image_sample_in_brick(__read_only image3d_t f32, __read_only image3d_t u16,
+                                             __read_only image3d_t u8, const VdvrBrick* b, VdvrGrid grid,
                                              vdvr_i32 bx, vdvr_i32 by, vdvr_i32 bz, float cx, float cy,
                                              float cz) {
-  const float x = vdvr_texel(cx, bx, b->level_x, grid.granularity, grid.cells_x, b->texel_x);
-  const float y = vdvr_texel(cy, by, b->level_y, grid.granularity, grid.cells_y, b->texel_y);
-  const float z = vdvr_texel(cz, bz, b->level_z, grid.granularity, grid.cells_z, b->texel_z);
-  return read_imagef(atlas, vdvr_linear, (float4)(x, y, z, 0.0f)).x;
+  const float x =
+      vdvr_texel(cx, bx, b->level_x, grid.granularity, grid.cells_x, (float)(b->place & 0x7fffu) + 0.5f);
+  const float y = vdvr_texel(cy, by, b->level_y, grid.granularity, grid.cells_y,
+                             (float)(b->place >> 15 & 0xffffu) + 0.5f);
+  const float z = vdvr_texel(cz, bz, b->level_z, grid.granularity, grid.cells_z,
+                             (float)(b->place >> 31 & 0xffffu) + 0.5f);
+  const float4 texel = (float4)(x, y, z, 0.0f);
+  // The filter of a normalised format returns stored / largest.
+  if (VDVR_HOLDS(*b, VDVR_F32)) return read_imagef(f32, vdvr_linear, texel).x;
+  if (VDVR_HOLDS(*b, VDVR_U16))
+    return read_imagef(u16, vdvr_linear, texel).x * (65535.0f * b->scale) + b->bias;
+  return read_imagef(u8, vdvr_linear, texel).x * (255.0f * b->scale) + b->bias;
 }
 
 #endif

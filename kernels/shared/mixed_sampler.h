@@ -17,6 +17,8 @@
 #define VDVR_INLINE inline
 typedef ulong vdvr_u64;
 typedef uint vdvr_u32;
+typedef ushort vdvr_u16;
+typedef uchar vdvr_u8;
 typedef int vdvr_i32;
 #elif defined(VDVR_DIALECT_HOST)
 #include <cstdint>
@@ -24,20 +26,37 @@ typedef int vdvr_i32;
 #define VDVR_INLINE inline
 typedef std::uint64_t vdvr_u64;
 typedef std::uint32_t vdvr_u32;
+typedef std::uint16_t vdvr_u16;
+typedef std::uint8_t vdvr_u8;
 typedef std::int32_t vdvr_i32;
 #else
 #error "declare VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST before including mixed_sampler.h"
 #endif
 
-// Where a brick's samples lie. 48 bytes; host/resident_volume.cpp fills it and checks the layout.
+// Sample types. The includer says which occur: VDVR_SAMPLE_TYPES, the sum of 1 << type over them, so that a
+// volume of one type is read without asking for it.
+#define VDVR_F32 0
+#define VDVR_U16 1
+#define VDVR_U8 2
+#ifndef VDVR_SAMPLE_TYPES
+#error "VDVR_SAMPLE_TYPES (the sum of 1 << type over the types in use) must be defined"
+#endif
+#define VDVR_HOLDS(b, t) \
+  (VDVR_SAMPLE_TYPES == (1 << (t)) || ((VDVR_SAMPLE_TYPES & (1 << (t))) != 0 && (b).type == (t)))
+
+// A brick's record is two words, three where integers occur: low word of its place; bits; offset on the
+// lattice. bits: level x 3, level y 3, level z 3, base_around 1, type 2, shift 5, high bits of its place 15.
+#define VDVR_BRICK_WORDS (VDVR_SAMPLE_TYPES == 1 ? 2 : 3)
+
+// A record, unpacked.
 typedef struct {
-  vdvr_u64 offset;    // of its first sample in the sample buffer, in floats
-  vdvr_u32 stride_y;  // in floats; stride_x is 1
+  vdvr_u64 place;  // number of its first sample, in samples of its type from the buffer's start; or its texel
+  vdvr_u32 stride_y;  // in samples; stride_x is 1
   vdvr_u32 stride_z;
   vdvr_u32 level_x, level_y, level_z;
   vdvr_u32 base_around;  // 1: this brick and those across its faces read the base (for raycast.cl; else 0)
-  float texel_x, texel_y, texel_z;  // of its first sample in the image3d atlas, at the texel's centre
-  float pad1;
+  vdvr_u32 type;
+  float scale, bias;  // sample = stored * scale + bias, for integers
 } VdvrBrick;
 
 // The grid and its bricks. 32 bytes.
@@ -45,8 +64,34 @@ typedef struct {
   vdvr_i32 cells_x, cells_y, cells_z;
   vdvr_i32 granularity;
   vdvr_i32 bricks_x, bricks_y, bricks_z;
-  vdvr_i32 pad0;
+  float step;  // of the lattice that integer samples lie on: a power of two
 } VdvrGrid;
+
+// Scale and bias are a power of two and a multiple of step below 2^24 steps: exact, as is every sample.
+VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u32 low, vdvr_u32 bits, vdvr_i32 offset, VdvrGrid grid) {
+  VdvrBrick b;
+  b.level_x = bits & 7u;
+  b.level_y = bits >> 3 & 7u;
+  b.level_z = bits >> 6 & 7u;
+  b.base_around = bits >> 9 & 1u;
+  b.type = bits >> 10 & 3u;
+  b.place = (vdvr_u64)(bits >> 17) << 32 | low;
+  if ((bits & 511u) == 0u) {
+    b.stride_y = (vdvr_u32)grid.cells_x + 1u;
+    b.stride_z = b.stride_y * ((vdvr_u32)grid.cells_y + 1u);
+  } else {
+    b.stride_y = ((vdvr_u32)grid.granularity << b.level_x) + 1u;
+    b.stride_z = b.stride_y * (((vdvr_u32)grid.granularity << b.level_y) + 1u);
+  }
+  b.scale = grid.step * (float)(1 << (bits >> 12 & 31u));
+  b.bias = grid.step * (float)offset;
+  return b;
+}
+
+VDVR_INLINE VdvrBrick vdvr_brick(VDVR_GLOBAL const vdvr_u32* records, VdvrGrid grid, vdvr_u64 brick) {
+  VDVR_GLOBAL const vdvr_u32* r = records + brick * VDVR_BRICK_WORDS;
+  return vdvr_unpack(r[0], r[1], VDVR_BRICK_WORDS == 3 ? (vdvr_i32)r[VDVR_BRICK_WORDS - 1] : 0, grid);
+}
 
 // A cell coordinate inside one brick along one axis: the sample below it and the fraction above that.
 typedef struct {
@@ -78,36 +123,67 @@ VDVR_INLINE VdvrLocal vdvr_local(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 g
   return l;
 }
 
-// Bilinear interpolation in the lower z face of the cell whose lowest sample is `s`: x first, then y.
-VDVR_INLINE float vdvr_bilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, float fx, float fy) {
-  return vdvr_lerp(vdvr_lerp(s[0], s[1], fx), vdvr_lerp(s[stride_y], s[stride_y + 1], fx), fy);
+// Stored samples are decoded one by one, exactly, and interpolated after that: bricks that hold the same
+// samples in other types or on other offsets give the same bits.
+#define VDVR_AS_IS(stored) (stored)
+#define VDVR_DECODED(stored) ((float)(stored)*scale + bias)
+// vdvr_bilinear_*: in the lower z face of the cell whose lowest sample is s[0]: x first, then y.
+// vdvr_trilinear_*: in that cell: x first, then y, then z.
+#define VDVR_DEFINE_INTERPOLATION(NAME, TYPE, READ)                                                        \
+  VDVR_INLINE float vdvr_bilinear_##NAME(VDVR_GLOBAL const TYPE* s, vdvr_u32 stride_y, float scale,        \
+                                         float bias, float fx, float fy) {                                 \
+    (void)scale, (void)bias;                                                                               \
+    return vdvr_lerp(vdvr_lerp(READ(s[0]), READ(s[1]), fx),                                                \
+                     vdvr_lerp(READ(s[stride_y]), READ(s[stride_y + 1]), fx), fy);                         \
+  }                                                                                                        \
+  VDVR_INLINE float vdvr_trilinear_##NAME(VDVR_GLOBAL const TYPE* s, vdvr_u32 stride_y, vdvr_u32 stride_z, \
+                                          float scale, float bias, float fx, float fy, float fz) {         \
+    return vdvr_lerp(vdvr_bilinear_##NAME(s, stride_y, scale, bias, fx, fy),                               \
+                     vdvr_bilinear_##NAME(s + stride_z, stride_y, scale, bias, fx, fy), fz);               \
+  }
+VDVR_DEFINE_INTERPOLATION(f32, float, VDVR_AS_IS)
+VDVR_DEFINE_INTERPOLATION(u16, vdvr_u16, VDVR_DECODED)
+VDVR_DEFINE_INTERPOLATION(u8, vdvr_u8, VDVR_DECODED)
+
+// Bilinear interpolation among a brick's samples of z index `z`.
+VDVR_INLINE float vdvr_sample_in_plane(VDVR_GLOBAL const void* samples, VdvrBrick b, VdvrLocal x, VdvrLocal y,
+                                       vdvr_i32 z) {
+  const vdvr_u64 i = b.place + (vdvr_u64)z * b.stride_z + (vdvr_u64)y.index * b.stride_y + (vdvr_u64)x.index;
+  if (VDVR_HOLDS(b, VDVR_F32))
+    return vdvr_bilinear_f32((VDVR_GLOBAL const float*)samples + i, b.stride_y, b.scale, b.bias, x.fraction,
+                             y.fraction);
+  if (VDVR_HOLDS(b, VDVR_U16))
+    return vdvr_bilinear_u16((VDVR_GLOBAL const vdvr_u16*)samples + i, b.stride_y, b.scale, b.bias,
+                             x.fraction, y.fraction);
+  return vdvr_bilinear_u8((VDVR_GLOBAL const vdvr_u8*)samples + i, b.stride_y, b.scale, b.bias, x.fraction,
+                          y.fraction);
 }
 
-// Trilinear interpolation in that cell: x first, then y, then z.
-VDVR_INLINE float vdvr_trilinear(VDVR_GLOBAL const float* s, vdvr_u32 stride_y, vdvr_u32 stride_z, float fx,
-                                 float fy, float fz) {
-  return vdvr_lerp(vdvr_bilinear(s, stride_y, fx, fy), vdvr_bilinear(s + stride_z, stride_y, fx, fy), fz);
-}
-
-// The field at a cell coordinate of a known brick; `first` is the brick's first sample.
-VDVR_INLINE float vdvr_sample_in_brick(VDVR_GLOBAL const float* first, vdvr_u32 stride_y, vdvr_u32 stride_z,
-                                       VdvrLocal x, VdvrLocal y, VdvrLocal z) {
-  return vdvr_trilinear(
-      first + (vdvr_u64)z.index * stride_z + (vdvr_u64)y.index * stride_y + (vdvr_u64)x.index, stride_y,
-      stride_z, x.fraction, y.fraction, z.fraction);
+// The field at a cell coordinate of a known brick.
+VDVR_INLINE float vdvr_sample_in_brick(VDVR_GLOBAL const void* samples, VdvrBrick b, VdvrLocal x, VdvrLocal y,
+                                       VdvrLocal z) {
+  const vdvr_u64 i =
+      b.place + (vdvr_u64)z.index * b.stride_z + (vdvr_u64)y.index * b.stride_y + (vdvr_u64)x.index;
+  if (VDVR_HOLDS(b, VDVR_F32))
+    return vdvr_trilinear_f32((VDVR_GLOBAL const float*)samples + i, b.stride_y, b.stride_z, b.scale, b.bias,
+                              x.fraction, y.fraction, z.fraction);
+  if (VDVR_HOLDS(b, VDVR_U16))
+    return vdvr_trilinear_u16((VDVR_GLOBAL const vdvr_u16*)samples + i, b.stride_y, b.stride_z, b.scale,
+                              b.bias, x.fraction, y.fraction, z.fraction);
+  return vdvr_trilinear_u8((VDVR_GLOBAL const vdvr_u8*)samples + i, b.stride_y, b.stride_z, b.scale, b.bias,
+                           x.fraction, y.fraction, z.fraction);
 }
 
 // The field at a cell coordinate: finds the brick, then samples it.
-VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const float* samples, VDVR_GLOBAL const VdvrBrick* bricks,
+VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const void* samples, VDVR_GLOBAL const vdvr_u32* records,
                               VdvrGrid grid, float cx, float cy, float cz) {
   const vdvr_i32 bx = vdvr_brick_of(cx, grid.granularity, grid.bricks_x);
   const vdvr_i32 by = vdvr_brick_of(cy, grid.granularity, grid.bricks_y);
   const vdvr_i32 bz = vdvr_brick_of(cz, grid.granularity, grid.bricks_z);
-  const VdvrBrick b =
-      bricks[((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x +
-             (vdvr_u64)bx];
-  return vdvr_sample_in_brick(samples + b.offset, b.stride_y, b.stride_z,
-                              vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x),
+  const VdvrBrick b = vdvr_brick(
+      records, grid,
+      ((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x + (vdvr_u64)bx);
+  return vdvr_sample_in_brick(samples, b, vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x),
                               vdvr_local(cy, by, b.level_y, grid.granularity, grid.cells_y),
                               vdvr_local(cz, bz, b.level_z, grid.granularity, grid.cells_z));
 }

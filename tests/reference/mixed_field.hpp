@@ -10,6 +10,14 @@
 
 namespace vdvr::reference {
 
+/// Sample i of a block, from the text of docs/file-format.md: step * (offset + stored * 2^shift).
+inline double sample_of(const MixedVolume& v, const SampleBlock& b, std::size_t i) {
+  if (b.type == SampleType::f32) return static_cast<double>(b.f32.at(i));
+  const std::size_t tile = i / (b.size() / b.offset.size());
+  const double stored = b.type == SampleType::u16 ? b.u16.at(i) : b.u8.at(i);
+  return v.step * (b.offset.at(tile) + stored * std::ldexp(1.0, b.shift.at(tile)));
+}
+
 /// The stored sample number `sample` (x, y, z) of a brick at the brick's own level.
 inline double stored_sample(const MixedVolume& v, const Index3& brick, const Index3& sample) {
   const Index3 bricks = v.bricks(), n = v.grid.samples();
@@ -19,13 +27,13 @@ inline double stored_sample(const MixedVolume& v, const Index3& brick, const Ind
     const std::int64_t g = v.granularity;
     const std::int64_t x = brick[0] * g + sample[0], y = brick[1] * g + sample[1],
                        z = brick[2] * g + sample[2];
-    return static_cast<double>(v.base.at(static_cast<std::size_t>(x + n[0] * (y + n[1] * z))));
+    return sample_of(v, v.base, static_cast<std::size_t>(x + n[0] * (y + n[1] * z)));
   }
   const std::int64_t sx = (v.granularity << l[2]) + 1, sy = (v.granularity << l[1]) + 1,
                      sz = (v.granularity << l[0]) + 1;
   const std::int64_t first = static_cast<std::int64_t>(v.tile.at(b)) * sz * sy * sx;
-  return static_cast<double>(
-      v.tiles.at(l).at(static_cast<std::size_t>(first + sample[0] + sx * (sample[1] + sy * sample[2]))));
+  return sample_of(v, v.tiles.at(l),
+                   static_cast<std::size_t>(first + sample[0] + sx * (sample[1] + sy * sample[2])));
 }
 
 /// The brick a cell coordinate belongs to along one axis: half-open, the last brick closed.

@@ -60,7 +60,7 @@ inline MixedVolume mixed(const Grid& grid, int granularity, const LevelOf& level
         const LevelTriple level = level_of({x, y, z});
         m.level[i] = level;
         if (level == LevelTriple{0, 0, 0}) continue;
-        auto& tiles = m.tiles[level];
+        auto& tiles = m.tiles[level].f32;
         m.tile[i] = static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles.size()) / m.tile_size(level));
         const auto tile = tile_of(grid, granularity, {x, y, z}, level, f);
         tiles.insert(tiles.end(), tile.begin(), tile.end());

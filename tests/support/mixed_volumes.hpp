@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <numeric>
 #include <random>
@@ -17,7 +18,7 @@ inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate,
   v.grid = grid;
   v.granularity = granularity;
   v.rate = rate;
-  v.base.assign(static_cast<std::size_t>(grid.sample_count()), 0.0f);
+  v.base.f32.assign(static_cast<std::size_t>(grid.sample_count()), 0.0f);
   std::mt19937 random(seed);
   std::uniform_int_distribution<std::size_t> pick(0, triples.size() - 1);
   std::map<LevelTriple, std::vector<std::size_t>> bricks_of;
@@ -30,7 +31,7 @@ inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate,
     if (triple == LevelTriple{0, 0, 0}) continue;
     std::shuffle(bricks.begin(), bricks.end(), random);
     for (std::size_t t = 0; t < bricks.size(); ++t) v.tile[bricks[t]] = static_cast<std::uint32_t>(t);
-    v.tiles[triple].assign(bricks.size() * static_cast<std::size_t>(v.tile_size(triple)), 0.0f);
+    v.tiles[triple].f32.assign(bricks.size() * static_cast<std::size_t>(v.tile_size(triple)), 0.0f);
   }
   return v;
 }
@@ -41,9 +42,9 @@ inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate,
   MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed);
   std::mt19937 random(seed + 1);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
-  for (float& s : v.base) s = value(random);
+  for (float& s : v.base.f32) s = value(random);
   for (auto& [triple, samples] : v.tiles)
-    for (float& s : samples) s = value(random);
+    for (float& s : samples.f32) s = value(random);
   return v;
 }
 
@@ -56,7 +57,7 @@ inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate,
   for (std::int64_t z = 0, i = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x, ++i)
-        v.base[static_cast<std::size_t>(i)] =
+        v.base.f32[static_cast<std::size_t>(i)] =
             static_cast<float>(f(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)));
   for (std::size_t b = 0; b < v.level.size(); ++b) {
     const LevelTriple l = v.level[b];
@@ -69,13 +70,47 @@ inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate,
                           static_cast<double>(sample) / static_cast<double>(1 << l[2 - axis]);
       return std::min(cell, static_cast<double>(grid.cells[axis]));
     };
-    float* sample =
-        v.tiles[l].data() + static_cast<std::size_t>(v.tile[b]) * static_cast<std::size_t>(v.tile_size(l));
+    float* sample = v.tiles[l].f32.data() +
+                    static_cast<std::size_t>(v.tile[b]) * static_cast<std::size_t>(v.tile_size(l));
     for (std::int64_t z = 0; z < side[0]; ++z)
       for (std::int64_t y = 0; y < side[1]; ++y)
         for (std::int64_t x = 0; x < side[2]; ++x)
           *sample++ = static_cast<float>(f(at(0, x), at(1, y), at(2, z)));
   }
+  return v;
+}
+
+/// The same with base and tiles in these types, taken in turn; samples rounded to what each tile can hold.
+inline MixedVolume in_types(MixedVolume v, const std::vector<SampleType>& types) {
+  const double step = 0x1p-20;
+  v.step = step;
+  std::size_t turn = 0;
+  const auto convert = [&](SampleBlock& block, std::size_t tile_size) {
+    const SampleType type = types[turn++ % types.size()];
+    if (type == SampleType::f32) return;
+    SampleBlock out;
+    out.type = type;
+    const int bits = type == SampleType::u8 ? 8 : 16;
+    for (std::size_t first = 0; first < block.f32.size(); first += tile_size) {
+      const auto begin = block.f32.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto [lo, hi] = std::minmax_element(begin, begin + static_cast<std::ptrdiff_t>(tile_size));
+      int shift = 0;
+      while ((static_cast<double>(*hi) - static_cast<double>(*lo)) / std::ldexp(step, shift) >
+             std::ldexp(1.0, bits) - 2)
+        ++shift;
+      const double unit = std::ldexp(step, shift), first_code = std::floor(static_cast<double>(*lo) / unit);
+      out.offset.push_back(static_cast<std::int32_t>(std::ldexp(first_code, shift)));
+      out.shift.push_back(static_cast<std::uint8_t>(shift));
+      for (std::size_t i = 0; i < tile_size; ++i) {
+        const double code = std::nearbyint(static_cast<double>(block.f32[first + i]) / unit) - first_code;
+        if (type == SampleType::u8) out.u8.push_back(static_cast<std::uint8_t>(code));
+        else out.u16.push_back(static_cast<std::uint16_t>(code));
+      }
+    }
+    block = out;
+  };
+  convert(v.base, v.base.f32.size());
+  for (auto& [triple, block] : v.tiles) convert(block, static_cast<std::size_t>(v.tile_size(triple)));
   return v;
 }
 

@@ -1,0 +1,22 @@
+// Uploads a stored field as it is stored: integers stay integers.
+#include "host/device_field.hpp"
+
+namespace vdvr {
+
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
+    : DeviceField(state, v, PackedRecords(v, tile_offsets(v))) {}
+
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records)
+    : samples(state, sample_buffer_bytes(v), "certified samples"),
+      bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
+      grid(sampler_grid(v)),
+      defines{{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))}} {
+  const auto put = [&](const SampleBlock& block, std::uint64_t first) {
+    samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
+  };
+  put(v.base, 0);
+  const auto offsets = tile_offsets(v);
+  for (const auto& [triple, block] : v.tiles) put(block, offsets.at(triple));
+}
+
+}  // namespace vdvr

@@ -1,0 +1,19 @@
+// A stored field on the device: sample buffer, brick records, and what kernels must be compiled for to read
+// them. Called by gold_stream.cpp, verify_field.cpp and resident_volume.cpp; read by mixed_sampler.h.
+#pragma once
+
+#include "host/brick_layout.hpp"
+#include "host/opencl/array.hpp"
+
+namespace vdvr {
+
+struct DeviceField {
+  DeviceField(opencl::State& state, const MixedVolume& volume);
+  DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records);
+  opencl::DeviceArray<std::uint8_t> samples;  ///< host/brick_layout.hpp
+  opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
+  VdvrGrid grid;
+  opencl::Defines defines;  ///< VDVR_SAMPLE_TYPES
+};
+
+}  // namespace vdvr
