@@ -75,15 +75,17 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   }
   const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
 
-  const int tile_x = state.info.is_gpu ? 1 : 4, tile_y = state.info.is_gpu ? 1 : 2;
+  const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
-              {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
+              {"VDVR_TILE", std::to_string(tuning.tile)},
+              {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x),
+  const std::int64_t carried = tuning.lanes * tuning.vectors;
+  kernel({{count((slab.rows_padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},
          out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
