@@ -40,7 +40,12 @@ double position_error(const ParallelGeometry& geometry, const UpsampledColumns& 
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
                   const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out) {
-  const ColumnTuning tuning = column_tuning(state.info);
+  back_project(state, geometry, slab, blocks, filter, out, column_tuning(state.info));
+}
+
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnTuning& tuning) {
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
 
