@@ -17,9 +17,9 @@ struct ColumnTuning {
   int lanes = 16;   ///< samples of z per work-item: VDVR_LANES
   int tile = 8;     ///< columns of a back-projection's work-item: VDVR_TILE, 1 or 8
   int vectors = 1;  ///< of z per work-item of a back-projection: VDVR_VECTORS, 1 or 2
-  std::array<std::uint64_t, 3> local{1, 8, 16};  ///< work-group
+  std::array<std::uint64_t, 3> local{1, 16, 16};  ///< work-group
   /// Rows of at most so many columns are ramp-filtered by a matrix product, others by FFT.
-  std::int64_t product_columns = 512;
+  std::int64_t product_columns = 2048;
 };
 
 ColumnTuning column_tuning(const DeviceInfo& device);

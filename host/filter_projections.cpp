@@ -8,6 +8,7 @@
 
 #include "host/batched_product.hpp"
 #include "host/fft/fft.hpp"
+#include "host/huge_pages.hpp"
 #include "host/parallel.hpp"
 #include "host/ramp_kernel.hpp"
 #include "host/view_weights.hpp"
@@ -104,7 +105,7 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
   out.fft_length = fft::good_length(2 * g.columns - 1);
   const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method);
   const std::vector<float> view_weight(weights.weight.begin(), weights.weight.end());
-  out.samples.resize(static_cast<std::size_t>(scan.size()));
+  out.samples = large_zeros(static_cast<std::size_t>(scan.size()));
   out.view_max.assign(static_cast<std::size_t>(g.views()), 0.0);
   (*filter)(scan.data, view_weight, out.samples, progress);
   measure_views(out, scan, weights, *filter);

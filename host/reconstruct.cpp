@@ -10,6 +10,7 @@
 
 #include "host/back_project.hpp"
 #include "host/coverage.hpp"
+#include "host/huge_pages.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
 #include "host/reconstruct_field.hpp"
@@ -79,7 +80,7 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
-  Volume volume{grid, std::vector<float>(static_cast<std::size_t>(grid.sample_count()))};
+  Volume volume{grid, large_zeros(static_cast<std::size_t>(grid.sample_count()))};
   std::vector<std::uint8_t> kept(static_cast<std::size_t>(n[0] * n[1]));
   parallel_for(n[1], {}, "", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < n[0]; ++x) {

@@ -158,7 +158,7 @@ TuneResult tune(Device& device, std::int64_t size, std::int64_t views, int repet
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(),
                    [](const TuneCandidate& a, const TuneCandidate& b) { return a.gups > b.gups; });
-  for (const std::int64_t columns : {128, 256, 512, 1024}) {
+  for (const std::int64_t columns : {256, 512, 1024, 2048, 4096}) {
     result.filters.push_back(time_filter(device, columns, size * size * views / 4, repetitions));
     if (result.filters.back().product_seconds < result.filters.back().fourier_seconds)
       result.product_columns = columns;
