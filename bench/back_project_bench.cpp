@@ -1,6 +1,13 @@
-// Back-projection alone: 256^3 samples from 180 views of 256 x 256, items = sample updates.
+// Back-projection alone: 256^3 samples from 180 views of 256 x 256, items = sample updates; and the same
+// beside a loop written by hand for AVX-512, turn by turn in one run, with the ratio of the two.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "bench/hand_loop.hpp"
 #include "host/back_project.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/reconstruct_field.hpp"
@@ -8,43 +15,140 @@
 
 using namespace vdvr;
 
-static void back_projection(benchmark::State& bench) {
-  const std::int64_t n = bench.range(0), k = bench.range(1);
-  const int rate = static_cast<int>(bench.range(2));
-  const std::string filter = bench.range(3) ? "cubic" : "linear";
-  ProjectionSet scan;
-  scan.geometry.columns = scan.geometry.rows = n;
-  scan.geometry.center = 0.5 * static_cast<double>(n - 1);
-  for (std::int64_t i = 0; i < k; ++i)
-    scan.geometry.theta_rad.push_back(3.14159265 * static_cast<double>(i) / static_cast<double>(k));
-  scan.data.assign(static_cast<std::size_t>(scan.size()), 1.0f);
-  for (std::size_t i = 0; i < scan.data.size(); ++i) scan.data[i] = static_cast<float>(i % 7);
-  Device device;
-  const FilteredScan filtered = filter_projections(device.state(), scan, {});
-  Upsampler upsampler(device.state(), filtered);
-  const auto columns = upsampled_columns(n, rate, 2);
-  const auto rows = detector_rows(scan.geometry, -0.5 * static_cast<double>(n - 1), 1.0, n);
-  const UpsampledSlab slab = upsampler(columns, rows);
-  const std::int64_t band = 64;
-  opencl::DeviceArray<float> out(device.state(), static_cast<std::uint64_t>(band * n * column_stride(n)),
-                                 "out");
-  // Samples at the upsampled spacing times `rate`: a gold block when rate > 1.
-  for (auto _ : bench) {
-    for (std::int64_t y = 0; y < n; y += band) {
-      const ColumnBlocks blocks{n,
-                                std::min(band, n - y),
-                                1.0 / rate,
-                                1.0 / rate,
-                                {{-0.5 * static_cast<double>(n) / rate,
-                                  (-0.5 * static_cast<double>(n) + static_cast<double>(y)) / rate}}};
-      back_project(device.state(), scan.geometry, slab, blocks, filter, out);
-    }
+namespace {
+
+// n^3 samples of step 1 / rate about the axis, from k views of n x n.
+struct Problem {
+  Problem(std::int64_t size, std::int64_t views, int upsampling) : n(size), k(views), rate(upsampling) {
+    scan.geometry.columns = scan.geometry.rows = n;
+    scan.geometry.center = 0.5 * static_cast<double>(n - 1);
+    for (std::int64_t i = 0; i < k; ++i)
+      scan.geometry.theta_rad.push_back(std::numbers::pi * static_cast<double>(i) / static_cast<double>(k));
+    scan.data.resize(static_cast<std::size_t>(scan.size()));
+    for (std::size_t i = 0; i < scan.data.size(); ++i) scan.data[i] = static_cast<float>(i % 7);
+    filtered = filter_projections(device.state(), scan, {});
+    Upsampler upsampler(device.state(), filtered);
+    // So wide that no corner of the grid falls off the detector: nothing is clamped.
+    slab = upsampler(upsampled_columns(n, rate, 0.25 * static_cast<double>(n)),
+                     detector_rows(scan.geometry, -0.5 * static_cast<double>(n - 1), 1.0, n));
+    out = opencl::DeviceArray<float>(device.state(), static_cast<std::uint64_t>(band * n * column_stride(n)),
+                                     "columns");
+  }
+
+  [[nodiscard]] double first() const { return -0.5 * static_cast<double>(n - 1) / rate; }
+  [[nodiscard]] double updates() const { return static_cast<double>(n * n * n * k); }
+
+  // Enqueues rows y .. y + band - 1.
+  void back_project_band(std::int64_t y, const std::string& filter) {
+    back_project(device.state(), scan.geometry, slab,
+                 {n,
+                  std::min(band, n - y),
+                  1.0 / rate,
+                  1.0 / rate,
+                  {{first(), first() + static_cast<double>(y) / rate}}},
+                 filter, out);
+  }
+  void back_project_all(const std::string& filter) {
+    for (std::int64_t y = 0; y < n; y += band) back_project_band(y, filter);
     opencl::finish(device.state(), "bench");
   }
-  bench.counters["updates"] =
-      benchmark::Counter(static_cast<double>(n * n * n * k) * static_cast<double>(bench.iterations()),
-                         benchmark::Counter::kIsRate);
+
+  static constexpr std::int64_t band = 64;
+  std::int64_t n, k;
+  int rate;
+  Device device;
+  ProjectionSet scan;
+  FilteredScan filtered;
+  UpsampledSlab slab;
+  opencl::DeviceArray<float> out;
+};
+
+double seconds_of(const auto& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+void back_projection(benchmark::State& bench) {
+  Problem problem(bench.range(0), bench.range(1), static_cast<int>(bench.range(2)));
+  const std::string filter = bench.range(3) ? "cubic" : "linear";
+  for (auto _ : bench) problem.back_project_all(filter);
+  bench.counters["updates"] = benchmark::Counter(problem.updates() * static_cast<double>(bench.iterations()),
+                                                 benchmark::Counter::kIsRate);
+}
+
+// The largest difference between the engine's samples and the loop's, relative to the largest sample.
+double difference(Problem& problem, std::span<const float> loop) {
+  const std::int64_t n = problem.n, stride = column_stride(n), rows = (n + 15) / 16 * 16;
+  double worst = 0, largest = 0;
+  for (std::int64_t y0 = 0; y0 < n; y0 += Problem::band) {
+    problem.back_project_band(y0, "linear");
+    const auto ours = problem.out.to_host();
+    for (std::int64_t c = 0; c < std::min(Problem::band, n - y0) * n; ++c)
+      for (std::int64_t z = 0; z < n; ++z) {
+        const double a = static_cast<double>(ours[static_cast<std::size_t>(c * stride + z)]),
+                     b = static_cast<double>(loop[static_cast<std::size_t>((y0 * n + c) * rows + z)]);
+        if (!(std::abs(a - b) <= worst)) worst = std::abs(a - b);
+        largest = std::max(largest, std::abs(b));
+      }
+  }
+  return worst / largest;
+}
+
+// `ratio`: the engine's rate over the loop's, of the medians; one turn of each per iteration.
+void beside_hand_loop(benchmark::State& bench) {
+  if (const std::string missing = bench::hand_loop_missing(); !missing.empty()) {
+    bench.SkipWithError(missing.c_str());
+    return;
+  }
+  Problem problem(256, 180, 1);
+  if (!problem.device.info().is_cpu) {
+    bench.SkipWithError("the device is not this processor");
+    return;
+  }
+  const std::int64_t n = problem.n, chunks = n / 16;
+  std::vector<double> ours, theirs;
+  double differs = 0;
+  problem.slab.values.read_mapped([&](std::span<const float> filtered) {
+    const bench::HandLoop loop{filtered,
+                               problem.k,
+                               problem.slab.columns.count,
+                               chunks,
+                               n,
+                               n,
+                               problem.first(),
+                               1,
+                               1,
+                               problem.slab.columns.column_of(problem.scan.geometry.center),
+                               problem.scan.geometry.theta_rad};
+    std::vector<float> out(static_cast<std::size_t>(n * n * n));
+    run_hand_loop(loop, out);
+    differs = difference(problem, out);
+    // Both compute relative positions in fp32, of up to n columns: n 2^-22 of a step of at most twice the
+    // largest value.
+    if (!(differs <= static_cast<double>(4 * n) * 0x1p-22)) {
+      bench.SkipWithError("engine and loop disagree: not timed");
+      return;
+    }
+    for (auto _ : bench) {
+      ours.push_back(seconds_of([&] { problem.back_project_all("linear"); }));
+      theirs.push_back(seconds_of([&] { run_hand_loop(loop, out); }));
+      bench.SetIterationTime(ours.back());
+    }
+  });
+  if (ours.empty()) return;
+  bench.counters["gups"] = problem.updates() / median(ours) / 1e9;
+  bench.counters["loop_gups"] = problem.updates() / median(theirs) / 1e9;
+  bench.counters["ratio"] = median(theirs) / median(ours);
+  bench.counters["difference"] = differs;
+}
+
 BENCHMARK(back_projection)
     ->Args({256, 180, 1, 0})
     ->Args({256, 180, 1, 1})
@@ -53,3 +157,6 @@ BENCHMARK(back_projection)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime()
     ->UseRealTime();
+BENCHMARK(beside_hand_loop)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(9);
+
+}  // namespace

@@ -40,7 +40,12 @@ double position_error(const ParallelGeometry& geometry, const UpsampledColumns& 
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
                   const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out) {
-  const ColumnTuning tuning = column_tuning(state.info);
+  back_project(state, geometry, slab, blocks, filter, out, column_tuning(state.info));
+}
+
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnTuning& tuning) {
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
 
@@ -75,15 +80,17 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   }
   const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
 
-  const int tile_x = state.info.is_gpu ? 1 : 4, tile_y = state.info.is_gpu ? 1 : 2;
+  const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
-              {"VDVR_TILE", std::to_string(tile_x * tile_y)}});
+              {"VDVR_TILE", std::to_string(tuning.tile)},
+              {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  kernel({{count(slab.rows_padded / tuning.lanes), count((blocks.nx + tile_x - 1) / tile_x),
+  const std::int64_t carried = tuning.lanes * tuning.vectors;
+  kernel({{count((slab.rows_padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},
          out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),

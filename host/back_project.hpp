@@ -25,6 +25,11 @@ struct ColumnBlocks {
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
                   const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out);
 
+/// The same with launch parameters of the caller's, for tests and for tuning.
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnTuning& tuning);
+
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
 /// share cache sets.
 std::int64_t column_stride(std::int64_t rows);

@@ -79,7 +79,7 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
   Grid grid;
   grid.unit = geometry.unit;
   const double d = options.spacing.value_or(geometry.pitch_u);
-  grid.spacing = {d, d, options.spacing.value_or(geometry.pitch_v)};
+  grid.spacing = {d, d, options.spacing_z.value_or(options.spacing.value_or(geometry.pitch_v))};
   if (!(grid.spacing[0] > 0) || !(grid.spacing[2] > 0))
     throw InputError("--spacing must be positive and finite");
   const double radius = coverage.inner_radius(), height = coverage.half_height();

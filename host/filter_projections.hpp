@@ -8,7 +8,9 @@
 #include <tuple>
 #include <vector>
 
+#include "host/column_tuning.hpp"
 #include "host/cosine_series.hpp"
+#include "host/filter_rows.hpp"
 #include "host/opencl/array.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/progress.hpp"
@@ -18,31 +20,24 @@ namespace vdvr {
 
 /// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
 struct FilteredScan {
-  ParallelGeometry geometry;   ///< with the centre in use
-  std::vector<float> samples;  ///< [view][u][v]
-  std::int64_t fft_length = 0;
+  ParallelGeometry geometry;     ///< with the centre in use
+  std::vector<float> samples;    ///< [view][u][v]
+  std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
   std::vector<double> view_max;  ///< max |q| of each view's samples
   double ramp_error =
       0;  ///< sum over views of a bound on the fp32 error of any filtered sample (docs/error-bounds.md)
   bool limited_angle = false;
 };
 
-/// Cost: views * rows FFTs of at least twice the columns. Memory: the filtered scan on the host, one chunk on
+/// Cost: as RowFilter's. Memory: the filtered scan on the host, one chunk on
 /// the device.
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                                const Progress& progress = {});
+                                const Progress& progress = {}, FilterMethod method = FilterMethod::automatic);
 
 /// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision,
 /// view by view, where that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps
 /// the bound.
 void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field);
-
-/// Lanes to which z is padded, and the launch shape of the column kernels, by device class.
-struct ColumnTuning {
-  int lanes = 16;
-  std::array<std::uint64_t, 3> local{1, 8, 16};
-};
-ColumnTuning column_tuning(const DeviceInfo& device);
 
 /// float values[row / 16][view][column][16]: one slab of rows, upsampled in u.
 struct UpsampledSlab {
@@ -75,6 +70,9 @@ class Upsampler {
     opencl::DeviceArray<float> values;
     double gain = 0;
   };
+  opencl::DeviceArray<float> row_matrix(std::span<const double> rows, int order, int lattice);
+  /// The slab where every column and row is one of the detector's: u, v.
+  void copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u, std::span<const std::int64_t> v);
   const Matrix& matrix_u(const UpsampledColumns& columns, int order);
 
   opencl::State* state_;

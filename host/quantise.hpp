@@ -29,7 +29,7 @@ struct Lattice {
 Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding);
 
 /// What `automatic` takes for `most_rounding`.
-inline double most_rounding(double epsilon_abs) { return epsilon_abs / 6; }
+inline double most_rounding(double epsilon_abs) { return epsilon_abs / 8; }
 
 /// Nearest multiple of `unit`; unit 0: the value itself. Never -0, which integers do not have.
 inline float round_to(float value, double unit) {

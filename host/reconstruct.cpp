@@ -10,6 +10,7 @@
 
 #include "host/back_project.hpp"
 #include "host/coverage.hpp"
+#include "host/huge_pages.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
 #include "host/reconstruct_field.hpp"
@@ -79,7 +80,7 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
-  Volume volume{grid, std::vector<float>(static_cast<std::size_t>(grid.sample_count()))};
+  Volume volume{grid, large_zeros(static_cast<std::size_t>(grid.sample_count()))};
   std::vector<std::uint8_t> kept(static_cast<std::size_t>(n[0] * n[1]));
   parallel_for(n[1], {}, "", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < n[0]; ++x) {
@@ -87,7 +88,6 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
       kept[static_cast<std::size_t>(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= -kept_margin(grid, 1);
     }
   });
-  std::vector<float> columns_host;
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
     const std::int64_t nz = std::min(rows, n[2] - z0);
     const auto positions =
@@ -96,7 +96,6 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
     watch.lap(state, "upsample");
     opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * column_stride(nz)),
                                    "reconstructed columns");
-    columns_host.resize(out.size());
     for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
       report(progress, "reconstruct",
              (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) /
@@ -109,17 +108,18 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
                           {}};
       back_project(state, g, slab, blocks, u_filter, out);
       watch.lap(state, "back-project");
-      out.read(columns_host);
       // Columns of z become planes of z, a band of 16 at a time so that both sides stay in cache.
-      parallel_for(blocks.ny, {}, "", [&](std::int64_t y) {
-        const std::uint8_t* keep = kept.data() + (y0 + y) * n[0];
-        const std::int64_t stride = column_stride(nz);
-        const float* row = columns_host.data() + y * n[0] * stride;
-        for (std::int64_t first = 0; first < nz; first += 16)
-          for (std::int64_t x = 0; x < n[0]; ++x)
-            for (std::int64_t z = first; keep[x] && z < std::min(first + 16, nz); ++z)
-              volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] =
-                  row[x * stride + z];
+      const std::int64_t stride = column_stride(nz);
+      out.read_mapped([&](std::span<const float> columns_host) {
+        parallel_for(blocks.ny, {}, "", [&](std::int64_t y) {
+          const std::uint8_t* keep = kept.data() + (y0 + y) * n[0];
+          const float* row = columns_host.data() + y * n[0] * stride;
+          for (std::int64_t first = 0; first < nz; first += 16)
+            for (std::int64_t x = 0; x < n[0]; ++x)
+              for (std::int64_t z = first; keep[x] && z < std::min(first + 16, nz); ++z)
+                volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] =
+                    row[x * stride + z];
+        });
       });
       watch.lap(state, "read back");
     }

@@ -18,6 +18,10 @@
 #ifndef VDVR_TILE
 #define VDVR_TILE 8
 #endif
+// Vectors of z per work-item, 1 or 2: two share weights and positions, at twice the registers.
+#ifndef VDVR_VECTORS
+#define VDVR_VECTORS 1
+#endif
 
 // A tile of 1 or 4 x 2 neighbours; lane i of a TILE value belongs to column i % 4, row i / 4.
 #if VDVR_TILE == 8
@@ -49,32 +53,44 @@
 #error "VDVR_TILE is 1 or 8"
 #endif
 
+// Into sum_low the column's samples at q, into sum_high those of the vector above.
+#if VDVR_VECTORS == 2
+#define INTO(sum, w, q)                                \
+  sum##_low = fma((VEC)(w), LOAD(q), sum##_low);       \
+  sum##_high = fma((VEC)(w), LOAD(q + above), sum##_high);
+#else
+#define INTO(sum, w, q) sum##_low = fma((VEC)(w), LOAD(q), sum##_low);
+#endif
 #if VDVR_CUBIC
-#define ADD(sum, i, c, r)                             \
-  {                                                   \
-    __global const float* q = plane + LANE(at, i);    \
-    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);      \
-    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum); \
-    sum = fma((VEC)(LANE(w2, i)), LOAD(q + 32), sum); \
-    sum = fma((VEC)(LANE(w3, i)), LOAD(q + 48), sum); \
+#define ADD(sum, i, c, r)                          \
+  {                                                \
+    __global const float* q = plane + LANE(at, i); \
+    INTO(sum, LANE(w0, i), q)                      \
+    INTO(sum, LANE(w1, i), q + 16)                 \
+    INTO(sum, LANE(w2, i), q + 32)                 \
+    INTO(sum, LANE(w3, i), q + 48)                 \
   }
 #else
-#define ADD(sum, i, c, r)                             \
-  {                                                   \
-    __global const float* q = plane + LANE(at, i);    \
-    sum = fma((VEC)(LANE(w0, i)), LOAD(q), sum);      \
-    sum = fma((VEC)(LANE(w1, i)), LOAD(q + 16), sum); \
+#define ADD(sum, i, c, r)                          \
+  {                                                \
+    __global const float* q = plane + LANE(at, i); \
+    INTO(sum, LANE(w0, i), q)                      \
+    INTO(sum, LANE(w1, i), q + 16)                 \
   }
 #endif
 // Named sums, not an array: compilers keep these in registers.
-#define CLEAR(sum, i, c, r) VEC sum = (VEC)(0.0f);
-#define PUT(sum, i, c, r) \
-  if (x + c < nx && y + r < ny) STORE(sum, target + (size_t)(r * nx + c) * out_stride);
+#define CLEAR(sum, i, c, r) VEC sum##_low = (VEC)(0.0f), sum##_high = (VEC)(0.0f);
+#define PUT(sum, i, c, r)                                                                         \
+  if (x + c < nx && y + r < ny) {                                                                 \
+    STORE(sum##_low, target + (size_t)(r * nx + c) * out_stride);                                 \
+    if (VDVR_VECTORS == 2 && above > 0)                                                           \
+      STORE(sum##_high, target + (size_t)(r * nx + c) * out_stride + VDVR_LANES);                 \
+  }
 
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
                            __global const int2* rows, int views, int columns, int z_padded, int out_stride,
                            int nx, int ny, int blocks) {
-  const int z = (int)get_global_id(0) * VDVR_LANES;
+  const int z = (int)get_global_id(0) * (VDVR_LANES * VDVR_VECTORS);
   const int x = (int)get_global_id(1) * TILE_X;
   const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
   const int block = row / tile_rows, y = (row - block * tile_rows) * TILE_Y;
@@ -87,6 +103,11 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
   const TILE tile_x = (float)x + OFFSET_X, tile_y = (float)y + OFFSET_Y;
   FOR_TILE(CLEAR)
   __global const float* plane = filtered + (size_t)(z / 16) * views * columns * 16 + z % 16;
+  // From one vector of z to the next, in the same chunk or the next one; beyond the last the same one again.
+  const int next = z + VDVR_LANES;
+  const size_t above = next >= z_padded    ? 0
+                       : next % 16 != 0 ? VDVR_LANES
+                                        : (size_t)views * columns * 16 - z % 16;
   __global const float4* view = steps + (size_t)block * views;
   for (int k = 0; k < views; ++k, plane += columns * 16) {
     const float4 step = view[k];

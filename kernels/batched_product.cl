@@ -3,7 +3,7 @@
 // z-vectors are stored in chunks of 16: element (i, z) of batch b of a matrix lies at b * batch + (z / 16) *
 // chunk + 16 i + z % 16. a_batch or v_batch is 0 where all batches share the matrix; `out_first` is where the
 // first batch begins. Sums run in runs of 16 terms that are then added, so that the rounding error grows with
-// 16 + terms / 16 instead of terms. Called by host/filter_projections.cpp.
+// 16 + terms / 16 instead of terms. Called by host/batched_product.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #include "shared/lanes.h"

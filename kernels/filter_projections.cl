@@ -1,6 +1,6 @@
 // The pieces of the ramp filter around the FFT along u: zero-padding, the product with the kernel's real
 // spectrum, and the crop that turns rows [view][v][u] into columns [view][u][v] with v contiguous (method:
-// linear convolution, docs/geometry.md). Called by host/filter_projections.cpp.
+// linear convolution, docs/geometry.md). Called by host/filter_rows.cpp.
 
 __kernel void pad_rows(__global float* padded, __global const float* rows, int columns, int length,
                        int count) {

@@ -199,33 +199,35 @@ BOOST_AUTO_TEST_CASE(amplitude_bound_of_projections_holds_at_1x) {
 }
 
 BOOST_AUTO_TEST_CASE(filter_error_is_never_above_what_is_charged) {
-  for (const Scan& scan : awkward_scans()) {
-    FilteredScan filtered = filter_projections(device().state(), scan.data, {});
-    const double a_priori = filtered.ramp_error, error = filter_error(filtered, scan.data);
-    measure_filter_error(filtered, scan.data, {});
-    BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
-               scan.name << ", measured: " << error << " > " << filtered.ramp_error);
-    // Higham's theorem knows no underflow: below 2^-126 the relative bound is none.
-    const bool normal =
-        *std::max_element(filtered.view_max.begin(), filtered.view_max.end()) > 0x1p-126 || error == 0;
-    if (normal)
-      BOOST_TEST(error <= tolerance::bound(a_priori),
-                 scan.name << ", a priori: " << error << " > " << a_priori);
-  }
+  for (const FilterMethod method : {FilterMethod::fourier, FilterMethod::product})
+    for (const Scan& scan : awkward_scans()) {
+      FilteredScan filtered = filter_projections(device().state(), scan.data, {}, {}, method);
+      const double a_priori = filtered.ramp_error, error = filter_error(filtered, scan.data);
+      measure_filter_error(filtered, scan.data, {});
+      BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
+                 scan.name << ", measured: " << error << " > " << filtered.ramp_error);
+      // Higham's theorem knows no underflow: below 2^-126 the relative bound is none.
+      const bool normal =
+          *std::max_element(filtered.view_max.begin(), filtered.view_max.end()) > 0x1p-126 || error == 0;
+      if (normal)
+        BOOST_TEST(error <= tolerance::bound(a_priori),
+                   scan.name << ", a priori: " << error << " > " << a_priori);
+    }
 }
 
 BOOST_AUTO_TEST_CASE(scans_beyond_the_range_of_fp32_are_refused_or_bounded) {
-  for (const double scale : {1e-40, 1e38}) {
-    const ProjectionSet scan = noise(geometry(11, 4, 24), 6, scale);
-    try {
-      FilteredScan filtered = filter_projections(device().state(), scan, {});
-      const double error = filter_error(filtered, scan);
-      BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
-                 "noise of " << scale << ", a priori: " << error << " > " << filtered.ramp_error);
-    } catch (const InputError&) {
-      BOOST_TEST(true);  // refused
+  for (const FilterMethod method : {FilterMethod::fourier, FilterMethod::product})
+    for (const double scale : {1e-40, 1e38}) {
+      const ProjectionSet scan = noise(geometry(11, 4, 24), 6, scale);
+      try {
+        FilteredScan filtered = filter_projections(device().state(), scan, {}, {}, method);
+        const double error = filter_error(filtered, scan);
+        BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
+                   "noise of " << scale << ", a priori: " << error << " > " << filtered.ramp_error);
+      } catch (const InputError&) {
+        BOOST_TEST(true);  // refused
+      }
     }
-  }
 }
 
 // Computed gold against the same interpolation of the same filtered samples, in double precision.

@@ -104,42 +104,12 @@ reference::UpsampledViews exact_views(const ProjectionSet& scan, const Upsampled
   return q;
 }
 
-// Launches the kernel with given tuning defines, as back_project.cpp does with its own.
 std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, const UpsampledSlab& slab,
-                               const ColumnBlocks& blocks, const std::string& cubic, int lanes, int tile) {
-  std::vector<cl_float4> steps;
-  for (const auto& first : blocks.first)
-    for (const double theta : g.theta_rad) {
-      const double scale = slab.columns.rate / g.pitch_u, c = std::cos(theta), s = std::sin(theta);
-      const double step_x = blocks.step_x * scale * c, step_y = blocks.step_y * scale * s;
-      const double at = slab.columns.column_of((first[0] * c + first[1] * s) / g.pitch_u + g.center);
-      const double whole = std::floor(at + std::min(0.0, step_x * static_cast<double>(blocks.nx + 4)) +
-                                      std::min(0.0, step_y * static_cast<double>(blocks.ny + 2))) -
-                           1;
-      steps.push_back({{static_cast<float>(step_x), static_cast<float>(step_y),
-                        static_cast<float>(at - whole), static_cast<float>(whole)}});
-    }
-  const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps), "steps");
-  const std::vector<cl_int2> rows(blocks.first.size() * static_cast<std::size_t>(blocks.ny),
-                                  cl_int2{{0, static_cast<cl_int>(blocks.nx - 1)}});
-  const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
+                               const ColumnBlocks& blocks, const std::string& filter,
+                               const ColumnTuning& tuning) {
   opencl::DeviceArray<float> out(state, floats_of(blocks, slab.rows), "columns");
   out.fill(0.0f);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int>
-      kernel(state, "back_project", "back_project",
-             {{"VDVR_CUBIC", cubic},
-              {"VDVR_LANES", std::to_string(lanes)},
-              {"VDVR_TILE", std::to_string(tile)}});
-  const int tile_x = tile == 8 ? 4 : 1, tile_y = tile == 8 ? 2 : 1;
-  const auto groups = [](std::int64_t n, int per) { return static_cast<std::uint64_t>((n + per - 1) / per); };
-  const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  kernel({{groups(slab.rows_padded, lanes), groups(blocks.nx, tile_x),
-           groups(blocks.ny, tile_y) * blocks.first.size()},
-          {1, 2, 2}},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
-         ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)), ints(blocks.nx),
-         ints(blocks.ny), ints(blocks.first.size()));
+  back_project(state, g, slab, blocks, filter, out, tuning);
   return out.to_host();
 }
 
@@ -229,21 +199,24 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
   Device device;
   const FilteredScan filtered = filter_projections(device.state(), scan, {});
   Upsampler upsampler(device.state(), filtered);
-  const UpsampledSlab slab = upsampler(upsampled_columns(23, 4, 1.0), rows_of(4, 37));
+  const UpsampledSlab slab =
+      upsampler(upsampled_columns(23, 4, 1.0), rows_of(4, 37));  // three vectors: an odd number
   const ColumnBlocks blocks{11, 7, 0.5, 0.6, {{-2.5, -2}, {1, -3}, {-6, 0.3}}};
   const auto q = read_back(slab);
   double magnitude = 0;
   for (const double v : q.values) magnitude = std::max(magnitude, std::abs(v));
   magnitude *= 1.25 * static_cast<double>(slab.views);  // the largest sum of |cubic weights|
   const double position = position_error(filtered.geometry, slab.columns, blocks) * 2 * 4.0 / 3 * magnitude;
-  for (const char* cubic : {"0", "1"}) {
-    const auto first = with_tuning(device.state(), filtered.geometry, slab, blocks, cubic, 16, 8);
-    opencl::DeviceArray<float> own(device.state(), floats_of(blocks, slab.rows), "columns");
-    back_project(device.state(), filtered.geometry, slab, blocks, *cubic == '1' ? "cubic" : "linear", own);
-    std::vector<std::vector<float>> all{own.to_host()};
+  for (const char* filter : {"linear", "cubic"}) {
+    const auto run = [&](const ColumnTuning& tuning) {
+      return with_tuning(device.state(), filtered.geometry, slab, blocks, filter, tuning);
+    };
+    std::vector<std::vector<float>> all{run(column_tuning(device.info()))};
     for (const int lanes : {1, 4, 8, 16})
       for (const int tile : {1, 8})
-        all.push_back(with_tuning(device.state(), filtered.geometry, slab, blocks, cubic, lanes, tile));
+        for (const int vectors : {1, 2})
+          all.push_back(run({.lanes = lanes, .tile = tile, .vectors = vectors, .local = {1, 2, 2}}));
+    const auto& first = all.front();
     for (const auto& other : all) {
       double worst = 0;
       for (std::size_t b = 0; b < blocks.first.size(); ++b)

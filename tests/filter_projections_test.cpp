@@ -27,15 +27,20 @@ double summed_error(const FilteredScan& filtered, const std::vector<double>& exa
   return sum;
 }
 
-void check_ramp(const ProjectionSet& scan) {
+void check_ramp(const ProjectionSet& scan, FilterMethod method) {
   Device device;
-  FilteredScan filtered = filter_projections(device.state(), scan, {});
+  FilteredScan filtered = filter_projections(device.state(), scan, {}, {}, method);
   BOOST_REQUIRE(filtered.samples.size() == scan.data.size());
   const double error = summed_error(filtered, reference::ramp_filtered(scan)), a_priori = filtered.ramp_error;
   BOOST_TEST(error <= tolerance::bound(a_priori));
   measure_filter_error(filtered, scan, {});
   BOOST_TEST(error <= tolerance::bound(filtered.ramp_error));
   BOOST_TEST(filtered.ramp_error <= a_priori);
+}
+
+void check_ramp(const ProjectionSet& scan) {
+  check_ramp(scan, FilterMethod::fourier);
+  check_ramp(scan, FilterMethod::product);
 }
 
 // Row z of a slab read back: values[row / 16][view][column][16].
@@ -165,6 +170,29 @@ BOOST_AUTO_TEST_CASE(slab_of_values_is_the_cosine_series) {
   for (const auto& [views, rows, columns] : {std::array{3, 1, 13}, {2, 2, 7}, {5, 9, 33}, {4, 19, 40}}) {
     const ProjectionSet scan = noise_scan(views, rows, columns);
     for (const int rate : {1, 2, 8}) check_slab(scan, {rate, 0.6, odd_rows(rows, 21)});
+  }
+}
+
+BOOST_AUTO_TEST_CASE(slab_of_whole_columns_and_rows_holds_the_samples_themselves) {
+  const ProjectionSet scan = noise_scan(3, 21, 13);
+  std::vector<double> upwards, backwards;
+  for (int z = -5; z < 30; ++z) upwards.push_back(z);  // mirrored below the first row and above the last
+  for (int z = 20; z >= 0; z -= 2) backwards.push_back(z);
+  for (const auto& rows : {upwards, backwards}) {
+    check_slab(scan, {1, 2.6, rows});
+    Device device;
+    const FilteredScan filtered = filter_projections(device.state(), scan, {});
+    Upsampler upsampler(device.state(), filtered);
+    const UpsampledColumns columns = upsampled_columns(13, 1, 2.6);
+    const HostSlab slab(upsampler(columns, rows, 0, 0, 0, 1, 2));
+    bool same = true;
+    for (std::size_t z = 0; z < rows.size(); ++z)
+      for (std::int64_t u = 0; u < 13; ++u)
+        for (std::int64_t k = 0; k < 2 && rows[z] >= 0 && rows[z] < 21; ++k)
+          same = same && slab.at(k, static_cast<std::int64_t>(z), u + columns.pad) ==
+                             filtered.samples[static_cast<std::size_t>(((k + 1) * 13 + u) * 21 +
+                                                                       static_cast<std::int64_t>(rows[z]))];
+    BOOST_TEST(same);
   }
 }
 

@@ -109,7 +109,7 @@ bool has_field_options(const Arguments& args) {
 void add_grid(Arguments& args) {
   args.group("Grid")
       .value("size", "NxNxN", "cells in x, y, z (default: the covered region)")
-      .value("spacing", "S", "cell width (default: the detector pitch)")
+      .value("spacing", "S[,SZ]", "cell width, and height where it differs (default: the detector pitch)")
       .value("origin", "X,Y,Z", "first sample (default: centred)")
       .value("roi", "X0,Y0,Z0,X1,Y1,Z1", "certify and count only bricks inside");
 }
@@ -117,7 +117,14 @@ void add_grid(Arguments& args) {
 GridOptions grid_options(const Arguments& args) {
   GridOptions grid;
   if (const auto size = args.sizes("size", 3)) grid.size = Index3{(*size)[0], (*size)[1], (*size)[2]};
-  if (args.has("spacing")) grid.spacing = args.positive_or("spacing", 1);
+  if (args.has("spacing")) {
+    const bool both = args.text("spacing").find(',') != std::string::npos;
+    const auto spacing = *args.numbers("spacing", both ? 2 : 1);
+    if (!(spacing.front() > 0 && spacing.back() > 0))
+      throw InputError(fmt::format("--spacing: {} is not above 0", args.text("spacing")));
+    grid.spacing = spacing.front();
+    if (both) grid.spacing_z = spacing.back();
+  }
   grid.origin = args.vec3("origin");
   return grid;
 }

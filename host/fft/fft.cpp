@@ -1,4 +1,4 @@
-// clFFT behind two functions. Called by host/filter_projections.cpp.
+// clFFT behind two functions. Called by host/filter_rows.cpp.
 #include "host/fft/fft.hpp"
 
 #pragma GCC diagnostic push

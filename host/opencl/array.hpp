@@ -1,5 +1,5 @@
 // A typed device buffer, counted against the memory account. Reads wait; writes and fills do not (in-order
-// queue), except that a write copies the host data before it returns.
+// queue), except that a write copies the host data before it returns. Mapping saves that copy on CPUs.
 #pragma once
 
 #include <fmt/format.h>
@@ -74,6 +74,19 @@ class DeviceArray {
                                       values.data());
     });
   }
+  /// f(span<const T>) on the mapped contents: on devices that share the host's memory nothing is copied.
+  /// Waits.
+  template <class F>
+  void read_mapped(F&& f) const {
+    const Mapping m(*this, CL_MAP_READ);
+    f(std::span<const T>(m.data, count_));
+  }
+  /// f(span<T>) fills all of the mapped array; what it held before is lost. Waits for earlier work.
+  template <class F>
+  void write_mapped(F&& f) {
+    const Mapping m(*this, CL_MAP_WRITE_INVALIDATE_REGION);
+    f(std::span<T>(m.data, count_));
+  }
   [[nodiscard]] std::vector<T> to_host() const {
     std::vector<T> values(count_);
     read(values);
@@ -84,6 +97,20 @@ class DeviceArray {
   }
 
  private:
+  // Maps the whole array, and unmaps it even when the work on it throws.
+  struct Mapping {
+    Mapping(const DeviceArray& of, cl_map_flags flags) : array(of) {
+      array.guard("map", [&] {
+        data = static_cast<T*>(
+            array.state_->queue.enqueueMapBuffer(array.buffer_, CL_TRUE, flags, 0, array.size_bytes()));
+      });
+    }
+    ~Mapping() { clEnqueueUnmapMemObject(array.state_->queue(), array.buffer_(), data, 0, nullptr, nullptr); }
+    Mapping(const Mapping&) = delete;
+    Mapping& operator=(const Mapping&) = delete;
+    const DeviceArray& array;
+    T* data = nullptr;
+  };
   // OpenCL has no empty buffers: an empty array holds one element.
   [[nodiscard]] std::uint64_t size_bytes() const { return (count_ == 0 ? 1 : count_) * sizeof(T); }
   void check(std::uint64_t first, std::uint64_t n) const {

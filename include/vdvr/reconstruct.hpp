@@ -16,8 +16,9 @@ namespace vdvr {
 struct GridOptions {
   std::optional<Index3>
       size;  ///< cells x, y, z; default: the smallest box of cells around the covered cylinder
-  std::optional<double> spacing;  ///< default: the detector pitch (pitch_u in x and y, pitch_v in z)
-  std::optional<Vec3> origin;     ///< first sample; default centred on the axis and on the middle row
+  std::optional<double> spacing;    ///< default: the detector pitch (pitch_u in x and y, pitch_v in z)
+  std::optional<double> spacing_z;  ///< along z, where it differs from `spacing`
+  std::optional<Vec3> origin;       ///< first sample; default centred on the axis and on the middle row
 };
 
 /// Throws InputError for an empty, non-finite or overflowing grid, or a scan with no covered region.

@@ -1,0 +1,10 @@
+// vdvr bench tune. Called by bench.cpp.
+#pragma once
+
+#include "apps/vdvr/arguments.hpp"
+
+namespace vdvr::cli {
+
+int bench_tune(Arguments& args);
+
+}  // namespace vdvr::cli
