@@ -68,10 +68,11 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
   if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
     throw ResourceError(fmt::format(
-        "gold at rate {} from {} views of {} upsampled columns needs {} MiB for its thinnest slab; raise "
+        "gold at rate {} from {} views of {} upsampled columns needs {:.1f} MiB for its thinnest slab; raise "
         "--max-memory, "
         "or choose a smaller --granularity, --upsampling or --gold",
-        settings.rate, scan.geometry.views(), columns_.count, slab_bytes(slab_bricks_ * g) >> 20));
+        settings.rate, scan.geometry.views(), columns_.count,
+        static_cast<double>(slab_bytes(slab_bricks_ * g)) / (1 << 20)));
   }
   const std::int64_t side = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
   const ColumnBlocks largest{

@@ -226,8 +226,8 @@ Phantom volume_phantom(Volume volume) {
     slices = reorder(volume);
   } catch (const std::bad_alloc&) {
     throw ResourceError(
-        fmt::format("no memory for a second copy of the volume ({} MiB); use a smaller volume",
-                    (volume.samples.size() * sizeof(float)) >> 20));
+        fmt::format("no memory for a second copy of the volume ({:.1f} MiB); use a smaller volume",
+                    static_cast<double>(volume.samples.size() * sizeof(float)) / (1 << 20)));
   }
   p.density = [slices](const Vec3& point) { return density(*slices, point); };
   p.line_integral = [slices](double theta, double u, double v) {

@@ -71,10 +71,11 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   std::int64_t rows = std::min<std::int64_t>(n[2], 256);
   while (rows > 16 && upsampler.slab_bytes(columns, rows) > budget) rows = (rows + 1) / 2;
   if (upsampler.slab_bytes(columns, rows) > std::min(budget, state.info.max_allocation)) {
-    throw ResourceError(
-        fmt::format("{} views of {} upsampled columns need {} MiB per slab of {} rows; raise --max-memory or "
-                    "lower --upsampling",
-                    g.views(), columns.count, upsampler.slab_bytes(columns, rows) >> 20, rows));
+    throw ResourceError(fmt::format(
+        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise --max-memory or "
+        "lower --upsampling",
+        g.views(), columns.count, static_cast<double>(upsampler.slab_bytes(columns, rows)) / (1 << 20),
+        rows));
   }
   const std::int64_t wanted =
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);

@@ -167,6 +167,49 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_at_several_tolerances) {
     check_all(scan, {grid_of(scan, {12, 10, 8}, 0.9), epsilon}, 1);
 }
 
+// Noise at tolerances near its range and far below: half a step of 8 bits is then a small or the larger part.
+BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_every_storage) {
+  const ProjectionSet scan = noise_scan(19, 9, 33, 3);
+  for (const StorageChoice storage : {StorageChoice::u8, StorageChoice::u16, StorageChoice::automatic})
+    for (const double epsilon : {0.2, 0.05}) {
+      Wanted wanted{grid_of(scan, {11, 10, 7}, 0.9), epsilon};
+      wanted.options.storage = storage;
+      const Built built = build_of(scan, wanted);
+      check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 150, 3));
+      check_shared_bits(built.result.volume);
+      BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+      const SampleType base = built.result.volume.base.type;
+      if (storage == StorageChoice::u8) BOOST_TEST((base == SampleType::u8));
+      if (storage == StorageChoice::u16) BOOST_TEST((base == SampleType::u16));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(eight_bits_that_leave_no_room_are_refused_and_auto_takes_more) {
+  const ProjectionSet scan = noise_scan(19, 9, 33, 3);
+  Wanted wanted{grid_of(scan, {8, 8, 7}, 0.9), 0.004, {32, "cubic", 16}};
+  wanted.options.storage = StorageChoice::u8;  // half a step is about the whole tolerance
+  BOOST_CHECK_EXCEPTION(build_of(scan, wanted), ToleranceError, [](const ToleranceError& e) {
+    return std::string(e.what()).find("--storage") != std::string::npos;
+  });
+  wanted.options.storage = StorageChoice::automatic;
+  const Built built = build_of(scan, wanted);
+  check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 100, 3));
+  BOOST_TEST((built.result.volume.base.type != SampleType::u8));
+}
+
+BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_the_paper_closing) {
+  const ProjectionSet scan = noise_scan(19, 9, 33, 4);
+  for (const StorageChoice storage : {StorageChoice::f32, StorageChoice::u8}) {
+    Wanted wanted{grid_of(scan, {11, 10, 7}, 0.9), 0.15};
+    wanted.options.closing = Closing::paper;
+    wanted.options.storage = storage;
+    const Built built = build_of(scan, wanted);
+    check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 150, 3));
+    check_shared_bits(built.result.volume);
+    BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_for_every_u_filter_and_granularity) {
   const ProjectionSet scan = noise_scan(17, 7, 29, 5);
   const Grid grid = grid_of(scan, {9, 7, 6}, 0.8);

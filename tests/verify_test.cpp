@@ -371,7 +371,8 @@ BOOST_AUTO_TEST_CASE(program_says_what_is_wrong_with_a_file_and_where) {
   const std::string scan = (folder / "s.h5").string(), file = (folder / "v.vdvr").string();
   BOOST_REQUIRE(run(folder, "simulate --phantom shepp-logan --detector 25x9 --angles 30 -o " + scan).code ==
                 0);
-  const Result built = run(folder, "build " + scan + " --epsilon 10% --size 12x12x6 -o " + file);
+  const Result built =
+      run(folder, "build " + scan + " --epsilon 10% --storage f32 --size 12x12x6 -o " + file);
   BOOST_REQUIRE_MESSAGE(built.code == 0, built.err);
   const std::string with = " --projections " + scan;
   const Result good = run(folder, "verify " + file + with + " --exhaustive --json");

@@ -36,12 +36,23 @@ Json device_json(const DeviceInfo& d) {
           {"max_work_group", d.max_work_group},
           {"images", d.images},
           {"linear_float_image", d.linear_float_image},
+          {"linear_u16_image", d.linear_u16_image},
+          {"linear_u8_image", d.linear_u8_image},
           {"image3d_max", {d.image3d_max[0], d.image3d_max[1], d.image3d_max[2]}},
           {"sampler", sampler_reason(d)}};
 }
 
+Json filter_json(const FilterProbe& p) {
+  return {{"image3d", p.image3d},
+          {"weight_error", p.weight_error},
+          {"delta", p.delta},
+          {"constant_error", p.constant_error}};
+}
+
 Json probe_json(const SamplerProbe& p) {
   return {{"image3d", p.image3d},
+          {"u16", filter_json(p.u16)},
+          {"u8", filter_json(p.u8)},
           {"weight_error", p.weight_error},
           {"delta", p.delta},
           {"constant_error", p.constant_error},

@@ -14,7 +14,12 @@
 #if defined(VDVR_DIALECT_OPENCL)
 #pragma OPENCL FP_CONTRACT OFF
 #define VDVR_GLOBAL __global
+// Records and coordinates are handed on by value: a call that is not inlined copies them through memory.
+#if defined(__clang__) || defined(__GNUC__)
+#define VDVR_INLINE inline __attribute__((always_inline))
+#else
 #define VDVR_INLINE inline
+#endif
 typedef ulong vdvr_u64;
 typedef uint vdvr_u32;
 typedef ushort vdvr_u16;
@@ -76,13 +81,10 @@ VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u32 low, vdvr_u32 bits, vdvr_i32 offset, 
   b.base_around = bits >> 9 & 1u;
   b.type = bits >> 10 & 3u;
   b.place = (vdvr_u64)(bits >> 17) << 32 | low;
-  if ((bits & 511u) == 0u) {
-    b.stride_y = (vdvr_u32)grid.cells_x + 1u;
-    b.stride_z = b.stride_y * ((vdvr_u32)grid.cells_y + 1u);
-  } else {
-    b.stride_y = ((vdvr_u32)grid.granularity << b.level_x) + 1u;
-    b.stride_z = b.stride_y * (((vdvr_u32)grid.granularity << b.level_y) + 1u);
-  }
+  const int in_base = (bits & 511u) == 0u;
+  b.stride_y = (in_base ? (vdvr_u32)grid.cells_x : (vdvr_u32)grid.granularity << b.level_x) + 1u;
+  b.stride_z =
+      b.stride_y * ((in_base ? (vdvr_u32)grid.cells_y : (vdvr_u32)grid.granularity << b.level_y) + 1u);
   b.scale = grid.step * (float)(1 << (bits >> 12 & 31u));
   b.bias = grid.step * (float)offset;
   return b;
