@@ -1,7 +1,7 @@
 // Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered
 // projections, T from second differences of gold, and the node slack that the node test adds to |V - gold|.
-// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted sup of
-// the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
+// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted
+// sup of the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
 // float[block][cell z][y][x]; gold float[block][y + 1][x + 1][gold stride] with z + 1 inside, one node
 // of halo on every side; cells float[block][y][x][stride] with cell z at z + 1; slack
 // float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
@@ -75,7 +75,8 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
   p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
 }
 
-// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the block.
+// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the
+// block.
 __kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
                            int cells_z, int rate, int stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
@@ -107,18 +108,20 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
     low = fmin(low, v);                 \
     high = fmax(high, v);               \
   }
-#define CORNERS(M)                                                                  \
-  M(at)                                                                             \
-  M(at + 1) M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) \
-      M(at + row + gold_stride) M(at + row + gold_stride + 1)
+#define CORNERS(M)                                                                                  \
+  M(at)                                                                                             \
+  M(at + 1)                                                                                         \
+  M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
+      M(at + row + gold_stride + 1)
 
 // Slack of each gold cell: (larger signed sum of the largest second differences at the cell's corners) / 8
-// plus `addend`, which is 2.5 P + the remainder of T by base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
-// window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
-// room.
-__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* addend, int nx,
-                         int ny, int nz, int gold_stride, int stride, int rate, int cells_x, int cells_y,
-                         int blocks, float t_constant, int windowed, float window_low, float window_high) {
+// plus `addend`, which is 2.5 P + the remainder of T by base cell, plus t_constant. Cells beyond the block,
+// and with `windowed` those whose range misses the window, are UNTESTED. The host pads gold and the strides
+// so that no 16-lane access leaves its column's room.
+__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* addend,
+                         int nx, int ny, int nz, int gold_stride, int stride, int rate, int cells_x,
+                         int cells_y, int blocks, float t_constant, int windowed, float window_low,
+                         float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
