@@ -33,10 +33,10 @@
 #define TILE_Y 2
 #define OFFSET_X (float8)(0, 1, 2, 3, 0, 1, 2, 3)
 #define OFFSET_Y (float8)(0, 0, 0, 0, 1, 1, 1, 1)
-#define FOR_TILE(M)                                                                               \
-  M(a0, s0, 0, 0)                                                                                 \
-  M(a1, s1, 1, 0) M(a2, s2, 2, 0) M(a3, s3, 3, 0) M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) \
-      M(b3, s7, 3, 1)
+#define FOR_TILE(M) \
+  M(a0, s0, 0, 0)   \
+  M(a1, s1, 1, 0)   \
+  M(a2, s2, 2, 0) M(a3, s3, 3, 0) M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) M(b3, s7, 3, 1)
 #define LANE(v, i) v.i
 #elif VDVR_TILE == 1
 #define TILE float

@@ -1,5 +1,5 @@
-// One work-item carries VDVR_LANES samples of z: the vector type, and its aligned loads and stores. Tuning; never
-// changes the result. Included by back_project.cl and batched_product.cl.
+// One work-item carries VDVR_LANES samples of z: the vector type, and its aligned loads and stores. Tuning;
+// never changes the result. Included by back_project.cl and batched_product.cl.
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
