@@ -20,7 +20,8 @@ std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 }  // namespace
 
 LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& b, const opencl::DeviceArray<float>& gold,
-                         const opencl::DeviceArray<float>& margin, std::int64_t spacing, int steps) {
+                         const opencl::DeviceArray<float>& margin, std::int64_t spacing, int steps,
+                         float curvature) {
   LevelSamples l;
   l.spacing = spacing;
   l.reach = b.halo / spacing;
@@ -55,7 +56,7 @@ LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& b, const opencl
   const opencl::DeviceArray<float> low(state, columns * count(b.gold_stride), "smallest errors"),
       high(state, columns * count(b.gold_stride), "largest errors");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
       pool(state, "fit_coefficients", "pool_errors");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_float>
@@ -63,7 +64,7 @@ LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& b, const opencl
   for (int step = 0; step < steps; ++step) {
     pool({{count(b.gold_stride / 16), count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low.buffer(),
          high.buffer(), l.along.buffer(), gold.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s,
-         reach, cx, cy, blocks);
+         reach, cx, cy, blocks, curvature);
     shift(per_sample, l.samples.buffer(), low.buffer(), high.buffer(), halo, stride, s, reach, cx, cy, cz,
           to_int(l.stride), blocks, to_int(b.z_first), to_int(b.z_last), share);
     along();

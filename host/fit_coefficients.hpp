@@ -29,11 +29,12 @@ struct LevelSamples {
 /// samples gain from many steps (most bricks read them), those of finer levels hardly after two.
 constexpr int base_fit_steps = 8, level_fit_steps = 2;
 
-/// `steps` = 0: gold itself at the nodes. Right inside the blocks where halo >= steps * spacing. Cost: per
-/// step about two evaluations of the interpolant per gold node. Memory: (2 + 2 / spacing) / spacing^2 of the
-/// gold.
+/// `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many second differences below gold's
+/// interpolant, on average over a gold cell of the grid that is certified. Right inside the blocks where halo
+/// >= steps * spacing. Cost: per step about two evaluations of the interpolant per gold node. Memory: (2 + 2
+/// / spacing) / spacing^2 of the gold.
 LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& blocks,
                          const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                         std::int64_t spacing, int steps);
+                         std::int64_t spacing, int steps, float curvature);
 
 }  // namespace vdvr

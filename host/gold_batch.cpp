@@ -59,7 +59,8 @@ const LevelSamples& GoldStream::Batch::lattice(std::int64_t spacing) {
   const auto found = lattices_.find(spacing);
   if (found != lattices_.end()) return found->second;
   const int steps = !settings_.midrange ? 0 : spacing == settings_.rate ? base_fit_steps : level_fit_steps;
-  return lattices_.emplace(spacing, fit_lattice(state_, shape_, gold_, margin_, spacing, steps))
+  return lattices_
+      .emplace(spacing, fit_lattice(state_, shape_, gold_, margin_, spacing, steps, settings_.curvature))
       .first->second;
 }
 
@@ -102,16 +103,17 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
   const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
-                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
       kernel(state_, "verify", "verify_nodes", field.defines);
   const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
   kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
          r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),
-         field.bricks.buffer(), field.grid, gold_.buffer(), slack_.buffer(), margin_.buffer(), first.buffer(),
-         selected.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.halo),
-         to_int(shape_.gold_stride), to_int(stride_), settings_.rate, to_int(bricks_x_), to_int(bricks_y_),
-         to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)), tolerance);
+         field.bricks.buffer(), field.grid, gold_.buffer(), above_.buffer(), below_.buffer(),
+         margin_.buffer(), first.buffer(), selected.buffer(), shape_.lowest, to_int(shape_.nx),
+         to_int(shape_.ny), to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), settings_.rate,
+         to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)),
+         tolerance);
   return r;
 }
 
@@ -144,9 +146,9 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
   const auto fails = [&](cl_int bits) { return bits >= 0 && !(std::bit_cast<float>(bits) <= tolerance); };
 
   const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int,
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_float>
+                 cl_int, cl_int, cl_int, cl_float>
       level_error(state_, "classify", "level_error", defines);
   opencl::DeviceArray<cl_int> before = std::move(level0.total), error(state_, before.size(), "brick errors");
   std::vector<std::vector<cl_int>> by_level{totals};
@@ -155,11 +157,11 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
     const LevelSamples& samples = lattice(rate >> level);
     error.fill(-1);
     level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
-                before.buffer(), samples.along.buffer(), gold_.buffer(), slack_.buffer(), margin_.buffer(),
-                shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo),
-                to_int(shape_.gold_stride), to_int(stride_), to_int(samples.spacing), to_int(samples.reach),
-                to_int(samples.cx), to_int(samples.cy), to_int(bricks_x_), to_int(bricks_y_),
-                to_int(bricks_z_), to_int(n), tolerance);
+                before.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
+                margin_.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz),
+                to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), to_int(samples.spacing),
+                to_int(samples.reach), to_int(samples.cx), to_int(samples.cy), to_int(bricks_x_),
+                to_int(bricks_y_), to_int(bricks_z_), to_int(n), tolerance);
     by_level.push_back(error.to_host());
     std::swap(error, before);
   }

@@ -16,9 +16,11 @@ struct GoldSettings {
   int rate = 8;
   int upsampling = 8;
   std::string u_filter = "linear";
-  std::optional<std::pair<double, double>> window;
+  std::optional<std::pair<double, double>> window{};
   bool midrange = false;   ///< samples fitted to the trilinear filter; else gold at the nodes
   bool base_only = false;  ///< only fitted base samples are asked for: no slack, no other level
+  /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
+  float curvature = 0.0625f;
   bool grid_only = false;  ///< slack counts as 0: the paper's test, for comparison
 };
 

@@ -63,7 +63,7 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
     slab_bricks_ /= 2;
   const auto block_bytes = [&] {
     const std::int64_t width = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
-    return count(12 * width * width * (slab_bricks_ * g * settings.rate + 62 + 2 * halo_));
+    return count(20 * width * width * (slab_bricks_ * g * settings.rate + 62 + 2 * halo_));
   };
   while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
   if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
@@ -268,7 +268,7 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
     }
 
   const std::int64_t gold = (b.nx + 2 * halo_) * (b.ny + 2 * halo_), nodes = b.nx * b.ny * slab.stride;
-  const std::int64_t per_block = 4 * (gold * b.gold_stride + 2 * nodes);
+  const std::int64_t per_block = 4 * (gold * b.gold_stride + 4 * nodes);
   const std::int64_t together = std::clamp<std::int64_t>(
       std::min<std::int64_t>(64 << 20, static_cast<std::int64_t>(state_.memory.left() / 3)) / per_block, 1,
       static_cast<std::int64_t>(work.first.size()));
@@ -276,7 +276,8 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
       opencl::DeviceArray<float>(state_, count(together * gold * b.gold_stride + gold_room), "gold block");
   batch.margin_ = opencl::DeviceArray<float>(state_, count(together * gold), "coverage margins");
   if (node_slack_) {
-    batch.slack_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack");
+    batch.above_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack above");
+    batch.below_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack below");
     batch.p_ = opencl::DeviceArray<float>(
         state_, count(together * slab.cells_x * slab.cells_y * slab.cells_z), "projection bounds of cells");
     node_slack_->begin(slab, together);
@@ -323,7 +324,8 @@ void GoldStream::run_slab(const Work& work, const std::vector<std::uint8_t>& sel
     batch.margin_.write(margins);
     back_project(state_, scan_.geometry, projections, columns, settings_.u_filter, batch.gold_);
     if (node_slack_)
-      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.slack_, batch.p_);
+      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_,
+                     batch.p_);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
       spent_.work.samples +=
@@ -342,6 +344,8 @@ void GoldStream::run_slab(const Work& work, const std::vector<std::uint8_t>& sel
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
                       const FieldSups& sups, GoldSettings settings, const std::vector<std::uint8_t>& selected,
                       std::vector<float>& base, const Progress& progress) {
+  // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
+  settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
   settings.midrange = settings.base_only = true;
   GoldStream stream(state, scan, upsampler, sups, settings);

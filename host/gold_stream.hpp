@@ -6,6 +6,7 @@
 // is the same.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <map>
@@ -26,12 +27,23 @@
 
 namespace vdvr {
 
+/// How far F may lie above and below gold's interpolant in the gold cells around a node: T + P to either
+/// side. Negative where the node is not tested.
+struct Slack {
+  float above = -1, below = -1;
+  [[nodiscard]] bool tested() const { return above >= 0; }
+  /// The most that |V - F| may be around a node where V - gold is `difference`.
+  [[nodiscard]] float total(float difference) const {
+    return std::max(difference + below, above - difference);
+  }
+};
+
 /// What one brick measured against gold.
 struct BrickMeasure {
   std::int64_t brick = 0;
-  float total = -1;  ///< largest |V - gold| + T + P; negative: no tested node
+  float total = -1;  ///< largest that |V - F| may be, from V - gold and the slack; negative: no tested node
   float error = 0;   ///< largest |V - gold|
-  float slack = 0;   ///< largest T + P: what even gold may err
+  float slack = 0;   ///< largest T + P to either side: what even gold may err
   std::uint32_t violated =
       0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
 };
@@ -124,9 +136,9 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - gold| + slack
-  /// <= tolerance. Level 0 is measured on the stored base samples through the sampler: closing never changes
-  /// those, so it is final.
+  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - F| may be at
+  /// most the tolerance. Level 0 is measured on the stored base samples through the sampler: closing never
+  /// changes those, so it is final.
   std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
                                    const opencl::DeviceArray<std::uint8_t>& selected);
 
@@ -137,20 +149,21 @@ class GoldStream::Batch {
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();
 
-  /// Calls visit(node index x, y, z in the brick, gold, slack) for every node of one closed brick; reads the
+  /// Calls visit(node index x, y, z in the brick, gold, Slack) for every node of one closed brick; reads the
   /// block back.
   template <class Visit>
   void for_each_node(std::int64_t brick, Visit&& visit) const {
     const auto [b, x, y, z] = place(brick);
-    const std::vector<float> gold = gold_.to_host(), slack = slack_.to_host();
+    const std::vector<float> gold = gold_.to_host(), above = above_.to_host(), below = below_.to_host();
     const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate, h = shape_.halo;
     for (std::int64_t k = 0; k <= side && z * side + k < shape_.nz; ++k)
       for (std::int64_t j = 0; j <= side; ++j)
         for (std::int64_t i = 0; i <= side; ++i) {
           const std::int64_t nx = x * side + i, ny = y * side + j, nz = z * side + k;
           const std::int64_t column = (b * (shape_.ny + 2 * h) + ny + h) * (shape_.nx + 2 * h) + nx + h;
+          const auto at = static_cast<std::size_t>(((b * shape_.ny + ny) * shape_.nx + nx) * stride_ + nz);
           visit(Index3{i, j, k}, gold[static_cast<std::size_t>(column * shape_.gold_stride + nz + h)],
-                slack[static_cast<std::size_t>(((b * shape_.ny + ny) * shape_.nx + nx) * stride_ + nz)]);
+                Slack{above[at], below[at]});
         }
   }
 
@@ -186,7 +199,7 @@ class GoldStream::Batch {
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;
-  opencl::DeviceArray<float> gold_, slack_, margin_, p_;
+  opencl::DeviceArray<float> gold_, above_, below_, margin_, p_;
 };
 
 }  // namespace vdvr

@@ -71,10 +71,10 @@ BrickGold brick_gold(GoldStream& stream, std::int64_t brick, std::size_t bricks)
   stream.run(
       one,
       [&](GoldStream::Batch& batch) {
-        batch.for_each_node(brick, [&](const Index3& i, float gold, float slack) {
+        batch.for_each_node(brick, [&](const Index3& i, float gold, const Slack& slack) {
           for (std::size_t a = 0; a < 3; ++a) out.side[a] = std::max(out.side[a], i[a] + 1);
           out.gold.push_back(gold);
-          out.slack.push_back(slack);
+          out.slack.push_back(std::max(slack.above, slack.below));
         });
       },
       {}, "brick");

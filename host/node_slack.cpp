@@ -56,7 +56,8 @@ void NodeSlack::begin(const SlabShape& slab, std::int64_t together) {
       count(together * (slab.cells_x * rate + 1) * (slab.cells_y * rate + 1) * slab.stride);
   addend_ = opencl::DeviceArray<float>(state_, cells, "slack of cells");
   cell_remainder_ = opencl::DeviceArray<float>(state_, cells, "remainders of cells");
-  cells_ = opencl::DeviceArray<float>(state_, columns, "cell slack");
+  cells_above_ = opencl::DeviceArray<float>(state_, columns, "cell slack above");
+  cells_below_ = opencl::DeviceArray<float>(state_, columns, "cell slack below");
   rows_ = opencl::DeviceArray<float>(state_, count(together * slab.cells_x * slab.cells_y * slab.stride),
                                      "slack by base cell of gold cells");
 }
@@ -66,7 +67,8 @@ void NodeSlack::end() {
   remainders_.reset();
   addend_ = {};
   cell_remainder_ = {};
-  cells_ = {};
+  cells_above_ = {};
+  cells_below_ = {};
   rows_ = {};
 }
 
@@ -128,14 +130,14 @@ void NodeSlack::look_up(std::int64_t blocks, const std::vector<std::array<std::i
 
 void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::int64_t, 3>>& first_brick,
                        const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                       opencl::DeviceArray<float>& slack) {
+                       opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below) {
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> expand(
       state_, "gold_bounds", "expand_bound");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_float, cl_float, cl_int, cl_float, cl_float>
-      cell_slack(state_, "gold_bounds", "cell_slack");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_float, cl_int, cl_int>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float, cl_int, cl_float, cl_float>
+      cell_slack(state_, "gold_bounds", "cell_slack");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_int>
       node_slack(state_, "gold_bounds", "node_slack");
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
@@ -156,22 +158,23 @@ void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::in
   window.second += arithmetic_;
   const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
   cell_slack({{count((b.nz + 15) / 16), count(b.nx - 1), count((b.ny - 1) * b.count)}, local},
-             cells_.buffer(), gold.buffer(), rows_.buffer(), nx, ny, nz, to_int(b.halo),
-             to_int(b.gold_stride), stride, settings_.rate, cells_x, cells_y, blocks,
+             cells_above_.buffer(), cells_below_.buffer(), gold.buffer(), rows_.buffer(), nx, ny, nz,
+             to_int(b.halo), to_int(b.gold_stride), stride, settings_.rate, cells_x, cells_y, blocks,
              settings_.grid_only ? 0.0f : 1.0f, static_cast<cl_float>(1.5 * rounding_),
              settings_.window ? 1 : 0, static_cast<cl_float>(window.first),
              static_cast<cl_float>(window.second));
-  node_slack({{count((b.nz + 15) / 16), count(b.nx), count(b.ny * b.count)}, local}, slack.buffer(),
-             cells_.buffer(), margin.buffer(), last.buffer(), nx, ny, nz, to_int(b.halo), stride, blocks,
-             b.lowest, to_int(b.z_first), to_int(b.z_last));
+  node_slack({{count((b.nz + 15) / 16), count(b.nx), count(b.ny * b.count)}, local}, above.buffer(),
+             below.buffer(), cells_above_.buffer(), cells_below_.buffer(), margin.buffer(), last.buffer(), nx,
+             ny, nz, to_int(b.halo), stride, blocks, b.lowest, to_int(b.z_first), to_int(b.z_last));
 }
 
 void NodeSlack::operator()(const GoldBlocks& blocks,
                            const std::vector<std::array<std::int64_t, 3>>& first_brick,
                            const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                           opencl::DeviceArray<float>& slack, opencl::DeviceArray<float>& p) {
+                           opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below,
+                           opencl::DeviceArray<float>& p) {
   look_up(blocks.count, first_brick, p);
-  launch(blocks, first_brick, gold, margin, slack);
+  launch(blocks, first_brick, gold, margin, above, below);
 }
 
 }  // namespace vdvr

@@ -1,5 +1,5 @@
-// The slack T + P of every gold node of a batch of blocks: P and the remainder of T by base cell, second
-// differences by gold cell (docs/error-bounds.md). Called by gold_stream.cpp.
+// The slack T + P of every gold node of a batch of blocks, to either side: P and the remainder of T by base
+// cell, second differences by gold cell (docs/error-bounds.md). Called by gold_stream.cpp.
 #pragma once
 
 #include <array>
@@ -30,11 +30,12 @@ class NodeSlack {
   /// Room for `together` blocks of a slab, and no tables yet.
   void begin(const SlabShape& slab, std::int64_t together);
   void end();
-  /// slack[block][y][x][stride] and p[block][cell z][y][x] of blocks whose first bricks are given. P of a
-  /// base cell is computed once: later passes read it.
+  /// above, below[block][y][x][stride] and p[block][cell z][y][x] of blocks whose first bricks are given. P
+  /// of a base cell is computed once: later passes read it.
   void operator()(const GoldBlocks& blocks, const std::vector<std::array<std::int64_t, 3>>& first_brick,
                   const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                  opencl::DeviceArray<float>& slack, opencl::DeviceArray<float>& p);
+                  opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below,
+                  opencl::DeviceArray<float>& p);
 
   /// What rounding adds to every slack.
   [[nodiscard]] double rounding() const { return settings_.grid_only ? 0 : 1.5 * rounding_; }
@@ -47,7 +48,7 @@ class NodeSlack {
                opencl::DeviceArray<float>& p);
   void launch(const GoldBlocks& b, const std::vector<std::array<std::int64_t, 3>>& first_brick,
               const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-              opencl::DeviceArray<float>& slack);
+              opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below);
 
   opencl::State& state_;
   const FilteredScan& scan_;
@@ -59,7 +60,7 @@ class NodeSlack {
   std::vector<float> cell_addend_;  // 2.5 P and the remainder of T, alike
   SlabShape slab_;
   std::optional<BoundTable> projection_, remainders_;  // of the slab, made when the first cell asks
-  opencl::DeviceArray<float> addend_, cell_remainder_, cells_, rows_;
+  opencl::DeviceArray<float> addend_, cell_remainder_, cells_above_, cells_below_, rows_;
   double table_seconds_ = 0;
 };
 

@@ -302,16 +302,10 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   const auto all = candidates(rates);
   const bool grid_only = settings.terms == "grid";
   const auto stream_at = [&](const Rates& r) {
-    return GoldStream(state, filtered, upsampler, sups,
-                      {grid,
-                       fitting_granularity(settings.granularity, grid),
-                       r.gold,
-                       r.upsampling,
-                       r.u_filter,
-                       {},
-                       settings.coefficients == "midrange",
-                       false,
-                       grid_only});
+    GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
+    s.midrange = settings.coefficients == "midrange";
+    s.grid_only = grid_only;
+    return GoldStream(state, filtered, upsampler, sups, s);
   };
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {

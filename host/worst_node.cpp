@@ -11,13 +11,13 @@ Vec3 worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::
   Vec3 where{};
   float largest = -1;
   const BrickSamples stored(volume, p);
-  batch.for_each_node(brick, [&](const Index3& i, float gold, float slack) {
-    if (slack < 0) return;
+  batch.for_each_node(brick, [&](const Index3& i, float gold, const Slack& slack) {
+    if (!slack.tested()) return;
     std::array<float, 3> c{};
     for (std::size_t a = 0; a < 3; ++a)
       c[a] = static_cast<float>(static_cast<double>(p[a] * g) + static_cast<double>(i[a]) / rate);
     const float v = stored.at(c[0], c[1], c[2]);
-    const float total = std::abs(v - gold) + slack;
+    const float total = slack.total(v - gold);
     if (total <= largest) return;
     largest = total;
     for (std::size_t a = 0; a < 3; ++a)

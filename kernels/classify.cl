@@ -5,12 +5,11 @@
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
-// The level's interpolant at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                                  \
-  (fabs((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + gold_stride + (z))) + \
-        fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + gold_stride + (z))) -          \
-        vload16(0, gold_column + (z))) +                                                             \
-   vload16(0, slack_column + (z)))
+// The level's interpolant less gold at 16 nodes of one column, or gold itself at 1x spacing.
+#define ERROR_AT(z)                                                                             \
+  ((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + gold_stride + (z))) + \
+   fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + gold_stride + (z))) -          \
+   vload16(0, gold_column + (z)))
 
 inline float largest_of(float16 v) {
   const float8 a = fmax(v.lo, v.hi);
@@ -19,13 +18,14 @@ inline float largest_of(float16 v) {
   return fmax(c.x, c.y);
 }
 
-// Raises error[block][brick z][brick y][brick x] to the largest |interpolant - gold| + slack of the brick's
+// Raises error[block][brick z][brick y][brick x] to the largest that |interpolant - F| may be at the brick's
 // closed nodes. It starts negative and stays so where no node of a brick is tested. Bricks that `before` (the
 // errors of the level below) found within `tolerance` are left out. Positive floats order as their bits do.
 // One work-item does one column of one brick layer; its last node is also the next layer's first.
 __kernel void level_error(volatile __global int* error, __global const int* before,
                           __global const float* along, __global const float* gold,
-                          __global const float* slack, __global const float* margin, float lowest, int nx,
+                          __global const float* above, __global const float* below,
+                          __global const float* margin, float lowest, int nx,
                           int ny, int nz, int halo, int gold_stride, int stride, int spacing, int reach,
                           int cx, int cy, int bricks_x, int bricks_y, int bricks_z, int blocks,
                           float tolerance) {
@@ -54,16 +54,21 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
       along + (((size_t)block * cy + iy + reach) * cx + ix + reach) * gold_stride + halo + first;
   __global const float* b = a + (size_t)cx * gold_stride;
   __global const float* gold_column = gold + gold_at * gold_stride + halo + first;
-  __global const float* slack_column = slack + column * stride + first;
+  __global const float *above_column = above + column * stride + first,
+                       *below_column = below + column * stride + first;
 
   // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
   float largest = -1.0f;
   int z = 0;
-  for (; z + 16 <= last - first + 1; z += 16) largest = fmax(largest, largest_of(ERROR_AT(z)));
+  for (; z + 16 <= last - first + 1; z += 16) {
+    const float16 e = ERROR_AT(z);
+    largest = fmax(largest, largest_of(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
+  }
   for (; z <= last - first; ++z) {
     const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[gold_stride + z]) +
                     fy * ((1.0f - fx) * b[z] + fx * b[gold_stride + z]);
-    largest = fmax(largest, fabs(v - gold_column[z]) + slack_column[z]);
+    const float e = v - gold_column[z];
+    largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
   }
   if (largest < 0.0f) return;
   for (int by = by0; by <= by1; ++by)

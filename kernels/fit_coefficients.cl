@@ -1,6 +1,7 @@
 // Samples fitted to the trilinear filter (docs/error-bounds.md, section on coefficients): starting from gold
 // at the nodes of a level, each step takes from a sample 0.8 of the middle between the largest and the
-// smallest error of the interpolant around it, half a sample spacing to every side. Layouts: gold
+// smallest error of the interpolant around it, half a sample spacing to every side. Errors count from the middle
+// of where F may lie between gold nodes: gold less `curvature` times its second differences. Layouts: gold
 // float[block][y + halo][x + halo][gold_stride], node z at z + halo; margin float[block][y + halo][x + halo];
 // a lattice of every `spacing`-th gold node, `reach` of them in the halo on every side: lattice
 // float[block][cy][cx][lattice_stride], node n at n / spacing + reach; along, low and high
@@ -45,7 +46,7 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
 __kernel void pool_errors(__global float* low, __global float* high, __global const float* along,
                           __global const float* gold, __global const float* margin, float lowest, int nx,
                           int ny, int halo, int gold_stride, int spacing, int reach, int cx, int cy,
-                          int blocks) {
+                          int blocks, float curvature) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cy, y = (int)get_global_id(2) - block * cy;
   if (z + 16 > gold_stride || x < 1 || y < 1 || x >= cx - 1 || y >= cy - 1 || block >= blocks) return;
@@ -62,9 +63,15 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
                   fy = (float)(dy < 0 ? dy + spacing : dy) * step;
       __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * gold_stride + z;
       __global const float* b = a + (size_t)cx * gold_stride;
+      __global const float* centre = gold + column * gold_stride + z;
+      const float16 f = vload16(0, centre);
+      const float16 around = vload16(0, centre - 1) + vload16(0, centre + 1) +
+                             vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) +
+                             vload16(0, centre - (size_t)row * gold_stride) +
+                             vload16(0, centre + (size_t)row * gold_stride);
       const float16 e = (1.0f - fy) * ((1.0f - fx) * vload16(0, a) + fx * vload16(0, a + gold_stride)) +
                         fy * ((1.0f - fx) * vload16(0, b) + fx * vload16(0, b + gold_stride)) -
-                        vload16(0, gold + column * gold_stride + z);
+                        (f - curvature * (around - 6.0f * f));
       smallest = fmin(smallest, e);
       largest = fmax(largest, e);
     }

@@ -114,11 +114,12 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
   M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
       M(at + row + gold_stride + 1)
 
-// Slack of each gold cell: (larger signed sum of the largest second differences at the cell's corners) / 8
-// plus `addend`, which is 2.5 P + the remainder of T by base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
-// window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
+// Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it lies
+// below, so `below` is the sum of the largest positive second differences at the cell's corners, by axis, / 8,
+// `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by base cell, plus
+// t_constant. Cells beyond the block, and with `windowed` those whose range misses the window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
 // room.
-__kernel void cell_slack(__global float* cells, __global const float* gold, __global const float* addend, int nx,
+__kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold, __global const float* addend, int nx,
                          int ny, int nz, int halo, int gold_stride, int stride, int rate, int cells_x,
                          int cells_y, int blocks, float counted, float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
@@ -132,42 +133,52 @@ __kernel void cell_slack(__global float* cells, __global const float* gold, __gl
   CORNERS(DIFFERENCES)
   const float16 bound =
       vload16(0, addend + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
-  float16 slack = fmax(px + py + pz, -(mx + my + mz)) * 0.125f + t_constant + bound;
+  float16 below = (px + py + pz) * 0.125f + t_constant + bound,
+          above = -(mx + my + mz) * 0.125f + t_constant + bound;
   if (windowed) {
     float16 low = vload16(0, at), high = low;
     CORNERS(RANGE)
     // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
-    slack = select(slack, (float16)(UNTESTED), (low - slack > window_high) | (high + slack < window_low));
+    const int16 out = (low - below > window_high) | (high + above < window_low);
+    above = select(above, (float16)(UNTESTED), out);
+    below = select(below, (float16)(UNTESTED), out);
   }
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  slack = select(slack * counted, (float16)(UNTESTED), k > nz - 2);
-  __global float* target = cells + (((size_t)block * ny + y) * nx + x) * stride;
-  vstore16(slack, 0, target + z + 1);
-  if (z == 0) target[0] = UNTESTED;
+  above = select(above * counted, (float16)(UNTESTED), k > nz - 2);
+  below = select(below * counted, (float16)(UNTESTED), k > nz - 2);
+  const size_t column = (((size_t)block * ny + y) * nx + x) * stride;
+  vstore16(above, 0, cells_above + column + z + 1);
+  vstore16(below, 0, cells_below + column + z + 1);
+  if (z == 0) cells_above[column] = cells_below[column] = UNTESTED;
 }
 
-// Slack of each node: the largest of the cells around it, UNTESTED where no such cell meets the covered
+// Slack of each node: the largest of either of the cells around it, UNTESTED where no such cell meets the covered
 // region. margin: per block and column the coverage margin across z; nodes with less than `lowest` are
 // untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
-__kernel void node_slack(__global float* slack, __global const float* cells, __global const float* margin,
+__kernel void node_slack(__global float* above, __global float* below, __global const float* cells_above,
+                         __global const float* cells_below, __global const float* margin,
                          __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,
                          float lowest, int z_first, int z_last) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
   if (z >= nz || x >= nx || block >= blocks) return;
   const size_t column = ((size_t)block * ny + y) * nx + x;
-  float16 largest = (float16)(UNTESTED);
+  float16 a = (float16)(UNTESTED), b = a;
   const int2 end = last[block];
   const size_t here = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
   if (margin[here] >= lowest && x <= end.x && y <= end.y) {
     for (int dy = -1; dy <= 0; ++dy)
       for (int dx = -1; dx <= 0; ++dx) {
         if (x + dx < 0 || y + dy < 0 || x + dx >= end.x || y + dy >= end.y) continue;
-        __global const float* at = cells + (column + dy * nx + dx) * stride + z;
-        largest = fmax(largest, fmax(vload16(0, at), vload16(0, at + 1)));
+        const size_t at = (column + dy * nx + dx) * stride + z;
+        a = fmax(a, fmax(vload16(0, cells_above + at), vload16(0, cells_above + at + 1)));
+        b = fmax(b, fmax(vload16(0, cells_below + at), vload16(0, cells_below + at + 1)));
       }
     const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    largest = select(largest, (float16)(UNTESTED), (k < z_first) | (k > z_last) | (k > nz - 1));
+    const int16 out = (k < z_first) | (k > z_last) | (k > nz - 1);
+    a = select(a, (float16)(UNTESTED), out);
+    b = select(b, (float16)(UNTESTED), out);
   }
-  vstore16(largest, 0, slack + column * stride + z);
+  vstore16(a, 0, above + column * stride + z);
+  vstore16(b, 0, below + column * stride + z);
 }

@@ -1,6 +1,6 @@
 // Measures the stored field V against gold at every tested node of a block, through the sampler that renders
-// it (kernels/shared/mixed_sampler.h). Per brick: the largest |V - gold| + T + P, the largest |V - gold|, the
-// largest T + P, and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
+// it (kernels/shared/mixed_sampler.h). Per brick: the largest that |V - F| may be, from V - gold and from how far F
+// may lie above and below gold's interpolant; the largest |V - gold|; the largest slack to either side; and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
 // Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
 // Called by host/gold_stream.cpp.
 #include "shared/mixed_sampler.h"
@@ -23,7 +23,8 @@ inline float largest_of(float8 v) {
 __kernel void verify_nodes(volatile __global int* total, volatile __global int* error,
                            volatile __global int* slack_max, volatile __global int* violated,
                            __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
-                           __global const float* gold, __global const float* slack,
+                           __global const float* gold, __global const float* above,
+                           __global const float* below,
                            __global const float* margin, __global const int4* first_brick,
                            __global const uchar* selected, float lowest, int nx, int ny, int halo,
                            int gold_stride, int stride, int rate, int bricks_x, int bricks_y, int bricks_z, int blocks,
@@ -45,7 +46,7 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
   __global const float* gold_start = gold + gold_at * gold_stride + halo;
-  __global const float* slack_start = slack + column * stride;
+  __global const float *above_start = above + column * stride, *below_start = below + column * stride;
 
   for (int brick_z = 0; brick_z < bricks_z; ++brick_z) {
     const int bz = first.z + brick_z;
@@ -56,7 +57,8 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
     const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x),
                     y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
     __global const float* gold_column = gold_start + brick_z * g * rate;
-    __global const float* slack_column = slack_start + brick_z * g * rate;
+    __global const float *above_column = above_start + brick_z * g * rate,
+                         *below_column = below_start + brick_z * g * rate;
     const float interval = (float)(1 << b.level_z) / (float)rate;
     float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
     int parts = 0;
@@ -71,28 +73,29 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
       int i = 0;
       for (; i + 8 <= nodes; i += 8) {
         const float8 t = ((float)i + (float8)(0, 1, 2, 3, 4, 5, 6, 7)) * interval;
-        const float8 s = vload8(0, slack_column + first_node + i);
-        const float8 e = fabs(((1.0f - t) * low + t * high) -
-                              vload8(0, gold_column + first_node + i));  // vdvr_lerp, eight at once
-        const float8 both = e + s;
+        const float8 up = vload8(0, above_column + first_node + i),
+                     down = vload8(0, below_column + first_node + i);
+        const float8 e = ((1.0f - t) * low + t * high) -
+                              vload8(0, gold_column + first_node + i);  // vdvr_lerp, eight at once
+        const float8 both = fmax(e + down, up - e);
         // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the
         // comparison.
-        if (any((s >= 0.0f) & !(both <= tolerance))) break;
+        if (any((up >= 0.0f) & !((e + down <= tolerance) & (up - e <= tolerance)))) break;
         largest_total = fmax(largest_total, largest_of(both));
-        largest_slack = fmax(largest_slack, largest_of(s));
-        largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), e, s >= 0.0f)));
+        largest_slack = fmax(largest_slack, largest_of(fmax(up, down)));
+        largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), fabs(e), up >= 0.0f)));
       }
       for (; i < nodes; ++i) {
         const int k = first_node + i;
-        const float s = slack_column[k];
-        if (!(s >= 0.0f)) continue;
+        const float up = above_column[k], down = below_column[k];
+        if (!(up >= 0.0f)) continue;
         // NaN would drop out of the maxima.
-        const float difference = fabs(vdvr_lerp(low, high, (float)i * interval) - gold_column[k]),
-                    e = isnan(difference) ? INFINITY : difference;
-        largest_total = fmax(largest_total, e + s);
-        largest_slack = fmax(largest_slack, s);
-        largest_error = fmax(largest_error, e);
-        if (!(e + s <= tolerance))
+        const float difference = vdvr_lerp(low, high, (float)i * interval) - gold_column[k],
+                    e = isnan(difference) ? INFINITY : difference, both = fmax(e + down, up - e);
+        largest_total = fmax(largest_total, both);
+        largest_slack = fmax(largest_slack, fmax(up, down));
+        largest_error = fmax(largest_error, fabs(e));
+        if (!(both <= tolerance))
           parts |= 1 << (part_of(k, last_z) * 9 + part_of(iy, last_y) * 3 + part_of(ix, last_x));
       }
     }

@@ -105,8 +105,8 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
     const float high = vdvr_sample_in_plane(samples, b, lx, ly, index + 1);
     const int nodes = k + per_interval == last_z ? per_interval + 1 : per_interval;
     for (int n = 0; n < nodes; ++n, ++k) {
-      const float e = fabs(vdvr_lerp(low, high, (float)n * step) - f[k]);
-      out[k] = e <= FLT_MAX ? e : INFINITY;  // NaN must not pass a maximum unseen
+      const float e = vdvr_lerp(low, high, (float)n * step) - f[k];
+      out[k] = fabs(e) <= FLT_MAX ? e : INFINITY;  // NaN must not pass a maximum unseen
     }
     low = high;
   }
@@ -194,7 +194,9 @@ inline float16 curvature(__global const float* p, int stride, float correction) 
     const float16 v = vload16(0, p);                                                           \
     low = fmin(low, v);                                                                        \
     high = fmax(high, v);                                                                      \
-    e = fmax(e, vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz)));                   \
+    const float16 ec = vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz));             \
+    highest = fmax(highest, ec);                                                               \
+    lowest = fmin(lowest, ec);                                                                 \
   }
 
 // Per column of gold cells of a tested brick: int4 {largest bound of |V - F| less the brick's constant, the
@@ -229,8 +231,8 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
     if (inside && z < end) {
       __global const float* at = field_column(field, item, begin, x, y, cells, nx, ny, z_padded) + z;
       __global const float* err = error + (((size_t)i * side + y) * side + x) * error_padded + z;
-      float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px, e = px;
-      float16 low = (float16)(INFINITY), high = -low;
+      float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
+      float16 low = (float16)(INFINITY), high = -low, lowest = low, highest = high;
       CORNER(0, 0, 0)
       CORNER(1, 0, 0)
       CORNER(0, 1, 0)
@@ -239,14 +241,14 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
       CORNER(1, 0, 1)
       CORNER(0, 1, 1)
       CORNER(1, 1, 1)
-      const float16 t = 0.125f * fmax(px + py + pz, -(mx + my + mz));
+      // Where F is convex its interpolant lies above it, where it is concave below.
+      const float16 over = 0.125f * (px + py + pz), under = -0.125f * (mx + my + mz);
       const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
       int16 counts = (k < end) & (k + z_begin >= z_first);
       if (windowed) {
-        const float16 more = t + widening[i];
-        counts &= ~((low - more > window_high) | (high + more < window_low));
+        counts &= ~((low - over - widening[i] > window_high) | (high + under + widening[i] < window_low));
       }
-      float16 total = e + t;
+      float16 total = fmax(highest + over, under - lowest), e = fmax(highest, -lowest);
       total = select((float16)(INFINITY), total, total <= FLT_MAX);
       total = select((float16)(-1.0f), total, counts);
       e = select((float16)(0.0f), e, counts);

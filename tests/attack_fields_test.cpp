@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
               if (!chain.exact.covered(p)) continue;
               ++covered;
               for (std::int64_t c = 0; c < 8; ++c)
-                if (!(l.slack[l.at(x + (c & 1), y + (c >> 1 & 1), cz + (c >> 2))] >= 0)) {
+                if (!(l.above[l.at(x + (c & 1), y + (c >> 1 & 1), cz + (c >> 2))] >= 0)) {
                   ++missed;
                   break;
                 }

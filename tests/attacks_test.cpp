@@ -42,11 +42,12 @@ void expect(const std::string& check, const Scan& scan, const std::string& how, 
                                                          << "): error " << w.error << ", bound " << w.bound);
 }
 
-// A gold cell: its corners' indices in the lattice, and the slack that every corner allows it.
+// A gold cell: its corners' indices in the lattice, and the slack that every corner allows it to
+// either side.
 struct Cell {
   Index3 low{0, 0, 0};
   std::array<std::size_t, 8> corner{};
-  double slack = INFINITY;
+  double above = INFINITY, below = INFINITY;
 };
 
 Cell cell_at(const Lattice& l, const Index3& low) {
@@ -56,7 +57,8 @@ Cell cell_at(const Lattice& l, const Index3& low) {
     c.corner[i] =
         l.at(low[0] + static_cast<std::int64_t>(i & 1), low[1] + static_cast<std::int64_t>(i >> 1 & 1),
              low[2] + static_cast<std::int64_t>(i >> 2));
-    c.slack = std::min(c.slack, l.slack[c.corner[i]]);
+    c.above = std::min(c.above, l.above[c.corner[i]]);
+    c.below = std::min(c.below, l.below[c.corner[i]]);
   }
   return c;
 }
@@ -88,7 +90,7 @@ void check_gold(const Scan& scan, Chain& chain, const Lattice& l, const std::str
     for (std::int64_t y = 0; y < l.nodes[1]; ++y)
       for (std::int64_t x = 0; x < l.nodes[0]; ++x, ++i) {
         const auto n = static_cast<std::size_t>(i);
-        if (l.slack[n] < 0) continue;  // untested
+        if (l.above[n] < 0) continue;  // untested
         projection.see(std::abs(l.gold[n] - F[n]), l.p_of_node({x, y, z}) + l.arithmetic, positions[n]);
       }
   std::uniform_real_distribution<double> unit(0, 1);
@@ -105,16 +107,20 @@ void check_gold(const Scan& scan, Chain& chain, const Lattice& l, const std::str
   const auto truth = chain.exact.at(points);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Cell& c = cells[i / 3];
-    if (c.slack < 0) continue;
+    if (c.above < 0) continue;
     std::array<double, 8> computed{}, exact{};
     for (std::size_t k = 0; k < 8; ++k) {
       computed[k] = l.gold[c.corner[k]];
       exact[k] = F[c.corner[k]];
     }
-    slack.see(std::abs(trilinear(computed, fractions[i]) - truth[i]), c.slack + l.arithmetic, points[i]);
+    const auto see = [&](Worst& worst, const std::array<double, 8>& corners, double spare) {
+      const double difference = truth[i] - trilinear(corners, fractions[i]);
+      worst.see(std::max(difference, 0.0), c.above + spare, points[i]);
+      worst.see(std::max(-difference, 0.0), c.below + spare, points[i]);
+    };
+    see(slack, computed, l.arithmetic);
     // What is left of the slack without P bounds gold's own interpolation.
-    own.see(std::abs(trilinear(exact, fractions[i]) - truth[i]),
-            c.slack - l.p_of_cell(c.low[0], c.low[1], c.low[2]), points[i]);
+    see(own, exact, -l.p_of_cell(c.low[0], c.low[1], c.low[2]));
   }
   expect("P at gold nodes", scan, how, projection);
   expect("T + P inside gold cells", scan, how, slack);
@@ -140,7 +146,7 @@ void check_global(const Scan& scan, Chain& chain, const Lattice& l, const Rates&
   const auto positions = l.positions();
   const auto F = chain.exact.at(positions);
   for (std::size_t n = 0; n < F.size(); ++n) {
-    if (l.slack[n] < 0) continue;
+    if (l.above[n] < 0) continue;
     const double error = std::abs(l.gold[n] - F[n]);
     curvature_u.see(error, curvature + l.arithmetic, positions[n]);
     if (!cubic) amplitude_u.see(error, u.projection[0].second + rounding + l.arithmetic, positions[n]);

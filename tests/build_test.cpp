@@ -24,6 +24,7 @@ struct Wanted {
   RateOptions rates{};
   BuildOptions options{};
   std::uint64_t max_memory = 0;
+  bool sampled = false;
 };
 
 struct Built {
@@ -33,7 +34,9 @@ struct Built {
 
 Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   Device device("", wanted.max_memory);
-  Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, {wanted.epsilon, {}});
+  PlanSettings settings;
+  if (wanted.sampled) settings.coefficients = "sampled";
+  Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, {wanted.epsilon, {}}, settings);
   BuildResult result = build(device, scan, plan, wanted.options);
   if (wanted.max_memory > 0) BOOST_TEST(device.peak_memory() <= wanted.max_memory);
   return {std::move(plan), std::move(result)};
@@ -202,6 +205,7 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_the_paper_closing) {
   for (const StorageChoice storage : {StorageChoice::f32, StorageChoice::u8}) {
     Wanted wanted{grid_of(scan, {11, 10, 7}, 0.9), 0.15};
     wanted.options.closing = Closing::paper;
+    wanted.sampled = true;
     wanted.options.storage = storage;
     const Built built = build_of(scan, wanted);
     check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 150, 3));

@@ -193,14 +193,21 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
     words.insert(words.end(), more.begin(), more.end());
     check_refused(words, more[0]);
   };
-  build({"--coefficients", "midrange"});
   build({"--levels", "anisotropic"});
-  build({"--terms", "grid"});
-  build({"--epsilon-of", "max"});
-  build({"--paper"});
   build({"--resume"});
   check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
+}
+
+BOOST_AUTO_TEST_CASE(settings_that_exclude_each_other_are_refused) {
+  const std::vector<std::string> build{"build", "x.h5", "--epsilon", "3%", "-o", at("excluded.vdvr")};
+  const auto with = [&](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  check_refused(with(build, {"--closing", "paper"}), "--coefficients sampled");
+  check_refused(with(build, {"--paper", "--coefficients", "midrange"}), "--coefficients sampled");
+  check_refused({"run", "x.h5", "--epsilon", "3%", "-o", at("run"), "--paper"}, "use vdvr build");
 }
 
 BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {

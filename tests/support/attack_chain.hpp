@@ -54,14 +54,14 @@ struct Chain {
   FieldSups sups;
 };
 
-/// All gold nodes of a grid, x fastest, with what the certificate says of them. slack: the smallest that any
-/// brick uses; negative: untested. p: of every base cell.
+/// All gold nodes of a grid, x fastest, with what the certificate says of them. above, below: the smallest
+/// slack that any brick uses; negative: untested. p: of every base cell.
 struct Lattice {
   Grid grid;
   int rate = 1;
   double arithmetic = 0;
   Index3 nodes{0, 0, 0};
-  std::vector<double> gold, slack, p;
+  std::vector<double> gold, above, below, p;
   [[nodiscard]] std::size_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
     return static_cast<std::size_t>((z * nodes[1] + y) * nodes[0] + x);
   }
@@ -108,7 +108,8 @@ inline Lattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates
   const auto count = static_cast<std::size_t>(out.nodes[0] * out.nodes[1] * out.nodes[2]);
   const auto cells = static_cast<std::size_t>(grid.cells[0] * grid.cells[1] * grid.cells[2]);
   out.gold.assign(count, 0);
-  out.slack.assign(count, INFINITY);
+  out.above.assign(count, INFINITY);
+  out.below.assign(count, INFINITY);
   out.p.assign(cells, 0);
   stream.run(
       std::vector<std::uint8_t>(cells, 1),
@@ -119,11 +120,12 @@ inline Lattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates
           const Index3 brick{id % grid.cells[0], id / grid.cells[0] % grid.cells[1],
                              id / grid.cells[0] / grid.cells[1]};
           out.p[static_cast<std::size_t>(id)] = static_cast<double>(p[b].first);
-          batch.for_each_node(id, [&](const Index3& i, float gold, float slack) {
+          batch.for_each_node(id, [&](const Index3& i, float gold, const Slack& slack) {
             const std::size_t n = out.at(brick[0] * rates.gold + i[0], brick[1] * rates.gold + i[1],
                                          brick[2] * rates.gold + i[2]);
             out.gold[n] = static_cast<double>(gold);
-            out.slack[n] = std::min(out.slack[n], static_cast<double>(slack));
+            out.above[n] = std::min(out.above[n], static_cast<double>(slack.above));
+            out.below[n] = std::min(out.below[n], static_cast<double>(slack.below));
           });
         }
       },
