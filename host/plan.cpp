@@ -31,8 +31,8 @@ struct Rates {
 
 // Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
 constexpr double share = 0.5, patient_share = 0.65;
-// The same for P of linear interpolation in u alone.
-constexpr double linear_share = 0.1;
+// The same for P alone: a finer cubic interpolation costs memory only.
+constexpr double linear_share = 0.1, cubic_share = 0.03;
 
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -146,7 +146,7 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
 // Whether the grid keeps enough of the tolerance. Cubic interpolation in u costs twice the time and hardly
 // any of the tolerance: linear must not cost much more, or the volume pays for it.
 bool fits(const Rates& r, const Trial& t, double epsilon) {
-  if (r.u_filter == "linear" && 2.5 * t.projection > linear_share * epsilon) return false;
+  if (2.5 * t.projection > (r.u_filter == "linear" ? linear_share : cubic_share) * epsilon) return false;
   return 1.1 * t.slack + 4 * t.arithmetic <= share * epsilon;
 }
 

@@ -1,6 +1,7 @@
 // The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
 // chosen tiles. Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l samples every
 // (rate >> l)-th gold node. Called by host/gold_stream.cpp.
+#include "shared/largest.h"
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
@@ -10,13 +11,6 @@
   ((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + gold_stride + (z))) + \
    fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + gold_stride + (z))) -          \
    vload16(0, gold_column + (z)))
-
-inline float largest_of(float16 v) {
-  const float8 a = fmax(v.lo, v.hi);
-  const float4 b = fmax(a.lo, a.hi);
-  const float2 c = fmax(b.lo, b.hi);
-  return fmax(c.x, c.y);
-}
 
 // Raises error[block][brick z][brick y][brick x] to the largest that |interpolant - F| may be at the brick's
 // closed nodes. It starts negative and stays so where no node of a brick is tested. Bricks that `before` (the
@@ -62,7 +56,7 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   int z = 0;
   for (; z + 16 <= last - first + 1; z += 16) {
     const float16 e = ERROR_AT(z);
-    largest = fmax(largest, largest_of(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
+    largest = fmax(largest, largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
   }
   for (; z <= last - first; ++z) {
     const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[gold_stride + z]) +

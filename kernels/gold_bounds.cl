@@ -3,8 +3,9 @@
 // Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted sup of
 // the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
 // float[block][cell z][y][x]; gold float[block][y + halo][x + halo][gold stride], node z at z + halo, with a
-// halo of at least one node; margin float[block][y + halo][x + halo]; cells float[block][y][x][stride] with cell z at z + 1; slack
-// float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
+// halo of at least one node; margin float[block][y + halo][x + halo]; cells float[block][y][x][stride] with cell z
+// at z + 1; slack float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
+#include "shared/largest.h"
 
 #define UNTESTED (-1e30f)
 
@@ -29,19 +30,24 @@ __kernel void bound_table(__global float2* table, __global const float* d, __glo
   const int n = (int)get_global_id(0), k = (int)get_global_id(1), c = (int)get_global_id(2);
   if (n >= columns || k >= chunk_views || c >= cells_z) return;
   const int first = c * row_step, last = min(first + row_count, rows) - 1;
-  float plus = 0.0f, minus = 0.0f;
-  for (int z = first; z <= last; ++z) {
-    __global const float* p = d + ((size_t)(z / 16) * chunk_views + k) * columns * 16 + z % 16;
-    const float also = view_rise[first_view + k],
-                rise = remainder * (sup[(size_t)k * z_padded + z] + also) + also;
+  const float also = view_rise[first_view + k];
+  float16 plus = (float16)(0.0f), minus = plus;
+  for (int z = first / 16 * 16; z <= last; z += 16) {
+    __global const float* p = d + ((size_t)(z / 16) * chunk_views + k) * columns * 16;
+    float16 high = (float16)(-INFINITY), low = -high;
     for (int m = max(n - below, 0); m <= min(n + above, columns - 1); ++m) {
-      const float v = p[(size_t)m * 16];
-      plus = fmax(plus, v + rise);
-      minus = fmax(minus, rise - v);
+      const float16 v = vload16(m, p);
+      high = fmax(high, v);
+      low = fmin(low, v);
     }
+    const float16 rise = remainder * (vload16(0, sup + (size_t)k * z_padded + z) + also) + also;
+    const int16 row = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const int16 outside = (row < first) | (row > last);
+    plus = fmax(plus, select(high + rise, (float16)(0.0f), outside));
+    minus = fmax(minus, select(rise - low, (float16)(0.0f), outside));
   }
   __global float2* entry = table + ((size_t)c * all_views + first_view + k) * columns + n;
-  const float2 term = weight * (float2)(plus, minus);
+  const float2 term = weight * (float2)(largest_of_16(plus), largest_of_16(minus));
   *entry = begin ? term : *entry + term;
 }
 

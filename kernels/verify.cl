@@ -3,6 +3,7 @@
 // may lie above and below gold's interpolant; the largest |V - gold|; the largest slack to either side; and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
 // Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
 // Called by host/gold_stream.cpp.
+#include "shared/largest.h"
 #include "shared/mixed_sampler.h"
 
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
@@ -12,12 +13,6 @@ inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 // atomic.
 inline void raise(volatile __global int* target, float v) {
   if (as_int(v) > *target) atomic_max(target, as_int(v));
-}
-
-inline float largest_of(float8 v) {
-  const float4 a = fmax(v.lo, v.hi);
-  const float2 b = fmax(a.lo, a.hi);
-  return fmax(b.x, b.y);
 }
 
 __kernel void verify_nodes(volatile __global int* total, volatile __global int* error,
@@ -81,9 +76,9 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
         // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the
         // comparison.
         if (any((up >= 0.0f) & !((e + down <= tolerance) & (up - e <= tolerance)))) break;
-        largest_total = fmax(largest_total, largest_of(both));
-        largest_slack = fmax(largest_slack, largest_of(fmax(up, down)));
-        largest_error = fmax(largest_error, largest_of(select((float8)(0.0f), fabs(e), up >= 0.0f)));
+        largest_total = fmax(largest_total, largest_of_8(both));
+        largest_slack = fmax(largest_slack, largest_of_8(fmax(up, down)));
+        largest_error = fmax(largest_error, largest_of_8(select((float8)(0.0f), fabs(e), up >= 0.0f)));
       }
       for (; i < nodes; ++i) {
         const int k = first_node + i;

@@ -6,16 +6,10 @@
 // brick; int4 items[item] = brick x, y, z and its block; int4 first[block] = the block's first brick; uchar
 // tested[block][cell y][cell x]: columns of gold cells that can hold a covered point.
 // Called by host/verify_field.cpp.
+#include "shared/largest.h"
 #include "shared/mixed_sampler.h"
 
 #define RADIUS 2
-
-inline float largest_of(float16 v) {
-  const float8 a = fmax(v.lo, v.hi);
-  const float4 b = fmax(a.lo, a.hi);
-  const float2 c = fmax(b.lo, b.hi);
-  return fmax(c.x, c.y);
-}
 
 // --- F at nodes -------------------------------------------------------------------------------------------
 
@@ -167,8 +161,8 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
         yz = fmax(yz, select(fabs(mixed(p, row, 1)), none, outside));
       }
     }
-  out[(size_t)i * side + y] = (float8)(largest_of(xx), largest_of(yy), largest_of(zz), largest_of(xy),
-                                       largest_of(xz), largest_of(yz), 0.0f, 0.0f);
+  out[(size_t)i * side + y] = (float8)(largest_of_16(xx), largest_of_16(yy), largest_of_16(zz), largest_of_16(xy),
+                                       largest_of_16(xz), largest_of_16(yz), 0.0f, 0.0f);
 }
 
 // --- cells ------------------------------------------------------------------------------------------------
@@ -252,8 +246,8 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
       total = select((float16)(INFINITY), total, total <= FLT_MAX);
       total = select((float16)(-1.0f), total, counts);
       e = select((float16)(0.0f), e, counts);
-      worst_error = fmax(worst_error, largest_of(e));
-      const float largest = largest_of(total);
+      worst_error = fmax(worst_error, largest_of_16(e));
+      const float largest = largest_of_16(total);
       float values[16];
       int flags[16];
       vstore16(counts, 0, flags);
