@@ -145,7 +145,7 @@ class Builder {
           }
           store(batch, tiles);
         },
-        progress_, "classify");
+        progress_, "classify", GoldStream::For::samples);
     watch_.lap("classify");
   }
 
@@ -192,7 +192,7 @@ class Builder {
             for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
             store(batch, tiles);
           },
-          progress_, "repair");
+          progress_, "repair", GoldStream::For::samples);
       watch_.lap("repair");
       before = std::move(volume);
     }

@@ -82,7 +82,7 @@ void classify(opencl::State& state, GoldStream& stream, const DeviceField& field
         }
         batch.extract(tiles);
       },
-      {}, "foresee");
+      {}, "foresee", GoldStream::For::samples);
 }
 
 // Whole blocks of the middle slab, from the axis outwards.
@@ -188,7 +188,8 @@ Foreseen foresee_build(opencl::State& state, GoldStream& stream, const Volume& b
   const auto samples = static_cast<double>(base.samples.size());
   out.samples_ratio = (samples + static_cast<double>(near.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
-  out.seconds = seconds_of(stream.work(near), large, true) + seconds_of(stream.work(refined), small, false);
+  out.seconds = seconds_of(stream.work(near, GoldStream::For::samples), large, true) +
+                seconds_of(stream.work(refined, GoldStream::For::measuring), small, false);
   return out;
 }
 

@@ -53,10 +53,11 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   const std::int64_t g = settings.granularity;
   // Second differences look one node beyond a block, fits further.
   if (settings.midrange)
-    halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
-  // About 16 x 16 x 32 base cells at once: large enough that halos are cheap, small enough for caches and
+    fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
+  halo_ = fit_halo_;
+  // About 24 x 24 x 32 base cells at once: large enough that halos are cheap, small enough for caches and
   // --max-memory.
-  block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
+  block_bricks_ = std::max<std::int64_t>(1, 192 / (g * settings.rate));
   slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
   while (slab_bricks_ > 1 &&
          slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() / 2, state.info.max_allocation))
@@ -150,7 +151,8 @@ double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& 
   return static_cast<double>(kept) / (raster * raster);
 }
 
-GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected) const {
+GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose) {
+  halo_ = purpose == For::samples ? fit_halo_ : 1;
   GoldWork out;
   for (const Work& w : partition(selected)) {
     out.rows += static_cast<double>(
@@ -162,7 +164,8 @@ GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected) const {
 }
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                     const Progress& progress, const std::string& stage) {
+                     const Progress& progress, const std::string& stage, For purpose) {
+  halo_ = purpose == For::samples ? fit_halo_ : 1;
   const std::vector<Work> all = partition(selected);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
@@ -350,7 +353,8 @@ void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler&
   settings.midrange = settings.base_only = true;
   GoldStream stream(state, scan, upsampler, sups, settings);
   stream.run(
-      selected, [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit");
+      selected, [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
+      GoldStream::For::samples);
 }
 
 }  // namespace vdvr

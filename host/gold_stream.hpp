@@ -75,9 +75,10 @@ class GoldStream {
 
   /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a
   /// block without a selected brick is skipped, and a few selected bricks are streamed as blocks of one
-  /// brick.
+  /// brick. Fitted samples look further around a block than measuring does.
+  enum class For { samples, measuring };
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
-           const std::string& stage);
+           const std::string& stage, For purpose = For::measuring);
 
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
@@ -90,7 +91,7 @@ class GoldStream {
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
   /// What `run` would compute for these bricks.
-  [[nodiscard]] GoldWork work(const std::vector<std::uint8_t>& selected) const;
+  [[nodiscard]] GoldWork work(const std::vector<std::uint8_t>& selected, For purpose);
   /// What it has computed so far, and what that took.
   [[nodiscard]] const GoldSpent& spent() const { return spent_; }
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
@@ -118,7 +119,7 @@ class GoldStream {
   Coverage coverage_;
   UpsampledColumns columns_;
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
-  std::int64_t halo_ = 1;  // gold nodes around a block
+  std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
   GoldSpent spent_;
   double arithmetic_ = 0;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
@@ -136,9 +137,9 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// The node test at levels 0 .. log2(rate) (isotropic), per brick of bricks(): |interpolant - F| may be at
-  /// most the tolerance. Level 0 is measured on the stored base samples through the sampler: closing never
-  /// changes those, so it is final.
+  /// In a run for samples: the node test at levels 0 .. log2(rate) (isotropic), per brick of bricks():
+  /// |interpolant - F| may be at most the tolerance. Level 0 is measured on the stored base samples through
+  /// the sampler: closing never changes those, so it is final.
   std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
                                    const opencl::DeviceArray<std::uint8_t>& selected);
 
@@ -167,8 +168,8 @@ class GoldStream::Batch {
         }
   }
 
-  /// Samples of the requested tiles, in the order asked, concatenated: float [z][y][x] each. They are gold at
-  /// the top level, fitted below it if the settings say so.
+  /// In a run for samples: samples of the requested tiles, in the order asked, concatenated: float [z][y][x]
+  /// each. They are gold at the top level, fitted below it if the settings say so.
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
   /// Measures a stored field on every selected brick.
