@@ -198,7 +198,6 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
   build({"--terms", "grid"});
   build({"--epsilon-of", "max"});
   build({"--paper"});
-  build({"--resume"});
   check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
 }
