@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "host/build_journal.hpp"
 #include "host/close_boundaries.hpp"
 #include "host/gold_stream.hpp"
 #include "host/reconstruct_field.hpp"
@@ -67,7 +68,11 @@ class Builder {
  public:
   Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
           const Progress& progress)
-      : state_(device.state()), plan_(plan), progress_(progress), watch_(seconds_) {
+      : state_(device.state()),
+        plan_(plan),
+        progress_(progress),
+        journal_(options.journal),
+        watch_(seconds_) {
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
     bricks_.rate = plan.gold_rate;
@@ -122,30 +127,12 @@ class Builder {
     const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near),
                                                         "bricks to classify");
     measures_.assign(bricks_.level.size(), {});
-    stream_->run(
-        near,
-        [&](GoldStream::Batch& batch) {
-          const auto classes = batch.classify(base, static_cast<float>(strict), device_near);
-          const auto& ids = batch.bricks();
-          const auto p = batch.largest_p();
-          std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
-          for (std::size_t i = 0; i < ids.size(); ++i) {
-            const std::size_t id = at(ids[i]);
-            const BrickClass& c = classes[i];
-            bricks_.involved[id] = c.base.total >= 0;
-            if (!bricks_.involved[id]) continue;
-            measures_[id] = c.base;
-            slack_.total = std::max(slack_.total, static_cast<double>(c.base.slack));
-            slack_.projection = std::max(slack_.projection, static_cast<double>(p[i].first));
-            slack_.gold =
-                std::max(slack_.gold, static_cast<double>(c.base.slack) - static_cast<double>(p[i].second));
-            if (!(static_cast<double>(c.base.slack) <= strict)) refuse(c.base.slack, strict);
-            set_level(ids[i], c.level);
-            if (c.level > 0) tiles.emplace_back(ids[i], bricks_.level[id]);
-          }
-          store(batch, tiles);
-        },
-        progress_, "classify", GoldStream::For::samples);
+    stream_->run(near,
+                 {[&](GoldStream::Batch& batch) {
+                    return class_record(batch, batch.classify(base, static_cast<float>(strict), device_near));
+                  },
+                  [&](ByteReader in) { apply_classes(in, strict); }},
+                 journal_, progress_, "classify", GoldStream::For::samples);
     watch_.lap("classify");
   }
 
@@ -176,23 +163,34 @@ class Builder {
                                                              "bricks to verify");
       stream_->run(
           pending,
-          [&](GoldStream::Batch& batch) {
-            for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending))
-              measures_[at(m.brick)] = m;
-          },
-          progress_, round == 0 ? "verify" : "repair");
+          {[&](GoldStream::Batch& batch) {
+             ByteWriter out;
+             for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending))
+               put(out, m);
+             return out.take();
+           },
+           [&](ByteReader in) {
+             while (!in.empty()) {
+               const BrickMeasure m = get_measure(in);
+               measures_.at(at(m.brick)) = m;
+             }
+           }},
+          journal_, progress_, round == 0 ? "verify" : "repair");
       watch_.lap("verify");
       const std::vector<std::uint8_t> raised = raise_violating(pending);
       repaired_ += std::count(raised.begin(), raised.end(), 1);
       if (std::find(raised.begin(), raised.end(), 1) == raised.end()) return volume;
-      stream_->run(
-          raised,
-          [&](GoldStream::Batch& batch) {
-            std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
-            for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
-            store(batch, tiles);
-          },
-          progress_, "repair", GoldStream::For::samples);
+      stream_->run(raised,
+                   {[&](GoldStream::Batch& batch) {
+                      Tiles tiles;
+                      for (const std::int64_t id : batch.bricks())
+                        tiles.emplace_back(id, bricks_.level[at(id)]);
+                      ByteWriter out;
+                      put_tiles(out, batch, tiles);
+                      return out.take();
+                    },
+                    [&](ByteReader in) { take_tiles(in); }},
+                   journal_, progress_, "repair", GoldStream::For::samples);
       watch_.lap("repair");
       before = std::move(volume);
     }
@@ -228,20 +226,78 @@ class Builder {
                     plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
   }
 
-  void set_level(std::int64_t brick, int level) {
+  using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
+
+  static LevelTriple triple(int level) {
     const auto l = static_cast<std::uint8_t>(level);
-    bricks_.level[at(brick)] = {l, l, l};
+    return {l, l, l};
   }
 
-  void store(GoldStream::Batch& batch, const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
-    const auto samples = batch.extract(tiles);
+  void put_tiles(ByteWriter& out, GoldStream::Batch& batch, const Tiles& tiles) const {
+    std::vector<std::int64_t> bricks;
+    std::vector<std::uint8_t> levels;
+    for (const auto& [brick, level] : tiles) {
+      bricks.push_back(brick);
+      levels.push_back(level[0]);
+    }
+    out.put(bricks);
+    out.put(levels);
+    out.put(batch.extract(tiles));
+  }
+
+  void take_tiles(ByteReader& in) {
+    const auto bricks = in.get_vector<std::int64_t>();
+    const auto levels = in.get_vector<std::uint8_t>();
+    const auto samples = in.get_vector<float>();
     auto next = samples.begin();
     const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}, 0};
-    for (const auto& [brick, level] : tiles) {
-      const auto end = next + shape.tile_size(level);
-      bricks_.samples[at(brick)].assign(next, end);
+    for (std::size_t i = 0; i < bricks.size(); ++i) {
+      const std::int64_t size = shape.tile_size(triple(levels.at(i)));
+      if (size > samples.end() - next)
+        throw FileError("a journal record lacks samples; start without --resume");
+      const auto end = next + size;
+      bricks_.samples.at(at(bricks[i])).assign(next, end);
       next = end;
     }
+  }
+
+  // What a batch's classes are, with the bounds behind them and the tiles that they ask for.
+  Bytes class_record(GoldStream::Batch& batch, const std::vector<BrickClass>& classes) const {
+    ByteWriter out;
+    const auto p = batch.largest_p();
+    Tiles tiles;
+    out.put(static_cast<std::uint64_t>(classes.size()));
+    for (std::size_t i = 0; i < classes.size(); ++i) {
+      const BrickClass& c = classes[i];
+      put(out, c.base);
+      out.put(c.level);
+      out.put(p[i].first);
+      out.put(p[i].second);
+      if (c.base.total >= 0 && c.level > 0) tiles.emplace_back(c.base.brick, triple(c.level));
+    }
+    put_tiles(out, batch, tiles);
+    return out.take();
+  }
+
+  void apply_classes(ByteReader& in, double strict) {
+    const auto n = in.get<std::uint64_t>();
+    for (std::uint64_t i = 0; i < n; ++i) {
+      const BrickMeasure base = get_measure(in);
+      const auto level = in.get<int>();
+      const auto largest_p = static_cast<double>(in.get<float>()),
+                 smallest_p = static_cast<double>(in.get<float>());
+      const std::size_t id = at(base.brick);
+      bricks_.involved.at(id) = base.total >= 0;
+      if (!bricks_.involved[id]) continue;
+      measures_[id] = base;
+      const auto slack = static_cast<double>(base.slack);
+      slack_.total = std::max(slack_.total, slack);
+      slack_.projection = std::max(slack_.projection, largest_p);
+      slack_.gold = std::max(slack_.gold, slack - smallest_p);
+      if (!(slack <= strict)) refuse(base.slack, strict);
+      bricks_.level[id] = triple(level);
+    }
+    take_tiles(in);
   }
 
   // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels
@@ -267,13 +323,14 @@ class Builder {
       }
     }
     for (std::size_t i = 0; i < raise.size(); ++i)
-      if (raise[i]) set_level(static_cast<std::int64_t>(i), bricks_.level[i][0] + 1);
+      if (raise[i]) bricks_.level[i] = triple(bricks_.level[i][0] + 1);
     return raise;
   }
 
   opencl::State& state_;
   const Plan& plan_;
   const Progress& progress_;
+  Journal* journal_;
   OpenBricks bricks_;
   Closing closing_ = Closing::coarse;
   std::vector<std::uint8_t> selected_;
@@ -380,6 +437,8 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
           fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
                       plan.epsilon_abs, plan.epsilon_abs - tolerance));
     }
+    if (attempt == 0 && options.journal)
+      options.journal->begin(journal_head(device, scan, plan, options, builder.stream(), tolerance));
     builder.classify(tolerance);
     BuildResult result;
     try {

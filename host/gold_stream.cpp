@@ -166,16 +166,83 @@ GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
   halo_ = purpose == For::samples ? fit_halo_ : 1;
+  run_unknown(
+      selected, on_batch, [](const Work&, std::size_t) { return 0; }, progress, stage);
+}
+
+void GoldStream::run(const std::vector<std::uint8_t>& selected, const Pass& pass, Journal* journal,
+                     const Progress& progress, const std::string& stage, For purpose) {
+  halo_ = purpose == For::samples ? fit_halo_ : 1;
+  const std::int64_t number = passes_++;
+  run_unknown(
+      selected,
+      [&](Batch& batch) {
+        const Bytes payload = pass.compute(batch);
+        if (journal) journal->append(record(number, batch, payload));
+        pass.apply(ByteReader(payload));
+      },
+      [&](const Work& work, std::size_t from) -> std::size_t {
+        const auto kept = journal ? journal->next() : std::nullopt;
+        return kept ? replay(number, work, from, *kept, pass.apply) : 0;
+      },
+      progress, stage);
+}
+
+void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                             const Known& known, const Progress& progress, const std::string& stage) {
   const std::vector<Work> all = partition(selected);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
   for (const Work& w : all) {
-    run_slab(w, selected, on_batch, [&](double blocks) {
+    const auto tick = [&](double blocks) {
       done += blocks * cost(w);
       report(progress, stage, std::min(1.0, done / total));
-    });
+    };
+    std::size_t from = 0;
+    while (from < w.first.size()) {
+      const std::size_t n = known(w, from);
+      if (n == 0) break;
+      from += n;
+      tick(static_cast<double>(n));
+    }
+    if (from < w.first.size()) run_slab(w, from, selected, on_batch, tick);
   }
+}
+
+// A record says which blocks of which pass it is of: how many share a batch depends on the memory left, which
+// a resumed process need not have alike.
+Bytes GoldStream::record(std::int64_t pass, const Batch& batch, const Bytes& payload) const {
+  ByteWriter out;
+  for (const std::int64_t n : {pass, batch.first_brick_.front()[2], batch.bricks_x_, batch.bricks_y_,
+                               batch.bricks_z_, batch.first_brick_.front()[0], batch.first_brick_.front()[1],
+                               static_cast<std::int64_t>(batch.blocks())})
+    out.put(n);
+  out.put(node_slack_ ? node_slack_->new_cells(batch.slab_, batch.first_brick_) : std::vector<float>{});
+  Bytes bytes = out.take();
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  return bytes;
+}
+
+std::size_t GoldStream::replay(std::int64_t pass, const Work& work, std::size_t from, const Bytes& record,
+                               const std::function<void(ByteReader)>& apply) {
+  ByteReader in(record);
+  bool same = true;
+  for (const std::int64_t n :
+       {pass, work.z, work.width_x, work.width_y, work.height, work.first[from][0], work.first[from][1]})
+    same = in.get<std::int64_t>() == n && same;
+  const auto n = in.get<std::int64_t>();
+  if (!same || n < 1 || count(n) > work.first.size() - from)
+    throw InputError(
+        "the journal's next record is of other blocks than this build asks for; start again without "
+        "--resume");
+  std::vector<std::array<std::int64_t, 3>> first;
+  for (std::size_t i = from; i < from + at(n); ++i)
+    first.push_back({work.first[i][0], work.first[i][1], work.z});
+  const auto cells = in.get_vector<float>();
+  if (node_slack_) node_slack_->restore(slab_of(work), first, cells);
+  apply(in);
+  return at(n);
 }
 
 std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
@@ -245,6 +312,7 @@ std::vector<std::array<std::int32_t, 2>> GoldStream::wanted(const std::vector<fl
 std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabShape& slab) {
   const Grid& grid = settings_.grid;
   const std::int64_t rate = settings_.rate;
+  batch.slab_ = slab;
   batch.bricks_x_ = work.width_x;
   batch.bricks_y_ = work.width_y;
   batch.bricks_z_ = work.height;
@@ -290,15 +358,22 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   return together;
 }
 
-void GoldStream::run_slab(const Work& work, const std::vector<std::uint8_t>& selected,
+SlabShape GoldStream::slab_of(const Work& work) const {
+  const Grid& grid = settings_.grid;
+  const std::int64_t g = settings_.granularity;
+  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0};
+  slab.cells_z = std::min(work.height * g, grid.cells[2] - slab.cell_z);
+  slab.z_first = grid.origin[2] + static_cast<double>(slab.cell_z) * grid.spacing[2];
+  slab.stride = column_stride(slab.cells_z * settings_.rate + 17);
+  return slab;
+}
+
+void GoldStream::run_slab(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                           const OnBatch& on_batch, const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
-  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0};
-  slab.cells_z = std::min(work.height * g, grid.cells[2] - slab.cell_z);
-  slab.z_first = grid.origin[2] + static_cast<double>(slab.cell_z) * grid.spacing[2];
-  slab.stride = column_stride(slab.cells_z * rate + 17);
+  const SlabShape slab = slab_of(work);
   const double hx = grid.spacing[0] / static_cast<double>(rate),
                hy = grid.spacing[1] / static_cast<double>(rate),
                hz = grid.spacing[2] / static_cast<double>(rate);
@@ -311,7 +386,7 @@ void GoldStream::run_slab(const Work& work, const std::vector<std::uint8_t>& sel
   Batch batch(state_, settings_);
   const std::int64_t together = begin_batch(batch, work, slab);
   ColumnBlocks columns{batch.shape_.nx + 2 * halo_, batch.shape_.ny + 2 * halo_, hx, hy, {}, {}};
-  for (std::size_t begin = 0; begin < work.first.size(); begin += at(together)) {
+  for (std::size_t begin = from; begin < work.first.size(); begin += at(together)) {
     const std::size_t n = std::min(at(together), work.first.size() - begin);
     batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
                   work.first.begin() + static_cast<std::ptrdiff_t>(begin + n)},

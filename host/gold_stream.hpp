@@ -16,12 +16,14 @@
 #include <vector>
 
 #include "host/back_project.hpp"
+#include "host/bytes.hpp"
 #include "host/coverage.hpp"
 #include "host/device_field.hpp"
 #include "host/fit_coefficients.hpp"
 #include "host/gold_settings.hpp"
 #include "host/node_slack.hpp"
 #include "host/projection_bounds.hpp"
+#include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 
@@ -80,6 +82,17 @@ class GoldStream {
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
            const std::string& stage, For purpose = For::measuring);
 
+  /// A pass in two steps: `compute` reads from a batch all that `apply` needs, which may be called in a later
+  /// process instead, with what the journal kept.
+  struct Pass {
+    std::function<Bytes(Batch&)> compute;
+    std::function<void(ByteReader)> apply;
+  };
+  /// The same by way of a journal (none: nullptr): batches that it holds are applied and not computed, the
+  /// others are added to it. Passes must come in the same order in every process.
+  void run(const std::vector<std::uint8_t>& selected, const Pass& pass, Journal* journal,
+           const Progress& progress, const std::string& stage, For purpose = For::measuring);
+
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
 
@@ -109,8 +122,16 @@ class GoldStream {
   std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
-  void run_slab(const Work& work, const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                const std::function<void(double)>& tick);
+  // How many blocks of a work, from the given one on, need not be computed.
+  using Known = std::function<std::size_t(const Work&, std::size_t)>;
+  void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
+                   const Progress& progress, const std::string& stage);
+  void run_slab(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
+                const OnBatch& on_batch, const std::function<void(double)>& tick);
+  [[nodiscard]] SlabShape slab_of(const Work& work) const;
+  [[nodiscard]] Bytes record(std::int64_t pass, const Batch& batch, const Bytes& payload) const;
+  std::size_t replay(std::int64_t pass, const Work& work, std::size_t from, const Bytes& record,
+                     const std::function<void(ByteReader)>& apply);
 
   opencl::State& state_;
   const FilteredScan& scan_;
@@ -121,6 +142,7 @@ class GoldStream {
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
   GoldSpent spent_;
+  std::int64_t passes_ = 0;  // begun with a journal
   double arithmetic_ = 0;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
@@ -195,6 +217,7 @@ class GoldStream::Batch {
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
   GoldBlocks shape_;
+  SlabShape slab_;
   std::int64_t stride_ = 0;                        // of the slack's columns
   std::map<std::int64_t, LevelSamples> lattices_;  // by spacing
   std::vector<std::array<std::int64_t, 3>> first_brick_;

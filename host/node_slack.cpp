@@ -86,7 +86,8 @@ void NodeSlack::look_up(std::int64_t blocks, const std::vector<std::array<std::i
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
   std::vector<float> p(at(blocks * slab_.cells_x * slab_.cells_y * slab_.cells_z), 0.0f), r(p.size(), 0.0f);
-  if (!std::all_of(first_brick.begin(), first_brick.end(), [&](const auto& f) { return known(f); })) {
+  computed_ = !std::all_of(first_brick.begin(), first_brick.end(), [&](const auto& f) { return known(f); });
+  if (computed_) {
     if (!projection_) {
       state_.queue.finish();
       const auto start = std::chrono::steady_clock::now();
@@ -116,6 +117,8 @@ void NodeSlack::look_up(std::int64_t blocks, const std::vector<std::array<std::i
     p_of_cells.read(std::span<float>(p));
     cell_remainder_.read(std::span<float>(r));
     each_cell(grid, g, slab_, first_brick, [&](std::size_t i, std::size_t cell) {
+      // Whichever blocks happen to share a batch: a cell's values stay what they were.
+      if (cell_p_[cell] >= 0) return;
       cell_p_[cell] = p[i];
       cell_addend_[cell] = (2.5f * p[i] + std::min(r[i], static_cast<float>(remainder_))) * (1 + 0x1p-22f);
     });
@@ -126,6 +129,28 @@ void NodeSlack::look_up(std::int64_t blocks, const std::vector<std::array<std::i
   });
   p_of_cells.write(p);
   addend_.write(r);
+}
+
+std::vector<float> NodeSlack::new_cells(const SlabShape& slab,
+                                        const std::vector<std::array<std::int64_t, 3>>& first_brick) const {
+  std::vector<float> cells;
+  if (!computed_) return cells;
+  each_cell(settings_.grid, settings_.granularity, slab, first_brick, [&](std::size_t, std::size_t cell) {
+    cells.push_back(cell_p_[cell]);
+    cells.push_back(cell_addend_[cell]);
+  });
+  return cells;
+}
+
+void NodeSlack::restore(const SlabShape& slab, const std::vector<std::array<std::int64_t, 3>>& first_brick,
+                        const std::vector<float>& cells) {
+  if (cells.empty()) return;
+  std::size_t next = 0;
+  each_cell(settings_.grid, settings_.granularity, slab, first_brick, [&](std::size_t, std::size_t cell) {
+    if (next + 2 > cells.size()) return;
+    cell_p_[cell] = cells[next++];
+    cell_addend_[cell] = cells[next++];
+  });
 }
 
 void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::int64_t, 3>>& first_brick,

@@ -37,6 +37,13 @@ class NodeSlack {
                   opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below,
                   opencl::DeviceArray<float>& p);
 
+  /// What the last call computed of base cells, in the order of its blocks; empty where it knew them all.
+  [[nodiscard]] std::vector<float> new_cells(
+      const SlabShape& slab, const std::vector<std::array<std::int64_t, 3>>& first_brick) const;
+  /// Takes what new_cells() gave for the same blocks in an earlier process.
+  void restore(const SlabShape& slab, const std::vector<std::array<std::int64_t, 3>>& first_brick,
+               const std::vector<float>& cells);
+
   /// What rounding adds to every slack.
   [[nodiscard]] double rounding() const { return settings_.grid_only ? 0 : 1.5 * rounding_; }
   /// Seconds spent on tables since the last call.
@@ -58,6 +65,7 @@ class NodeSlack {
   double arithmetic_, rounding_, remainder_;
   std::vector<float> cell_p_;       // P per base cell once computed, [z][y][x]; negative: not yet
   std::vector<float> cell_addend_;  // 2.5 P and the remainder of T, alike
+  bool computed_ = false;           // some cell, in the last call
   SlabShape slab_;
   std::optional<BoundTable> projection_, remainders_;  // of the slab, made when the first cell asks
   opencl::DeviceArray<float> addend_, cell_remainder_, cells_above_, cells_below_, rows_;

@@ -194,7 +194,6 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
     check_refused(words, more[0]);
   };
   build({"--levels", "anisotropic"});
-  build({"--resume"});
   check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
 }

@@ -121,6 +121,7 @@ int bench_build(Arguments& args) {
   add_build(args);
   add_common(args);
   if (!args.parse()) return 0;
+  refuse(args, {"resume"}, "a timing has nothing to resume; give it to build");
   const CommonOptions common = common_options(args);
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;

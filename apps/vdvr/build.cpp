@@ -9,24 +9,17 @@
 
 namespace vdvr::cli {
 
-int build_command(Arguments& args) {
-  args.positional("IN", "projections").value("output,o", "OUT.vdvr", "the certified volume to write");
-  add_plan_options(args);
-  add_build(args);
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  CertifyOptions options = certify_options(args);
-  options.plan.foresee = false;
-  const auto output = args.path("output");
-  check_output(output, common.force, {args.path("IN")});
+namespace {
 
+int build_file(const Arguments& args, const CommonOptions& common, const CertifyOptions& options,
+               const std::filesystem::path& output) {
   Device device = open_device(common);
   ProgressLine progress(args.command(), common.quiet);
   const Planned planned = read_and_plan(device, args, options, progress.callback());
   const BuildResult result = build_certified(device, planned, options, progress.callback());
   throw_if_interrupted();
   write_vdvr(output, result.volume, result.certificate);
+  options.build.journal->remove();
   progress.clear();
 
   const std::uint64_t bytes = std::filesystem::file_size(output);
@@ -34,6 +27,7 @@ int build_command(Arguments& args) {
                      {"grid", grid_json(result.volume.grid)},
                      {"bricks", levels_json(result.volume)},
                      {"storage", storage_json(result.volume, bytes)},
+                     {"resumed", {{"records", options.build.journal->replayed()}}},
                      {"certificate", certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
@@ -45,6 +39,24 @@ int build_command(Arguments& args) {
     fmt::print("written        {}\n", output.string());
   });
   return certificate_exit_code(args.command(), result.certificate);
+}
+
+}  // namespace
+
+int build_command(Arguments& args) {
+  args.positional("IN", "projections").value("output,o", "OUT.vdvr", "the certified volume to write");
+  add_plan_options(args);
+  add_build(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  CertifyOptions options = certify_options(args);
+  options.plan.foresee = false;
+  const auto output = args.path("output");
+  check_output(output, common.force || continues(args, output), {args.path("IN")});
+  const auto journal = open_journal(args, common, output, {output});
+  options.build.journal = journal.get();
+  return resumable(*journal, [&] { return build_file(args, common, options, output); });
 }
 
 }  // namespace vdvr::cli

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <utility>
 
 #include "apps/vdvr/inputs.hpp"
+#include "host/io/atomic_file.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
 
@@ -35,9 +37,51 @@ Planned read_and_plan(Device& device, const Arguments& args, const CertifyOption
   return planned;
 }
 
+std::filesystem::path journal_path(const std::filesystem::path& output) {
+  return output.string() + ".journal";
+}
+
+bool continues(const Arguments& args, const std::filesystem::path& output) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(journal_path(output), error);
+  return args.has("resume") && !error && bytes > 0;
+}
+
+std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions& common,
+                                      const std::filesystem::path& output,
+                                      const std::vector<std::filesystem::path>& outputs) {
+  const bool resume = args.has("resume");
+  auto journal = std::make_unique<Journal>(journal_path(output), resume);
+  for (const auto& file : outputs) io::remove_leftovers(file);
+  if (!common.quiet && resume != journal->found())
+    fmt::print(stderr, "vdvr {}: {} {}\n", args.command(), journal->path().string(),
+               resume
+                   ? "does not exist: nothing to resume, starting afresh"
+                   : "is of an unfinished build, which --resume would have continued: it will be replaced");
+  return journal;
+}
+
+int resumable(const Journal& journal, const std::function<int()>& work) {
+  try {
+    return work();
+  } catch (const Interrupted& e) {
+    if (journal.records() == 0) throw;
+    throw Interrupted(e.exit_code(),
+                      fmt::format("interrupted; {} stays: the same command with --resume continues",
+                                  journal.path().string()));
+  }
+}
+
 BuildResult build_certified(Device& device, const Planned& planned, const CertifyOptions& options,
                             const Progress& progress) {
-  BuildResult result = build(device, planned.scan, planned.plan, options.build, progress);
+  BuildResult result = [&] {
+    try {
+      return build(device, planned.scan, planned.plan, options.build, progress);
+    } catch (const ToleranceError&) {
+      if (options.build.journal) options.build.journal->remove();  // going on would end here again
+      throw;
+    }
+  }();
   Certificate& c = result.certificate;
   // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
   // (but in a scan of nothing but zeros, whose range is 0).

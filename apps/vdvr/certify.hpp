@@ -1,6 +1,11 @@
 // The way from the words after `plan`, `build`, `run` and `bench build` to a plan and to a certified volume.
 #pragma once
 
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
 #include "apps/vdvr/options.hpp"
 #include "vdvr/build.hpp"
 #include "vdvr/plan.hpp"
@@ -30,6 +35,19 @@ struct Planned {
 /// Reads IN and plans.
 Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
                       const Progress& progress);
+
+/// The journal of an output file: beside it, with this name.
+std::filesystem::path journal_path(const std::filesystem::path& output);
+/// Whether --resume was given and an earlier process left something to continue: its own outputs are then no
+/// reason to refuse.
+bool continues(const Arguments& args, const std::filesystem::path& output);
+/// Opens it for `build` and `run`, clears away what killed writers of `outputs` left, and says on stderr when
+/// there is nothing to resume or a journal is about to be replaced.
+std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions& common,
+                                      const std::filesystem::path& output,
+                                      const std::vector<std::filesystem::path>& outputs);
+/// Calls `work`; an interruption in it says that --resume continues, once there is anything to continue.
+int resumable(const Journal& journal, const std::function<int()>& work);
 
 /// Builds, and completes the certificate with the options and the content's hash. Throws ToleranceError when
 /// it does not hold for the `buffer` sampler, which every device has.

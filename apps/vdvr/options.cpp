@@ -205,12 +205,11 @@ void add_build(Arguments& args) {
   args.flag("paper",
             "the paper's settings, for comparison: --closing paper --coefficients sampled --granularity 4 "
             "--upsampling 8 --u-filter linear --gold 8 --terms grid --epsilon-of max, each unless given")
-      .flag("resume", "not in this version");
+      .flag("resume", "continue what an interrupted build or run left in its journal");
 }
 
 BuildOptions build_options(const Arguments& args) {
   for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
-  refuse(args, {"resume"}, "this version cannot resume; start again without it");
   const bool paper = args.has("paper");
   BuildOptions build;
   build.closing =

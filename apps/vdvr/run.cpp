@@ -132,24 +132,8 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
   fmt::print("{}\n", dvr == out.outside.end() ? "" : dvr->second);
 }
 
-}  // namespace
-
-int run_command(Arguments& args) {
-  args.positional("IN", "projections")
-      .value("output,o", "DIR", "the folder for volume, pictures and certificate");
-  add_plan_options(args);
-  add_build(args);
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  CertifyOptions options = certify_options(args);
-  options.plan.foresee = false;
-  if (options.plan.terms != "all" || options.build.closing == Closing::none)
-    throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
-  const auto input = args.path("IN"), output = args.path("output");
-  kind_of(input, args);
-  OutputFolder folder(output, file_names(), common.force);
-
+int run_steps(const Arguments& args, const CommonOptions& common, const CertifyOptions& options,
+              const std::filesystem::path& output, OutputFolder& folder) {
   Device device = open_device(common);
   ProgressLine line(args.command(), common.quiet);
   const Progress progress = line.callback();
@@ -177,12 +161,37 @@ int run_command(Arguments& args) {
                                     certificate.epsilon_abs));
   throw_if_interrupted();
   folder.finish(to_json(certificate));
+  options.build.journal->remove();
   out.files.emplace_back("certificate.json", "what is promised, and by which argument");
   line.clear();
 
   const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
   print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
   return certificate_exit_code(args.command(), certificate);
+}
+
+}  // namespace
+
+int run_command(Arguments& args) {
+  args.positional("IN", "projections")
+      .value("output,o", "DIR", "the folder for volume, pictures and certificate");
+  add_plan_options(args);
+  add_build(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  CertifyOptions options = certify_options(args);
+  options.plan.foresee = false;
+  if (options.plan.terms != "all" || options.build.closing == Closing::none)
+    throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
+  const auto output = args.path("output"), volume = output / "volume.vdvr";
+  kind_of(args.path("IN"), args);
+  OutputFolder folder(output, file_names(), common.force || continues(args, volume));
+  std::vector<std::filesystem::path> outputs;
+  for (const auto& name : file_names()) outputs.push_back(folder.file(name));
+  const auto journal = open_journal(args, common, volume, outputs);
+  options.build.journal = journal.get();
+  return resumable(*journal, [&] { return run_steps(args, common, options, output, folder); });
 }
 
 }  // namespace vdvr::cli

@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <vector>
 
 #include "vdvr/error.hpp"
 
@@ -59,6 +60,21 @@ void AtomicFile::commit() {
     throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
   committed_ = true;
   sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+void remove_leftovers(const std::filesystem::path& target) {
+  constexpr std::size_t random_letters = 6;  // mkstemp's
+  const std::string start = "." + target.filename().string() + ".";
+  std::error_code ignored;
+  std::vector<std::filesystem::path> found;
+  for (std::filesystem::directory_iterator entry(folder_of(target), ignored), end; entry != end;
+       entry.increment(ignored)) {
+    const std::string name = entry->path().filename().string();
+    if (name.size() == start.size() + random_letters && name.starts_with(start) &&
+        entry->is_regular_file(ignored))
+      found.push_back(entry->path());
+  }
+  for (const auto& path : found) std::filesystem::remove(path, ignored);
 }
 
 void write_file(const std::filesystem::path& path, const std::string& bytes) {

@@ -26,6 +26,10 @@ class AtomicFile {
   bool committed_ = false;
 };
 
+/// Removes temporary files that killed writers of `target` left in its folder. Only for whoever knows that no
+/// other process writes it now.
+void remove_leftovers(const std::filesystem::path& target);
+
 /// Writes bytes atomically.
 void write_file(const std::filesystem::path& path, const std::string& bytes);
 

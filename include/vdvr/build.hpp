@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/plan.hpp"
 
@@ -24,6 +25,9 @@ struct BuildOptions {
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
   Closing closing = Closing::coarse;
   StorageChoice storage = StorageChoice::automatic;
+  /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()
+  /// calls begin() and leaves it to the caller to remove() it once the result is stored.
+  Journal* journal = nullptr;
 };
 
 /// Whether these options make a volume to compare with, which no certificate goes with.
@@ -37,7 +41,9 @@ struct BuildResult {
   std::map<std::string, double> seconds;  ///< per stage
 };
 
-/// Throws ToleranceError when the tolerance is out of reach at the plan's rates.
+/// Throws ToleranceError when the tolerance is out of reach at the plan's rates, InputError when a journal to
+/// resume is of another scan, plan, device or other options. A resumed build gives the volume and the
+/// certificate of one that was never interrupted, to the bit.
 BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
                   const Progress& progress = {});
 

@@ -52,7 +52,8 @@ struct ResourceError : Error {
 };
 /// The user asked to stop (SIGINT: 130, SIGTERM: 143).
 struct Interrupted : Error {
-  explicit Interrupted(int exit_code) : Error(exit_code, "interrupted") {}
+  explicit Interrupted(int exit_code, std::string message = "interrupted")
+      : Error(exit_code, std::move(message)) {}
 };
 
 }  // namespace vdvr
