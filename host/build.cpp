@@ -12,6 +12,7 @@
 #include "host/build_journal.hpp"
 #include "host/close_boundaries.hpp"
 #include "host/gold_stream.hpp"
+#include "host/host_memory.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
 #include "host/worst_node.hpp"
@@ -72,7 +73,13 @@ class Builder {
         plan_(plan),
         progress_(progress),
         journal_(options.journal),
+        host_(state_),
         watch_(seconds_) {
+    const std::uint64_t cells =
+        static_cast<std::uint64_t>(plan.grid.cells[0] * plan.grid.cells[1] * plan.grid.cells[2]);
+    host_.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
+    host_.count(4 * (2 * plan.base.samples.size() + plan.fitted.size()), "the base samples");
+    host_.count(8 * cells, "the slack of base cells");
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
     bricks_.rate = plan.gold_rate;
@@ -149,7 +156,10 @@ class Builder {
     // change those.
     std::vector<std::uint8_t> pending(bricks_.level.size());
     MixedVolume before;
+    HostMemory closed(state_);
     for (int round = 0;; ++round) {
+      // A repair compares with the volume before it.
+      if (round < 2) closed.count(4 * bricks_.base.size() + tile_bytes_, "the closed volume");
       MixedVolume volume = close_boundaries(bricks_, closing_);
       // Where integers round, a raised brick can change more than those it touches.
       const std::vector<std::uint8_t> changed =
@@ -256,7 +266,12 @@ class Builder {
       if (size > samples.end() - next)
         throw FileError("a journal record lacks samples; start without --resume");
       const auto end = next + size;
-      bricks_.samples.at(at(bricks[i])).assign(next, end);
+      std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
+      const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();
+      host_.count(more, "the tiles before closing");
+      host_.uncount(less);
+      tile_bytes_ += more - less;
+      tile.assign(next, end);
       next = end;
     }
   }
@@ -331,6 +346,8 @@ class Builder {
   const Plan& plan_;
   const Progress& progress_;
   Journal* journal_;
+  HostMemory host_;
+  std::uint64_t tile_bytes_ = 0;  // of bricks_.samples
   OpenBricks bricks_;
   Closing closing_ = Closing::coarse;
   std::vector<std::uint8_t> selected_;

@@ -12,6 +12,7 @@
 
 #include "host/foresee.hpp"
 #include "host/gold_stream.hpp"
+#include "host/host_memory.hpp"
 #include "host/paper_bounds.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
@@ -258,6 +259,9 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   ParallelGeometry used = scan.geometry;
   if (field.center) used.center = *field.center;
   opencl::State& state = device.state();
+  HostMemory host(state);
+  host.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
+  host.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
   Plan plan;
   plan.notes = check_scan(used);
   plan.grid = grid;
@@ -374,10 +378,9 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
                       plan.epsilon_abs - t.arithmetic);
     plan.samples_ratio = foreseen.samples_ratio;
     plan.seconds = preparation + foreseen.seconds;
-    // On the device what the trial took and the stored field; on the host the scan, filtered too, the base
-    // samples three times, and the tiles before and after closing.
-    plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes +
-                        4 * (2 * static_cast<std::uint64_t>(scan.size()) + 3 * plan.base.samples.size());
+    // What the trial took, the scan and the base samples twice included; the base samples once more, the
+    // stored field on the device, and the tiles before and after closing.
+    plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan.base.samples.size();
   }
   report(progress, "plan", 1.0);
   return plan;

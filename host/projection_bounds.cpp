@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 #include <numbers>
+#include <utility>
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
@@ -172,9 +172,9 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
   const ParallelGeometry& g = scan.geometry;
   const std::int64_t U = g.columns, V = g.rows;
   const auto du = analysis_matrix(U), dv = analysis_matrix(V);
-  std::vector<double> projection(rates.size()), gold(rates.size());
-  std::mutex lock;
   const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
+  // [view][rate], summed in the order of views: a build made twice says the same to the bit.
+  std::vector<std::vector<double>> projection(at(g.views())), gold(at(g.views()));
   parallel_for(g.views(), {}, "amplitude", [&](std::int64_t k) {
     const float* q = scan.samples.data() + k * U * V;
     std::vector<double> a(at(U * V)), b(at(U * V));  // [m][v], then [m][l]
@@ -200,16 +200,18 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
                                                           wv * grid.spacing[2] / rates[r]});
         }
       }
-    const std::lock_guard guard(lock);
-    for (std::size_t r = 0; r < rates.size(); ++r) {
-      projection[r] += p[r];
-      gold[r] += f[r];
-    }
+    projection[at(k)] = std::move(p);
+    gold[at(k)] = std::move(f);
   });
   AmplitudeBounds out;
+  const auto sum = [](const std::vector<std::vector<double>>& by_view, std::size_t r) {
+    double total = 0;
+    for (const auto& view : by_view) total += view[r];
+    return total;
+  };
   for (std::size_t r = 0; r < rates.size(); ++r) {
-    out.projection.emplace_back(rates[r], projection[r]);
-    out.gold.emplace_back(rates[r], gold[r]);
+    out.projection.emplace_back(rates[r], sum(projection, r));
+    out.gold.emplace_back(rates[r], sum(gold, r));
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <random>
+#include <set>
 
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/scans.hpp"
@@ -335,10 +336,10 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_a_certificate_that_holds) {
 
 // Blocks are small for want of memory, so that there are several; closing makes bricks rise.
 BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted_one) {
-  const ProjectionSet scan = simulated(sphere(6, 1), 25, 21, 24);
-  const Grid grid = grid_of(scan, {16, 16, 16}, 1.0);
-  Device device("", 24 << 20);
-  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.06, {}});
+  const ProjectionSet scan = simulated(shepp_logan(8), 17, 13, 24);
+  const Grid grid = grid_of(scan, {17, 17, 12}, 1.0);
+  Device device("", 20 << 20);
+  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.2, {}});
   BuildOptions options;
   options.granularity = 2;
   const BuildResult whole = build(device, scan, plan, options);
@@ -348,12 +349,12 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
     Journal journal(folder / "o.journal", resume);
     options.journal = &journal;
     reports = 0;
-    std::map<std::string, int> stages;
+    std::set<std::string> stages;
     const BuildResult result = build(device, scan, plan, options, [&](const std::string& stage, double) {
-      ++stages[stage];
+      stages.insert(stage);
       if (++reports == last) throw Interrupted(130);
     });
-    for (const auto& [stage, n] : stages) BOOST_TEST_MESSAGE(stage << ": " << n << " reports");
+    BOOST_TEST(stages.contains("repair"));
     BOOST_TEST(content_sha256(result.volume) == content_sha256(whole.volume));
     BOOST_TEST(to_json(result.certificate) == to_json(whole.certificate));
     return journal.replayed();

@@ -52,15 +52,15 @@ struct Work {
 
   Work() {
     fs::create_directory(out);
-    BOOST_REQUIRE(run({"simulate", "--phantom", "shepp-logan", "--detector", "33x25", "--pitch", "4",
-                       "--angles", "40", "-o", scan.string()}) == 0);
+    BOOST_REQUIRE(run({"simulate", "--phantom", "shepp-logan", "--detector", "25x13", "--pitch", "5.5",
+                       "--angles", "24", "-o", scan.string()}) == 0);
   }
   int run(const std::vector<std::string>& words) const { return finish(start(words, messages)); }
   [[nodiscard]] std::string said() const { return vdvr::support::bytes_of(messages); }
   [[nodiscard]] std::vector<std::string> build(const std::string& more = "") const {
     // Little memory makes small blocks, hence many records.
-    std::vector<std::string> words{"build", scan.string(),   "--epsilon", "8%", "--max-memory",
-                                   "40M",   "--granularity", "2",         "-o", volume().string()};
+    std::vector<std::string> words{"build", scan.string(),   "--epsilon", "15%", "--max-memory",
+                                   "40M",   "--granularity", "2",         "-o",  volume().string()};
     if (!more.empty()) words.push_back(more);
     return words;
   }
@@ -81,6 +81,16 @@ struct Work {
     for (const auto& entry : fs::directory_iterator(out))
       BOOST_TEST((std::find(wanted.begin(), wanted.end(), entry.path()) != wanted.end()),
                  entry.path() << " was left behind");
+  }
+  // Until a record is there: the head alone is shorter than that.
+  [[nodiscard]] bool wait_for_journal() const {
+    for (int i = 0; i < 6000; ++i) {
+      std::error_code none;
+      const auto bytes = fs::file_size(journal(), none);
+      if (!none && bytes > 4096) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return false;
   }
   // A killed build leaves its journal and hidden temporary files, and an output only if it is whole.
   void nothing_is_half_written() const {
@@ -105,11 +115,13 @@ BOOST_AUTO_TEST_CASE(build_killed_at_twenty_random_moments_and_resumed_has_the_s
   Work w;
   w.build_whole();
   std::mt19937 random(20);
-  std::uniform_real_distribution<double> moment(0, 1.02 * w.whole.count());
+  std::uniform_real_distribution<double> unit(0, 1);
   int with_journal = 0;
   for (int i = 0; i < 20; ++i) {
     const pid_t child = start(w.build(), w.messages);
-    kill_after(child, moment(random));
+    // Half of the moments lie anywhere, half where the journal grows.
+    const bool late = i % 2 == 1 && w.wait_for_journal();
+    kill_after(child, unit(random) * (late ? 0.12 : 1.02) * w.whole.count());
     finish(child);
     w.nothing_is_half_written();
     std::error_code none;
@@ -131,7 +143,7 @@ BOOST_AUTO_TEST_CASE(build_killed_again_and_again_gets_there) {
   w.build_whole();
   const double slice = 0.75 * w.whole.count();
   bool done = false;
-  for (int i = 0; i < 12 && !done; ++i) {
+  for (int i = 0; i < 4 && !done; ++i) {
     const pid_t child = start(w.build("--resume"), w.messages);
     kill_after(child, slice);
     done = finish(child) == 0;
@@ -146,19 +158,13 @@ BOOST_AUTO_TEST_CASE(interrupted_build_says_that_resume_continues) {
   Work w;
   w.build_whole();
   const pid_t child = start(w.build(), w.messages);
-  // Once a record is there: the head alone is shorter than a block's.
-  for (int i = 0; i < 2000; ++i) {
-    std::error_code none;
-    const auto bytes = fs::file_size(w.journal(), none);
-    if (!none && bytes > 4096) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
+  BOOST_TEST(w.wait_for_journal());
   ::kill(child, SIGTERM);
   BOOST_TEST(finish(child) == 143);
   BOOST_TEST(w.said().find("--resume continues") != std::string::npos, w.said());
   BOOST_TEST(fs::exists(w.journal()));
   auto other = w.build("--resume");
-  other[3] = "9%";
+  other[3] = "16%";
   BOOST_TEST(w.run(other) == 2);
   BOOST_TEST(w.said().find("epsilon was") != std::string::npos, w.said());
   BOOST_TEST(w.run(w.build("--resume")) == 0, w.said());
@@ -170,8 +176,8 @@ BOOST_AUTO_TEST_CASE(run_killed_and_resumed_has_the_same_content_and_all_its_fil
   Work w;
   w.build_whole();
   const auto words = [&](const std::string& more) {
-    std::vector<std::string> all{"run", w.scan.string(), "--epsilon", "8%", "--max-memory",
-                                 "40M", "--granularity", "2",         "-o", w.out.string()};
+    std::vector<std::string> all{"run", w.scan.string(), "--epsilon", "15%", "--max-memory",
+                                 "40M", "--granularity", "2",         "-o",  w.out.string()};
     if (!more.empty()) all.push_back(more);
     return all;
   };
@@ -179,7 +185,7 @@ BOOST_AUTO_TEST_CASE(run_killed_and_resumed_has_the_same_content_and_all_its_fil
   BOOST_REQUIRE_MESSAGE(w.run(words("")) == 0, w.said());
   const std::chrono::duration<double> whole = Clock::now() - begin;
   const auto files = std::distance(fs::directory_iterator(w.out), fs::directory_iterator());
-  for (const double share : {0.3, 0.5, 0.7, 0.85, 0.95}) {
+  for (const double share : {0.6, 0.9}) {
     fs::remove_all(w.out);
     const pid_t child = start(words(""), w.messages);
     kill_after(child, share * whole.count());

@@ -1,0 +1,37 @@
+// The large host arrays of a stage, counted against --max-memory beside the device's. What is not counted
+// (docs/performance.md): scratch no larger than a batch of blocks, and libraries. Called by plan.cpp,
+// build.cpp.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "host/opencl/state.hpp"
+
+namespace vdvr {
+
+class HostMemory {
+ public:
+  explicit HostMemory(opencl::State& state) : state_(state) {}
+  ~HostMemory() { state_.memory.give(bytes_); }
+  HostMemory(const HostMemory&) = delete;
+  HostMemory& operator=(const HostMemory&) = delete;
+
+  /// Before they are allocated. Throws ResourceError naming `what` when they pass the limit.
+  void count(std::uint64_t bytes, const std::string& what) {
+    // What the pool keeps is in use as well: it goes first when room is short.
+    if (state_.memory.left() < bytes + state_.pool.bytes()) state_.pool.clear();
+    state_.memory.take(bytes, what, state_.pool.bytes());
+    bytes_ += bytes;
+  }
+  void uncount(std::uint64_t bytes) {
+    state_.memory.give(bytes);
+    bytes_ -= bytes;
+  }
+
+ private:
+  opencl::State& state_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace vdvr
