@@ -20,7 +20,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 160 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 300 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
@@ -214,7 +214,6 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.table_lo = table.lo;
   p.table_scale = table.scale;
   p.table_size = kTableSize;
-  p.iso = static_cast<float>(o.iso);
   p.termination = static_cast<float>(o.termination);
   // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
   p.gradient_full = (v.value_range.second - v.value_range.first) / 32;
@@ -227,6 +226,8 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.height = static_cast<int>(o.height);
   p.shading = o.shading ? 1 : 0;
   p.skip = o.skip_empty ? 1 : 0;
+  p.surfaces = 1;
+  p.surface[0] = {static_cast<float>(o.iso), 1, {0.93f, 0.86f, 0.74f}};
   return p;
 }
 
@@ -295,12 +296,21 @@ float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
   return static_cast<float>(slack);
 }
 
-opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+// Packets address samples and records by 32-bit numbers.
+int lanes_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+  constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
+  if (sampler == SamplerKind::image3d || v.field->samples.size() > most || v.field->bricks.size() > most)
+    return 1;
+  return tuning.lanes.value_or(v.state->info.is_cpu ? 8 : 1);
+}
+
+opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning, int lanes) {
   return {{"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
           {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
-          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"},
+          {"VDVR_LANES", std::to_string(lanes)},
+          {"VDVR_UNIFORM", v.is_uniform && lanes > 1 ? "1" : "0"},
           v.field->defines.front()};
 }
 
@@ -322,15 +332,19 @@ void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
-            const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
-  const opencl::Range range{
-      {static_cast<std::uint64_t>(o.width), static_cast<std::uint64_t>(o.height), 1},
-      {static_cast<std::uint64_t>(tuning.group_x), static_cast<std::uint64_t>(tuning.group_y), 1}};
+            int lanes, const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
+  // Pixels of one packet (shared/packet.h).
+  const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
+  const auto packets = [](std::int64_t pixels, int packet) {
+    return static_cast<std::uint64_t>((pixels + packet - 1) / packet);
+  };
+  const opencl::Range range{{packets(o.width, packet_x), packets(o.height, packet_y), 1},
+                            {packets(tuning.group_x, packet_x), packets(tuning.group_y, packet_y), 1}};
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
-    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer> kernel(*v.state, "raycast", "slice",
-                                                                                 defines);
-    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture);
+    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
+        *v.state, "raycast", "slice", defines);
+    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
     return;
   }
   const char* name = o.mode == RenderMode::dvr   ? "raycast_dvr"
@@ -363,16 +377,17 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   prepare_frame(v, o, table);
   if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
 
-  const auto defines = defines_for(v, result.sampler, tuning);
+  const int lanes = lanes_for(v, result.sampler, tuning);
+  const auto defines = defines_for(v, result.sampler, tuning, lanes);
   const bool image = result.sampler == SamplerKind::image3d;
   if (image) v.atlas();
   opencl::finish(*v.state, "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
   if (image) {
     const auto& atlas = v.atlas();
-    launch(v, o, defines, tuning, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
+    launch(v, o, defines, tuning, lanes, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
   } else {
-    launch(v, o, defines, tuning, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
+    launch(v, o, defines, tuning, lanes, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
   }
   result.pixels = v.frame.picture.to_host();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
