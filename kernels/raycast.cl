@@ -258,14 +258,15 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       brick = open_brick(bricks, grid, at);
     }
-    const Emission e = look_up(table, &p, sample_open(THE_FIELD, &brick, grid, c));
+    const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
+    const Emission e = look_up(table, &p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
     const V weight = PICK(active, (1.0f - alpha) * e.opacity, none);
     if (ANY(weight > 0.0f)) {
 #if VDVR_GEOMETRY
       const I half_way = (alpha < 0.5f) & (alpha + weight >= 0.5f);
       if (ANY(half_way)) {
-        const V3 g = gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length, half_way);
+        const V3 g = gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, half_way);
         normal = pick3(half_way, normal_of(g), normal);
         depth = PICK(half_way, (ray.first + t) * p.length_unit, depth);
       }
@@ -273,10 +274,11 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
       V3 rgb = e.rgb;
       const I seen = weight > SHADED_WEIGHT * p.step;
       if (p.shading && ANY(seen))
-        rgb = pick3(seen,
-                    shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length, seen),
-                          ray.world, p.gradient_full),
-                    rgb);
+        rgb = pick3(
+            seen,
+            shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, seen),
+                  ray.world, p.gradient_full),
+            rgb);
       colour = plus(colour, scaled(rgb, weight));
 #endif
       alpha += weight;
@@ -352,7 +354,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       brick = open_brick(bricks, grid, at);
     }
-    const I side = side_of(&p, sample_open(THE_FIELD, &brick, grid, c));
+    const I side = side_of(&p, sample_open(THE_FIELD, &brick, grid, c).value);
     samples += PICK(active, (I)(1), (I)(0));
     was = k == 0 ? side : PICK(active, was, side);
     while (1) {
@@ -364,7 +366,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       V before = (V)((float)(k - 1) * p.step), behind = t;
       for (int i = 0; i < BISECTIONS; ++i) {
         const V middle = 0.5f * (before + behind);
-        const I inside = sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)) >= s.value;
+        const I inside =
+            sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)).value >= s.value;
         const I is_before = inside != up;
         before = PICK(is_before, middle, before);
         behind = PICK(is_before, behind, middle);
@@ -375,7 +378,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       if (p.shading || VDVR_GEOMETRY) {
         const V3 hit = position_at(&ray, grid, at);
         const OpenBrick around = open_brick(bricks, grid, brick_at(grid, hit));
-        const V3 g = gradient_at(THE_FIELD, bricks, grid, &around, hit, cells_per_length, crossing);
+        const Sampled sampled = sample_open(THE_FIELD, &around, grid, hit);
+        const V3 g = gradient_at(THE_FIELD, bricks, grid, &around, &sampled, hit, cells_per_length, crossing);
         normal = pick3(first, normal_of(g), normal);
         s.rgb = shade(s.rgb, g, ray.world, 0.0f);
       }
@@ -427,7 +431,7 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
       }
       brick = open_brick(bricks, grid, at);
     }
-    const V value = sample_open(THE_FIELD, &brick, grid, c);
+    const V value = sample_open(THE_FIELD, &brick, grid, c).value;
     samples += PICK(active, (I)(1), (I)(0));
     const I raised = active & (value > largest);
     largest = PICK(raised, value, largest);
@@ -451,7 +455,7 @@ __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice p, __globa
   c[p.down] += TO_V(py) * p.step_down;
   const V3 point = v3(c[0], c[1], c[2]), nearest = clamp_to_grid(point, grid);
   const I inside = (point.x == nearest.x) & (point.y == nearest.y) & (point.z == nearest.z);
-  const V value = sample_anywhere(THE_FIELD, bricks, grid, nearest), none = (V)(0.0f), one = (V)(1.0f);
+  const V value = sample_anywhere(THE_FIELD, bricks, grid, nearest).value, none = (V)(0.0f), one = (V)(1.0f);
   const V grey = clamp((value - p.window_lo) * p.window_scale, none, one);
   const V shown = PICK(inside, grey, (V)(0.02f));
   put(p.width, p.height, picture, row_samples, px, py, v3(shown, shown, shown), PICK(inside, value, (V)(NAN)),
