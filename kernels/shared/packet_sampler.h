@@ -144,11 +144,27 @@ RAY_INLINE I is_inside(const OpenBrick* b, V3 c) {
 // -----------------------------------------------------------------------------------------------------------
 #ifdef VDVR_SAMPLER_BUFFER
 
+// The number of a sample in each lane: `lane` + `all`. What is the same in all lanes is kept apart because it
+// costs nothing in an address.
+typedef struct {
+  Offset lane;
+  int all;
+} Place;
+RAY_INLINE Place place(Offset lane, int all) {
+  const Place p = {lane, all};
+  return p;
+}
+RAY_INLINE Place after(Place p, Place stride) {
+  p.lane += stride.lane;
+  p.all += stride.all;
+  return p;
+}
+
 // Where points lie in cells of samples: the cell's lowest sample, and the fractions above it.
 typedef struct {
   I3 index;  // of the lowest sample, from the brick's first
   V3 fraction;
-  Offset lowest, stride_y, stride_z;
+  Place lowest, x, y, z;  // the lowest sample; strides
   I type;
   V value_scale, bias;
 } Cell;
@@ -170,18 +186,20 @@ RAY_INLINE float stored(FIELD, int type, ulong i) {
 }
 #endif
 
-// Samples number i of the buffer, decoded as in mixed_sampler.h.
-RAY_INLINE V load(FIELD, const Cell* c, Offset i) {
+// Samples of the buffer, decoded as in mixed_sampler.h.
+RAY_INLINE V load(FIELD, const Cell* c, Place p) {
 #if VDVR_SAMPLE_TYPES == 1
-  __global const float* s = (__global const float*)field;
-  return GATHER(V, s, i);
+  __global const float* s = (__global const float*)field + p.all;
+  return GATHER(V, s, p.lane);
 #elif VDVR_SAMPLE_TYPES == 2
-  __global const ushort* s = (__global const ushort*)field;
-  return TO_V(GATHER(U16, s, i)) * c->value_scale + c->bias;
+  __global const ushort* s = (__global const ushort*)field + p.all;
+  return TO_V(GATHER(U16, s, p.lane)) * c->value_scale + c->bias;
 #elif VDVR_SAMPLE_TYPES == 4
-  return TO_V(GATHER(U8, field, i)) * c->value_scale + c->bias;
+  __global const uchar* s = field + p.all;
+  return TO_V(GATHER(U8, s, p.lane)) * c->value_scale + c->bias;
 #else
   V v;
+  const Offset i = p.lane + (Offset)(p.all);
 #define STORED(n) LANE(v, n) = stored(field, LANE(c->type, n), LANE(i, n));
   EACH(STORED)
 #undef STORED
@@ -200,20 +218,24 @@ RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
   cell.index.x = local_of(c.x, zero, one, (I)(grid.cells_x - 1), &cell.fraction.x);
   cell.index.y = local_of(c.y, zero, one, (I)(grid.cells_y - 1), &cell.fraction.y);
   cell.index.z = local_of(c.z, zero, one, (I)(grid.cells_z - 1), &cell.fraction.z);
-  cell.stride_y = (Offset)(grid.cells_x + 1);
-  cell.stride_z = (Offset)((grid.cells_x + 1) * (grid.cells_y + 1));
-  cell.lowest = (cell.index.z * (grid.cells_y + 1) + cell.index.y) * (grid.cells_x + 1) + cell.index.x;
+  cell.x = place(0, 1);
+  cell.y = place(0, grid.cells_x + 1);
+  cell.z = place(0, (grid.cells_x + 1) * (grid.cells_y + 1));
+  cell.lowest =
+      place((cell.index.z * (grid.cells_y + 1) + cell.index.y) * (grid.cells_x + 1) + cell.index.x, 0);
 #else
   cell.index.x = local_of(c.x, b->low.x, b->scale.x, b->top.x, &cell.fraction.x);
   cell.index.y = local_of(c.y, b->low.y, b->scale.y, b->top.y, &cell.fraction.y);
   cell.index.z = local_of(c.z, b->low.z, b->scale.z, b->top.z, &cell.fraction.z);
-  cell.stride_y = b->stride_y;
-  cell.stride_z = b->stride_z;
+  cell.x = place((Offset)(0), 1);
+  cell.y = place(b->stride_y, 0);
+  cell.z = place(b->stride_z, 0);
   cell.type = b->type;
   cell.value_scale = b->value_scale;
   cell.bias = b->bias;
-  cell.lowest = b->place + TO_OFFSET(cell.index.z) * b->stride_z + TO_OFFSET(cell.index.y) * b->stride_y +
-                TO_OFFSET(cell.index.x);
+  cell.lowest = place(b->place + TO_OFFSET(cell.index.z) * b->stride_z +
+                          TO_OFFSET(cell.index.y) * b->stride_y + TO_OFFSET(cell.index.x),
+                      0);
 #endif
   return cell;
 }
@@ -229,25 +251,27 @@ typedef struct {
 RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   Sampled k;
   k.cell = cell_at(grid, b, c);
-  const Offset i = k.cell.lowest, y = i + k.cell.stride_y, z = i + k.cell.stride_z, yz = z + k.cell.stride_y;
-  k.s000 = load(field, &k.cell, i);
-  k.s001 = load(field, &k.cell, i + 1);
-  k.s010 = load(field, &k.cell, y);
-  k.s011 = load(field, &k.cell, y + 1);
-  k.s100 = load(field, &k.cell, z);
-  k.s101 = load(field, &k.cell, z + 1);
-  k.s110 = load(field, &k.cell, yz);
-  k.s111 = load(field, &k.cell, yz + 1);
+  const Cell* q = &k.cell;
+  const Place i = q->lowest, y = after(i, q->y), z = after(i, q->z), yz = after(y, q->z);
+  k.s000 = load(field, q, i);
+  k.s001 = load(field, q, after(i, q->x));
+  k.s010 = load(field, q, y);
+  k.s011 = load(field, q, after(y, q->x));
+  k.s100 = load(field, q, z);
+  k.s101 = load(field, q, after(z, q->x));
+  k.s110 = load(field, q, yz);
+  k.s111 = load(field, q, after(yz, q->x));
   const V3 f = k.cell.fraction;
   k.value = lerp(lerp(lerp(k.s000, k.s001, f.x), lerp(k.s010, k.s011, f.x), f.y),
                  lerp(lerp(k.s100, k.s101, f.x), lerp(k.s110, k.s111, f.x), f.y), f.z);
   return k;
 }
 
-// The field in the face of cells that starts at sample i and runs along two axes.
-RAY_INLINE V in_face(FIELD, const Cell* c, Offset i, Offset u, V fu, Offset v, V fv) {
-  return lerp(lerp(load(field, c, i), load(field, c, i + u), fu),
-              lerp(load(field, c, i + v), load(field, c, i + u + v), fu), fv);
+// The field in a face of cells with lowest sample i, by fractions along the two axes that it runs along.
+RAY_INLINE V in_face(FIELD, const Cell* c, Place i, Place u, V fu, Place v, V fv) {
+  const Place iv = after(i, v);
+  return lerp(lerp(load(field, c, i), load(field, c, after(i, u)), fu),
+              lerp(load(field, c, iv), load(field, c, after(iv, u)), fu), fv);
 }
 
 // How one axis' two points lie: cells of samples away from the sampled one's, and the fraction in both. Half
@@ -265,49 +289,63 @@ RAY_INLINE Spread spread_of(I reach, V t) {
   return s;
 }
 
-// f(c + half a base cell) - f(c - half a base cell) along one axis with stride w: a, b are the field in the
-// faces across it of the sampled cell. Beyond first and last, where the grid ends, the outermost face counts.
-RAY_INLINE V difference(FIELD, const Cell* c, V a, V b, I reach, I index, V t, I first, I last, Offset w,
-                        Offset u, V fu, Offset v, V fv) {
+// The field at two points.
+typedef struct {
+  V lo, hi;
+} Ends;
+
+// The field half a base cell before and behind the sampled point along one axis, w its stride; a, b are the
+// field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the outermost
+// face counts.
+RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, I first, I last, Offset w,
+                           Place u, V fu, Place v, V fv) {
   const Spread s = spread_of(reach, t);
-#define FACE(n) \
-  in_face(field, c, c->lowest + TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, u, fu, v, fv)
-  const V p = FACE(s.back), s_ = FACE(s.ahead + 1);
-  V q, r;
+#define FACE(n)                                                                                            \
+  in_face(field, c,                                                                                        \
+          after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), u, fu, \
+          v, fv)
+  const V outer = FACE(s.back), outermost = FACE(s.ahead + 1);
+  V inner, nearer;
   if (ANY(reach > 1)) {
-    q = FACE(s.back + 1);
-    r = FACE(s.ahead);
+    inner = FACE(s.back + 1);
+    nearer = FACE(s.ahead);
   } else {
-    q = PICK(s.back < 0, a, b);
-    r = PICK(s.ahead > 0, b, a);
+    inner = PICK(s.back < 0, a, b);
+    nearer = PICK(s.ahead > 0, b, a);
   }
 #undef FACE
-  return lerp(r, s_, s.fraction) - lerp(p, q, s.fraction);
+  const Ends e = {lerp(outer, inner, s.fraction), lerp(nearer, outermost, s.fraction)};
+  return e;
 }
 
-// The same along every axis, where both points lie in what the bricks reach.
-RAY_INLINE V3 differences_within(FIELD, VdvrGrid grid, const OpenBrick* b, const Sampled* k) {
+typedef struct {
+  Ends x, y, z;
+} Neighbours;
+
+// The same along every axis. Right where the points lie in what the bricks reach.
+RAY_INLINE Neighbours neighbours_within(FIELD, VdvrGrid grid, const OpenBrick* b, const Sampled* k) {
   const Cell* c = &k->cell;
   const V3 t = c->fraction;
 #if VDVR_UNIFORM
   const I3 reach = {(I)(0), (I)(0), (I)(0)}, first = reach;
   const I3 last = {(I)(grid.cells_x), (I)(grid.cells_y), (I)(grid.cells_z)};
+  const Offset wy = (Offset)(c->y.all), wz = (Offset)(c->z.all);
 #else
   const I3 reach = b->reach, first = b->first, last = b->last;
+  const Offset wy = b->stride_y, wz = b->stride_z;
 #endif
-  const Offset one = (Offset)(1);
-  V3 d;
-  d.x = difference(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
+  Neighbours n;
+  n.x = ends_along(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
                    lerp(lerp(k->s001, k->s011, t.y), lerp(k->s101, k->s111, t.y), t.z), reach.x, c->index.x,
-                   t.x, first.x, last.x, one, c->stride_y, t.y, c->stride_z, t.z);
+                   t.x, first.x, last.x, (Offset)(1), c->y, t.y, c->z, t.z);
   // Along y and z the edges along x are shared.
   const V e00 = lerp(k->s000, k->s001, t.x), e01 = lerp(k->s010, k->s011, t.x);
   const V e10 = lerp(k->s100, k->s101, t.x), e11 = lerp(k->s110, k->s111, t.x);
-  d.y = difference(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, first.y,
-                   last.y, c->stride_y, one, t.x, c->stride_z, t.z);
-  d.z = difference(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, first.z,
-                   last.z, c->stride_z, one, t.x, c->stride_y, t.y);
-  return d;
+  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, first.y,
+                   last.y, wy, c->x, t.x, c->z, t.z);
+  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, first.z,
+                   last.z, wz, c->x, t.x, c->y, t.y);
+  return n;
 }
 
 #else
@@ -331,17 +369,35 @@ RAY_INLINE Sampled sample_anywhere(FIELD, BRICKS, VdvrGrid grid, V3 c) {
 }
 
 #ifdef VDVR_SAMPLER_IMAGE3D
-RAY_INLINE V at_point(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, V3 c) {
+RAY_INLINE V at_point(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, V x, V y, V z) {
+  const V3 c = v3(x, y, z);
   return is_inside(b, c) ? sample_open(THE_FIELD, b, grid, c).value
                          : sample_anywhere(THE_FIELD, bricks, grid, c).value;
 }
 #elif !VDVR_UNIFORM
-// f(high point) - f(low point) instead of `within` in the lanes where either lies beyond what the brick
-// reaches.
-RAY_INLINE V across(FIELD, BRICKS, VdvrGrid grid, V within, V3 lo, V3 hi, I beyond) {
-  if (!ANY(beyond)) return within;
-  const V v = sample_anywhere(field, bricks, grid, hi).value - sample_anywhere(field, bricks, grid, lo).value;
-  return PICK(beyond, v, within);
+// Samples the points that lie beyond what the bricks reach, one a lane and round: most lanes have none or
+// one.
+RAY_INLINE void sample_beyond(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, V3 c, V3 lo, V3 hi, I needed,
+                              Neighbours* n) {
+  const I none = (I)(0);
+  I left = PICK(lo.x < b->low.x, (I)(1), none) | PICK(hi.x > b->high.x, (I)(2), none) |
+           PICK(lo.y < b->low.y, (I)(4), none) | PICK(hi.y > b->high.y, (I)(8), none) |
+           PICK(lo.z < b->low.z, (I)(16), none) | PICK(hi.z > b->high.z, (I)(32), none);
+  left = PICK(needed & NOT(b->base_around), left, none);
+  while (ANY(left != 0)) {
+    const I now = left & -left;
+    const V3 point =
+        v3(PICK(now == 1, lo.x, PICK(now == 2, hi.x, c.x)), PICK(now == 4, lo.y, PICK(now == 8, hi.y, c.y)),
+           PICK(now == 16, lo.z, PICK(now == 32, hi.z, c.z)));
+    const V value = sample_anywhere(field, bricks, grid, point).value;
+    n->x.lo = PICK(now == 1, value, n->x.lo);
+    n->x.hi = PICK(now == 2, value, n->x.hi);
+    n->y.lo = PICK(now == 4, value, n->y.lo);
+    n->y.hi = PICK(now == 8, value, n->y.hi);
+    n->z.lo = PICK(now == 16, value, n->z.lo);
+    n->z.hi = PICK(now == 32, value, n->z.hi);
+    left &= left - 1;
+  }
 }
 #endif
 
@@ -356,25 +412,19 @@ RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, cons
   const V3 hi = v3(LEAST(c.x + GRADIENT_REACH, (V)((float)grid.cells_x)),
                    LEAST(c.y + GRADIENT_REACH, (V)((float)grid.cells_y)),
                    LEAST(c.z + GRADIENT_REACH, (V)((float)grid.cells_z)));
-  V3 d;
 #ifdef VDVR_SAMPLER_IMAGE3D
-  d.x = at_point(THE_FIELD, bricks, grid, b, v3(hi.x, c.y, c.z)) -
-        at_point(THE_FIELD, bricks, grid, b, v3(lo.x, c.y, c.z));
-  d.y = at_point(THE_FIELD, bricks, grid, b, v3(c.x, hi.y, c.z)) -
-        at_point(THE_FIELD, bricks, grid, b, v3(c.x, lo.y, c.z));
-  d.z = at_point(THE_FIELD, bricks, grid, b, v3(c.x, c.y, hi.z)) -
-        at_point(THE_FIELD, bricks, grid, b, v3(c.x, c.y, lo.z));
+  const V3 d = v3(at_point(THE_FIELD, bricks, grid, b, hi.x, c.y, c.z) -
+                      at_point(THE_FIELD, bricks, grid, b, lo.x, c.y, c.z),
+                  at_point(THE_FIELD, bricks, grid, b, c.x, hi.y, c.z) -
+                      at_point(THE_FIELD, bricks, grid, b, c.x, lo.y, c.z),
+                  at_point(THE_FIELD, bricks, grid, b, c.x, c.y, hi.z) -
+                      at_point(THE_FIELD, bricks, grid, b, c.x, c.y, lo.z));
 #else
-  d = differences_within(field, grid, b, k);
+  Neighbours n = neighbours_within(field, grid, b, k);
 #if !VDVR_UNIFORM
-  const I edge = needed & NOT(b->base_around);
-  d.x = across(field, bricks, grid, d.x, v3(lo.x, c.y, c.z), v3(hi.x, c.y, c.z),
-               edge & ((lo.x < b->low.x) | (hi.x > b->high.x)));
-  d.y = across(field, bricks, grid, d.y, v3(c.x, lo.y, c.z), v3(c.x, hi.y, c.z),
-               edge & ((lo.y < b->low.y) | (hi.y > b->high.y)));
-  d.z = across(field, bricks, grid, d.z, v3(c.x, c.y, lo.z), v3(c.x, c.y, hi.z),
-               edge & ((lo.z < b->low.z) | (hi.z > b->high.z)));
+  sample_beyond(field, bricks, grid, b, c, lo, hi, needed, &n);
 #endif
+  const V3 d = v3(n.x.hi - n.x.lo, n.y.hi - n.y.lo, n.z.hi - n.z.lo);
 #endif
   return v3(d.x / (hi.x - lo.x) * cells_per_length.x, d.y / (hi.y - lo.y) * cells_per_length.y,
             d.z / (hi.z - lo.z) * cells_per_length.z);
