@@ -22,8 +22,8 @@ struct RaycastTuning {
 };
 
 struct FloatPicture {
-  /// [y][x]: r, g, b display values; then dvr: opacity; iso: distance from the eye in world units, -1 where
-  /// nothing is hit; mip: the maximum, -infinity where the box is missed; slice: the field.
+  /// [y][x]: r, g, b display values, or of output depth and normal the unit normal; then the value of
+  /// RenderResult, but of iso -1 and of mip -infinity where it is NaN there, and of normal the depth.
   std::vector<cl_float4> pixels;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;
