@@ -186,25 +186,66 @@ RAY_INLINE float stored(FIELD, int type, ulong i) {
 }
 #endif
 
-// Samples of the buffer, decoded as in mixed_sampler.h.
-RAY_INLINE V load(FIELD, const Cell* c, Place p) {
 #if VDVR_SAMPLE_TYPES == 1
-  __global const float* s = (__global const float*)field + p.all;
-  return GATHER(V, s, p.lane);
+#define VDVR_ONE_TYPE float
+#define VDVR_ONE_VECTOR V
 #elif VDVR_SAMPLE_TYPES == 2
-  __global const ushort* s = (__global const ushort*)field + p.all;
-  return TO_V(GATHER(U16, s, p.lane)) * c->value_scale + c->bias;
+#define VDVR_ONE_TYPE ushort
+#define VDVR_ONE_VECTOR U16
 #elif VDVR_SAMPLE_TYPES == 4
-  __global const uchar* s = field + p.all;
-  return TO_V(GATHER(U8, s, p.lane)) * c->value_scale + c->bias;
+#define VDVR_ONE_TYPE uchar
+#define VDVR_ONE_VECTOR U8
+#endif
+
+// As in mixed_sampler.h.
+RAY_INLINE V decoded(const Cell* c, V v) {
+#if VDVR_SAMPLE_TYPES == 1
+  return v;
+#elif VDVR_SAMPLE_TYPES == 2 || VDVR_SAMPLE_TYPES == 4
+  return v * c->value_scale + c->bias;
+#else
+  return PICK(c->type == VDVR_F32, v, v * c->value_scale + c->bias);
+#endif
+}
+
+RAY_INLINE V load(FIELD, const Cell* c, Place p) {
+#ifdef VDVR_ONE_TYPE
+  __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
+  return decoded(c, TO_V(GATHER(VDVR_ONE_VECTOR, s, p.lane)));
 #else
   V v;
   const Offset i = p.lane + (Offset)(p.all);
 #define STORED(n) LANE(v, n) = stored(field, LANE(c->type, n), LANE(i, n));
   EACH(STORED)
 #undef STORED
-  return PICK(c->type == VDVR_F32, v, v * c->value_scale + c->bias);
+  return decoded(c, v);
 #endif
+}
+
+// A sample and its neighbour along x, which lies behind it: one load.
+typedef struct {
+  V at, next;
+} Pair;
+RAY_INLINE Pair load_pair(FIELD, const Cell* c, Place p) {
+  Pair v;
+#ifdef VDVR_ONE_TYPE
+  __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
+  VDVR_ONE_VECTOR at, next;
+#define TWO(n)                                             \
+  {                                                        \
+    __global const VDVR_ONE_TYPE* q = s + LANE(p.lane, n); \
+    LANE(at, n) = vload2(0, q).x;                          \
+    LANE(next, n) = vload2(0, q).y;                        \
+  }
+  EACH(TWO)
+#undef TWO
+  v.at = decoded(c, TO_V(at));
+  v.next = decoded(c, TO_V(next));
+#else
+  v.at = load(field, c, p);
+  v.next = load(field, c, after(p, c->x));
+#endif
+  return v;
 }
 
 RAY_INLINE V lerp(V a, V b, V t) { return (1.0f - t) * a + t * b; }
@@ -253,14 +294,16 @@ RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   k.cell = cell_at(grid, b, c);
   const Cell* q = &k.cell;
   const Place i = q->lowest, y = after(i, q->y), z = after(i, q->z), yz = after(y, q->z);
-  k.s000 = load(field, q, i);
-  k.s001 = load(field, q, after(i, q->x));
-  k.s010 = load(field, q, y);
-  k.s011 = load(field, q, after(y, q->x));
-  k.s100 = load(field, q, z);
-  k.s101 = load(field, q, after(z, q->x));
-  k.s110 = load(field, q, yz);
-  k.s111 = load(field, q, after(yz, q->x));
+  const Pair p00 = load_pair(field, q, i), p01 = load_pair(field, q, y);
+  const Pair p10 = load_pair(field, q, z), p11 = load_pair(field, q, yz);
+  k.s000 = p00.at;
+  k.s001 = p00.next;
+  k.s010 = p01.at;
+  k.s011 = p01.next;
+  k.s100 = p10.at;
+  k.s101 = p10.next;
+  k.s110 = p11.at;
+  k.s111 = p11.next;
   const V3 f = k.cell.fraction;
   k.value = lerp(lerp(lerp(k.s000, k.s001, f.x), lerp(k.s010, k.s011, f.x), f.y),
                  lerp(lerp(k.s100, k.s101, f.x), lerp(k.s110, k.s111, f.x), f.y), f.z);
@@ -272,6 +315,15 @@ RAY_INLINE V in_face(FIELD, const Cell* c, Place i, Place u, V fu, Place v, V fv
   const Place iv = after(i, v);
   return lerp(lerp(load(field, c, i), load(field, c, after(i, u)), fu),
               lerp(load(field, c, iv), load(field, c, after(iv, u)), fu), fv);
+}
+// The same where the first of them is x.
+RAY_INLINE V in_face_along_x(FIELD, const Cell* c, Place i, V fx, Place v, V fv) {
+  const Pair p = load_pair(field, c, i), q = load_pair(field, c, after(i, v));
+  return lerp(lerp(p.at, p.next, fx), lerp(q.at, q.next, fx), fv);
+}
+
+RAY_INLINE V face_at(FIELD, const Cell* c, Place i, int along_x, Place u, V fu, Place v, V fv) {
+  return along_x ? in_face_along_x(field, c, i, fu, v, fv) : in_face(field, c, i, u, fu, v, fv);
 }
 
 // How one axis' two points lie: cells of samples away from the sampled one's, and the fraction in both. Half
@@ -298,12 +350,12 @@ typedef struct {
 // field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the outermost
 // face counts.
 RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, I first, I last, Offset w,
-                           Place u, V fu, Place v, V fv) {
+                           int along_x, Place u, V fu, Place v, V fv) {
   const Spread s = spread_of(reach, t);
-#define FACE(n)                                                                                            \
-  in_face(field, c,                                                                                        \
-          after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), u, fu, \
-          v, fv)
+#define FACE(n)                                                                                              \
+  face_at(field, c,                                                                                          \
+          after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), along_x, \
+          u, fu, v, fv)
   const V outer = FACE(s.back), outermost = FACE(s.ahead + 1);
   V inner, nearer;
   if (ANY(reach > 1)) {
@@ -337,14 +389,14 @@ RAY_INLINE Neighbours neighbours_within(FIELD, VdvrGrid grid, const OpenBrick* b
   Neighbours n;
   n.x = ends_along(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
                    lerp(lerp(k->s001, k->s011, t.y), lerp(k->s101, k->s111, t.y), t.z), reach.x, c->index.x,
-                   t.x, first.x, last.x, (Offset)(1), c->y, t.y, c->z, t.z);
+                   t.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
   // Along y and z the edges along x are shared.
   const V e00 = lerp(k->s000, k->s001, t.x), e01 = lerp(k->s010, k->s011, t.x);
   const V e10 = lerp(k->s100, k->s101, t.x), e11 = lerp(k->s110, k->s111, t.x);
   n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, first.y,
-                   last.y, wy, c->x, t.x, c->z, t.z);
+                   last.y, wy, 1, c->x, t.x, c->z, t.z);
   n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, first.z,
-                   last.z, wz, c->x, t.x, c->y, t.y);
+                   last.z, wz, 1, c->x, t.x, c->y, t.y);
   return n;
 }
 
