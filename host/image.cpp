@@ -52,12 +52,13 @@ void write_png(const std::filesystem::path& path, const Image& image) {
 }
 
 void write_npy(const std::filesystem::path& path, const FloatImage& image) {
-  if (image.width < 1 || image.height < 1 ||
-      image.values.size() != static_cast<std::size_t>(image.width * image.height))
+  if (image.width < 1 || image.height < 1 || image.channels < 1 ||
+      image.values.size() != static_cast<std::size_t>(image.width * image.height * image.channels))
     throw InputError(fmt::format("{}: {} values for {} x {} pixels", path.string(), image.values.size(),
                                  image.width, image.height));
-  std::string header = fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
-                                   image.height, image.width);
+  std::string header =
+      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}{}), }}", image.height,
+                  image.width, image.channels == 1 ? "" : fmt::format(", {}", image.channels));
   // Magic, version and length take 10 bytes; the header ends in a line feed at a multiple of 64.
   header.append(63 - (10 + header.size()) % 64, ' ').push_back('\n');
   std::string bytes = "\x93NUMPY";

@@ -20,7 +20,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 160 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 300 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
@@ -64,6 +64,16 @@ void check_transfer(const TransferFunction& f) {
   }
 }
 
+void check_surfaces(const std::vector<IsoSurface>& surfaces) {
+  if (surfaces.empty() || surfaces.size() > VDVR_SURFACES)
+    throw InputError(
+        fmt::format("--iso names {} surfaces; 1 to {} can be drawn", surfaces.size(), VDVR_SURFACES));
+  for (const IsoSurface& s : surfaces)
+    if (!std::isfinite(s.value) || !(s.opacity >= 0 && s.opacity <= 1) || !is_finite(s.rgb))
+      throw InputError(
+          fmt::format("--iso {} must be finite, and its opacity {} within [0, 1]", s.value, s.opacity));
+}
+
 void check_options(const RenderOptions& o) {
   // Pixels are counted in int on the device; 16384 x 16384 already needs 4 GiB there.
   if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
@@ -72,6 +82,8 @@ void check_options(const RenderOptions& o) {
     throw InputError(
         "an error slice needs the projections: use `run`, or `render --mode error --projections`");
   if (o.mode == RenderMode::slice) {
+    if (o.output != RenderOutput::colour)
+      throw InputError("--show depth and normal do not apply to a slice, which has no camera");
     if (o.slice_axis < 0 || o.slice_axis > 2)
       throw InputError(fmt::format("slice axis {} is not 0 (x), 1 (y) or 2 (z)", o.slice_axis));
     if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
@@ -85,8 +97,9 @@ void check_options(const RenderOptions& o) {
     throw InputError(fmt::format("--step {} must lie between 1/1024 and 1024 base cells", o.step));
   if (!(o.termination > 0 && o.termination <= 1))
     throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
-  if (o.mode == RenderMode::iso && !std::isfinite(o.iso))
-    throw InputError(fmt::format("--iso {} must be finite", o.iso));
+  if (o.mode == RenderMode::iso) check_surfaces(o.surfaces);
+  if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
+    throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
 }
 
@@ -119,9 +132,9 @@ TransferPoint evaluate(const std::vector<TransferPoint>& points, double value) {
 
 Table bake(const TransferFunction& transfer, double step) {
   Table t;
-  // A picture of an iso-surface needs a colour only.
-  const std::vector<TransferPoint> plain{{0, {0.93, 0.86, 0.74}, 1}};
-  const auto& points = transfer.points.empty() ? plain : transfer.points;
+  // Iso-surfaces have colours of their own.
+  const std::vector<TransferPoint> none{{0, {0, 0, 0}, 0}};
+  const auto& points = transfer.points.empty() ? none : transfer.points;
   const double lo = points.front().value, hi = points.back().value;
   t.lo = static_cast<float>(lo);
   t.scale = hi > lo ? static_cast<float>((kTableSize - 1) / (hi - lo)) : 0.0f;
@@ -161,6 +174,12 @@ std::vector<std::uint8_t> bricks_reaching(const Impl& v, float iso, float slack)
   return occupied;
 }
 
+float lowest_surface(const RenderOptions& o) {
+  const auto lowest = std::min_element(o.surfaces.begin(), o.surfaces.end(),
+                                       [](const auto& a, const auto& b) { return a.value < b.value; });
+  return static_cast<float>(lowest->value);
+}
+
 // Brings frame.distance up to date; a turntable computes it once.
 void update_distance(Impl& v, const RenderOptions& o, const Table& table, float slack) {
   std::vector<float> key{slack};
@@ -168,11 +187,11 @@ void update_distance(Impl& v, const RenderOptions& o, const Table& table, float 
     key.insert(key.end(), {0, table.lo, table.scale});
     for (const auto& e : table.entries) key.push_back(e.s[3] > 0 ? 1.0f : 0.0f);
   } else {
-    key.insert(key.end(), {1, static_cast<float>(o.iso)});
+    key.insert(key.end(), {1, lowest_surface(o)});
   }
   if (key == v.frame.distance_key) return;
   const auto occupied = o.mode == RenderMode::dvr ? opaque_bricks(v, table, slack)
-                                                  : bricks_reaching(v, static_cast<float>(o.iso), slack);
+                                                  : bricks_reaching(v, lowest_surface(o), slack);
   const VdvrGrid& g = v.field->grid;
   const Index3 n{g.bricks_x, g.bricks_y, g.bricks_z};
   const auto distance = distance_to_occupied(occupied, n);
@@ -191,6 +210,17 @@ void set3(float& x, float& y, float& z, const glm::dvec3& v) {
   x = static_cast<float>(v.x);
   y = static_cast<float>(v.y);
   z = static_cast<float>(v.z);
+}
+
+void set_surfaces(VdvrRaycast& p, std::vector<IsoSurface> surfaces) {
+  std::sort(surfaces.begin(), surfaces.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+  for (const IsoSurface& s : surfaces) {
+    if (p.surfaces == VDVR_SURFACES) break;
+    VdvrSurface& to = p.surface[p.surfaces++];
+    to.value = static_cast<float>(s.value);
+    to.opacity = static_cast<float>(s.opacity);
+    for (std::size_t c = 0; c < 3; ++c) to.rgb[c] = static_cast<float>(s.rgb[c]);
+  }
 }
 
 VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& table, float slack) {
@@ -214,7 +244,6 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.table_lo = table.lo;
   p.table_scale = table.scale;
   p.table_size = kTableSize;
-  p.iso = static_cast<float>(o.iso);
   p.termination = static_cast<float>(o.termination);
   // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
   p.gradient_full = (v.value_range.second - v.value_range.first) / 32;
@@ -227,6 +256,7 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.height = static_cast<int>(o.height);
   p.shading = o.shading ? 1 : 0;
   p.skip = o.skip_empty ? 1 : 0;
+  set_surfaces(p, o.surfaces);
   return p;
 }
 
@@ -295,12 +325,23 @@ float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
   return static_cast<float>(slack);
 }
 
-opencl::Defines defines_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+// Packets address samples and records by 32-bit numbers.
+int lanes_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+  constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
+  if (sampler == SamplerKind::image3d || v.field->samples.size() > most || v.field->bricks.size() > most)
+    return 1;
+  return tuning.lanes.value_or(v.state->info.is_cpu ? 8 : 1);
+}
+
+opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind sampler,
+                            const RaycastTuning& tuning, int lanes) {
   return {{"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
           {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
-          {"VDVR_WIDE_GRADIENT", tuning.wide_gradient.value_or(v.state->info.is_cpu) ? "1" : "0"},
+          {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
+          {"VDVR_LANES", std::to_string(lanes)},
+          {"VDVR_UNIFORM", v.is_uniform && lanes > 1 ? "1" : "0"},
           v.field->defines.front()};
 }
 
@@ -322,15 +363,19 @@ void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
-            const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
-  const opencl::Range range{
-      {static_cast<std::uint64_t>(o.width), static_cast<std::uint64_t>(o.height), 1},
-      {static_cast<std::uint64_t>(tuning.group_x), static_cast<std::uint64_t>(tuning.group_y), 1}};
+            int lanes, const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
+  // Pixels of one packet (shared/packet.h).
+  const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
+  const auto packets = [](std::int64_t pixels, int packet) {
+    return static_cast<std::uint64_t>((pixels + packet - 1) / packet);
+  };
+  const opencl::Range range{{packets(o.width, packet_x), packets(o.height, packet_y), 1},
+                            {packets(tuning.group_x, packet_x), packets(tuning.group_y, packet_y), 1}};
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
-    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer> kernel(*v.state, "raycast", "slice",
-                                                                                 defines);
-    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture);
+    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
+        *v.state, "raycast", "slice", defines);
+    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
     return;
   }
   const char* name = o.mode == RenderMode::dvr   ? "raycast_dvr"
@@ -349,6 +394,49 @@ std::uint8_t to_byte(float x) {
   return static_cast<std::uint8_t>(x > 0.0f ? std::min(x, 1.0f) * 255.0f + 0.5f : 0.0f);
 }
 
+constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+
+FloatImage values_of(const std::vector<cl_float4>& pixels, const RenderOptions& o) {
+  FloatImage image{o.width, o.height, {}, o.output == RenderOutput::normal ? 3 : 1};
+  image.values.resize(pixels.size() * static_cast<std::size_t>(image.channels));
+  float* to = image.values.data();
+  for (const cl_float4& p : pixels) {
+    if (image.channels == 3) {
+      for (std::size_t c = 0; c < 3; ++c) *to++ = p.s[c];
+      continue;
+    }
+    const bool missed =
+        (o.mode == RenderMode::iso && p.s[3] < 0) || (o.mode == RenderMode::mip && !std::isfinite(p.s[3]));
+    *to++ = missed ? kNothing : p.s[3];
+  }
+  return image;
+}
+
+Image coloured(const std::vector<cl_float4>& pixels, const RenderOptions& o) {
+  Image image{o.width, o.height, std::vector<std::uint8_t>(3 * pixels.size())};
+  std::uint8_t* to = image.rgb.data();
+  for (const cl_float4& p : pixels)
+    for (std::size_t c = 0; c < 3; ++c) *to++ = to_byte(p.s[c]);
+  return image;
+}
+
+// Depths from white, nearest, to dark grey; normals with 0 as middle grey; nothing black.
+Image shown(const FloatImage& values) {
+  Image image{values.width, values.height,
+              std::vector<std::uint8_t>(static_cast<std::size_t>(3 * values.width * values.height))};
+  float lo = std::numeric_limits<float>::infinity(), hi = -lo;
+  for (const float x : values.values) {
+    if (!std::isfinite(x)) continue;
+    lo = std::min(lo, x);
+    hi = std::max(hi, x);
+  }
+  const float scale = hi > lo ? 0.85f / (hi - lo) : 0.0f;
+  for (std::size_t i = 0; i < image.rgb.size(); ++i)
+    image.rgb[i] = to_byte(values.channels == 3 ? 0.5f + 0.5f * values.values[i]
+                                                : 1.0f - (values.values[i / 3] - lo) * scale);
+  return image;
+}
+
 }  // namespace
 
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& o,
@@ -363,16 +451,17 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   prepare_frame(v, o, table);
   if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
 
-  const auto defines = defines_for(v, result.sampler, tuning);
+  const int lanes = lanes_for(v, result.sampler, tuning);
+  const auto defines = defines_for(v, o, result.sampler, tuning, lanes);
   const bool image = result.sampler == SamplerKind::image3d;
   if (image) v.atlas();
   opencl::finish(*v.state, "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
   if (image) {
     const auto& atlas = v.atlas();
-    launch(v, o, defines, tuning, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
+    launch(v, o, defines, tuning, lanes, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
   } else {
-    launch(v, o, defines, tuning, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
+    launch(v, o, defines, tuning, lanes, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
   }
   result.pixels = v.frame.picture.to_host();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -387,11 +476,8 @@ RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderO
   r.sampler_reason = std::move(picture.sampler_reason);
   r.samples = picture.samples;
   r.seconds = picture.seconds;
-  r.image.width = options.width;
-  r.image.height = options.height;
-  r.image.rgb.reserve(3 * picture.pixels.size());
-  for (const cl_float4& p : picture.pixels)
-    for (std::size_t c = 0; c < 3; ++c) r.image.rgb.push_back(to_byte(p.s[c]));
+  r.values = values_of(picture.pixels, options);
+  r.image = options.output == RenderOutput::colour ? coloured(picture.pixels, options) : shown(r.values);
   return r;
 }
 

@@ -15,13 +15,15 @@ namespace vdvr {
 
 /// Never changes a picture.
 struct RaycastTuning {
-  int group_x = 8, group_y = 8;       ///< pixels of one work-group
-  std::optional<bool> wide_gradient;  ///< gradients in vectors of eight; default: on CPUs
+  int group_x = 8, group_y = 8;  ///< pixels of one work-group
+  /// Rays that a work-item follows side by side: 1, 4, 8 or 16; default: 8 on CPUs, else 1. The image3d
+  /// sampler and volumes of 2^31 samples take 1.
+  std::optional<int> lanes;
 };
 
 struct FloatPicture {
-  /// [y][x]: r, g, b display values; then dvr: opacity; iso: distance from the eye in world units, -1 where
-  /// nothing is hit; mip: the maximum, -infinity where the box is missed; slice: the field.
+  /// [y][x]: r, g, b display values, or of output depth and normal the unit normal; then the value of
+  /// RenderResult, but of iso -1 and of mip -infinity where it is NaN there, and of normal the depth.
   std::vector<cl_float4> pixels;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;

@@ -228,6 +228,7 @@ std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& 
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
     : state(&device.state()), grid(v.grid) {
   check_sizes(v);
+  is_uniform = v.base.type == SampleType::f32 && v.tiles.empty();
   offsets_ = tile_offsets(v);
   types_[{0, 0, 0}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;

@@ -1,19 +1,26 @@
-// Ray-casting of the mixed-resolution field: emission-absorption (dvr), first iso-surface (iso), maximum
-// (mip), slice. One source for both samplers: VDVR_SAMPLER_BUFFER reads the field by mixed_sampler.h,
-// VDVR_SAMPLER_IMAGE3D by mixed_image.h.
+// Ray-casting of the mixed-resolution field: emission-absorption (dvr), iso-surfaces (iso), maximum (mip),
+// slice. One source for both samplers and for packets of 1 to 16 rays per work-item (shared/packet.h).
 //
 // Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, and each belongs to the brick that
-// vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. So
-// the picture does not depend on skipping, to the bit.
+// vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
+// rays of a packet share k; each counts from its own entry. So neither skipping nor packets change a bit.
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one worth sampling, at most 255),
 // ranges[bz][by][bx], table[table_size] (rgb, opacity of one step), picture[y][x] (r, g, b, alpha | depth |
-// maximum). Called by: raycast() in host/raycast.cpp. Calls: mixed_sampler.h, mixed_image.h.
+// maximum; with VDVR_GEOMETRY normal, depth). Called by: raycast() in host/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
 #if defined(VDVR_SAMPLER_BUFFER) == defined(VDVR_SAMPLER_IMAGE3D)
 #error "define one of VDVR_SAMPLER_BUFFER and VDVR_SAMPLER_IMAGE3D"
+#endif
+// 1: every brick reads a float32 base, whose cells are then addressed without records.
+#ifndef VDVR_UNIFORM
+#define VDVR_UNIFORM 0
+#endif
+// 1: where and how what is seen stands, instead of its colour.
+#ifndef VDVR_GEOMETRY
+#define VDVR_GEOMETRY 0
 #endif
 // Tuning: pixels of one work-group. 8 x 8 keeps the rays of a group in the same bricks.
 #ifndef VDVR_GROUP_X
@@ -22,12 +29,6 @@
 #ifndef VDVR_GROUP_Y
 #define VDVR_GROUP_Y 8
 #endif
-// Tuning: the six samples of a gradient as one vector of eight lanes. Pays where a work-item is a scalar
-// thread (CPUs); same operations in the same order, so the same bits. Needs the buffer sampler.
-#ifndef VDVR_WIDE_GRADIENT
-#define VDVR_WIDE_GRADIENT 0
-#endif
-#define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X, VDVR_GROUP_Y, 1)))
 
 // Calls in the sampling loop cost as much as a sample; compilers without the attribute inline anyway.
 #if defined(__clang__) || defined(__GNUC__)
@@ -39,28 +40,15 @@
 #include "shared/mixed_sampler.h"
 #include "shared/mixed_image.h"
 #include "shared/raycast_params.h"
+#include "shared/packet.h"
+#include "shared/packet_sampler.h"
 
-// One image per sample type; the launcher binds any to those that do not occur. THE_FIELD hands it on.
-#ifdef VDVR_SAMPLER_IMAGE3D
-#define FIELD __read_only image3d_t field_f32, __read_only image3d_t field_u16, __read_only image3d_t field_u8
-#define THE_FIELD field_f32, field_u16, field_u8
-#else
-#define FIELD __global const uchar* restrict field
-#define THE_FIELD field
-#endif
-#define BRICKS __global const uint* restrict bricks
-
-// Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
-#define LEAST(a, b) ((a) < (b) ? (a) : (b))
-#define MOST(a, b) ((a) > (b) ? (a) : (b))
+#define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X / PACKET_X, VDVR_GROUP_Y / PACKET_Y, 1)))
 
 // How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a
 // grid of 8192 cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration
 // often.
 #define LEAP_MARGIN 0.00390625f
-// Central differences reach half a base cell to each side, at every level: one gradient operator for the
-// whole volume, so that shading has no seam where levels meet.
-#define GRADIENT_REACH 0.5f
 // Bisections of an iso interval: the hit is known to 2^-13 of a step.
 #define BISECTIONS 12
 
@@ -68,394 +56,408 @@
 // for shading.
 #define SHADED_WEIGHT 0.001953125f
 
-// A ray clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
+// Rays clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
 typedef struct {
-  float3 world;  // unit direction, world axes
-  float3 entry, direction, inverse;
-  float length, first;  // inside the box; from the eye to `entry`
+  V3 world;  // unit direction, world axes
+  V3 entry, direction, inverse;
+  V length, first;  // inside the box; from the eye to `entry`
 } Ray;
 
-// The brick that is being sampled; a cell coordinate c belongs to it iff low <= c < high.
-typedef struct {
-  int x, y, z;
-  VdvrBrick record;
-  float3 low, high;
-} OpenBrick;
-
-RAY_INLINE float3 grid_cells(VdvrGrid grid) {
-  return (float3)((float)grid.cells_x, (float)grid.cells_y, (float)grid.cells_z);
-}
-
-RAY_INLINE float3 clamp_to_grid(float3 c, VdvrGrid grid) {
-  const float3 cells = grid_cells(grid);
-  c = LEAST(c, cells);
-  return MOST(c, (float3)(0.0f));
-}
-
-RAY_INLINE ulong brick_index(VdvrGrid grid, int x, int y, int z) {
-  return ((ulong)z * (ulong)grid.bricks_y + (ulong)y) * (ulong)grid.bricks_x + (ulong)x;
-}
-
-RAY_INLINE float sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, float3 c) {
-#ifdef VDVR_SAMPLER_IMAGE3D
-  return vdvr_image_sample_in_brick(THE_FIELD, &b->record, grid, b->x, b->y, b->z, c.x, c.y, c.z);
-#else
-  return vdvr_sample_in_brick(field, b->record,
-                              vdvr_local(c.x, b->x, b->record.level_x, grid.granularity, grid.cells_x),
-                              vdvr_local(c.y, b->y, b->record.level_y, grid.granularity, grid.cells_y),
-                              vdvr_local(c.z, b->z, b->record.level_z, grid.granularity, grid.cells_z));
-#endif
-}
-
-RAY_INLINE int3 brick_at(VdvrGrid grid, float3 c) {
-  return (int3)(vdvr_brick_of(c.x, grid.granularity, grid.bricks_x),
-                vdvr_brick_of(c.y, grid.granularity, grid.bricks_y),
-                vdvr_brick_of(c.z, grid.granularity, grid.bricks_z));
-}
-
-RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, int3 b) {
-  OpenBrick o;
-  o.x = b.x;
-  o.y = b.y;
-  o.z = b.z;
-  o.record = vdvr_brick(bricks, grid, brick_index(grid, b.x, b.y, b.z));
-  o.low = convert_float3(b * grid.granularity);
-  o.high = o.low + (float)grid.granularity;
-  // The last brick of an axis is closed, and wider than the grid where the cells do not divide by the
-  // granularity.
-  if (b.x == grid.bricks_x - 1) o.high.x = INFINITY;
-  if (b.y == grid.bricks_y - 1) o.high.y = INFINITY;
-  if (b.z == grid.bricks_z - 1) o.high.z = INFINITY;
-  return o;
-}
-
-RAY_INLINE int is_inside(const OpenBrick* b, float3 c) {
-  return c.x >= b->low.x && c.x < b->high.x && c.y >= b->low.y && c.y < b->high.y && c.z >= b->low.z &&
-         c.z < b->high.z;
-}
-
-// The field anywhere: vdvr_sample, or its image form.
-RAY_INLINE float sample_anywhere(FIELD, BRICKS, VdvrGrid grid, float3 c) {
-#ifdef VDVR_SAMPLER_IMAGE3D
-  const OpenBrick b = open_brick(bricks, grid, brick_at(grid, c));
-  return sample_open(THE_FIELD, &b, grid, c);
-#else
-  return vdvr_sample(field, bricks, grid, c.x, c.y, c.z);
-#endif
-}
-
-RAY_INLINE float sample_near(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c) {
-  return is_inside(b, c) ? sample_open(THE_FIELD, b, grid, c) : sample_anywhere(THE_FIELD, bricks, grid, c);
-}
-
-#if VDVR_WIDE_GRADIENT && defined(VDVR_SAMPLER_BUFFER)
-#define GRADIENT_IS_WIDE 1
-
-// Local coordinates of six points along one axis, as vdvr_local; the points lie in the region.
-RAY_INLINE int8 local8(float8 c, float first, float scale, int last, float8* fraction) {
-  const float8 r = (c - first) * scale;
-  int8 i = convert_int8(r);
-  const int8 top = (int8)(last - 1);
-  i = i > top ? top : i;
-  *fraction = r - convert_float8(i);
-  return i;
-}
-
-#define LOAD6(TYPE, s, i) (TYPE)((s)[i.s0], (s)[i.s1], (s)[i.s2], (s)[i.s3], (s)[i.s4], (s)[i.s5], 0, 0)
-// Samples number first + i of the buffer, decoded as in mixed_sampler.h.
-RAY_INLINE float8 load6(FIELD, const VdvrBrick* b, ulong first, int8 i) {
-  if (VDVR_HOLDS(*b, VDVR_F32)) {
-    __global const float* s = (__global const float*)field + first;
-    return LOAD6(float8, s, i);
-  }
-  if (VDVR_HOLDS(*b, VDVR_U16)) {
-    __global const ushort* s = (__global const ushort*)field + first;
-    return convert_float8(LOAD6(ushort8, s, i)) * b->scale + b->bias;
-  }
-  __global const uchar* s = field + first;
-  return convert_float8(LOAD6(uchar8, s, i)) * b->scale + b->bias;
-}
-
-RAY_INLINE float8 lerp8(float8 a, float8 b, float8 t) { return (1.0f - t) * a + t * b; }
-
-// vdvr_trilinear at six points (lanes 0 to 5) of one region: an open brick, or, where the bricks around read
-// the base too, the whole base, whose cells give the same bits in global coordinates as in the brick's.
-RAY_INLINE float8 sample6(FIELD, VdvrGrid grid, const OpenBrick* b, float8 x, float8 y, float8 z) {
-  const int base = (int)b->record.base_around;
-  const int fx = base ? 0 : b->x * grid.granularity, fy = base ? 0 : b->y * grid.granularity;
-  const int fz = base ? 0 : b->z * grid.granularity;
-  const int wide = base ? INT_MAX : grid.granularity;
-  const uint lx = b->record.level_x, ly = b->record.level_y, lz = b->record.level_z;
-  float8 tx, ty, tz;
-  const int8 ix = local8(x, (float)fx, (float)(1 << lx), min(grid.cells_x - fx, wide) << lx, &tx);
-  const int8 iy = local8(y, (float)fy, (float)(1 << ly), min(grid.cells_y - fy, wide) << ly, &ty);
-  const int8 iz = local8(z, (float)fz, (float)(1 << lz), min(grid.cells_z - fz, wide) << lz, &tz);
-  const int sy = (int)b->record.stride_y, sz = (int)b->record.stride_z;
-  const int8 i = iz * sz + iy * sy + ix;
-  const VdvrBrick* r = &b->record;
-  const ulong s = base ? 0 : r->place, t = s + (ulong)sz;
-  const float8 p = lerp8(lerp8(load6(field, r, s, i), load6(field, r, s + 1, i), tx),
-                         lerp8(load6(field, r, s + sy, i), load6(field, r, s + sy + 1, i), tx), ty);
-  const float8 q = lerp8(lerp8(load6(field, r, t, i), load6(field, r, t + 1, i), tx),
-                         lerp8(load6(field, r, t + sy, i), load6(field, r, t + sy + 1, i), tx), ty);
-  return lerp8(p, q, tz);
-}
-#else
-#define GRADIENT_IS_WIDE 0
-#endif
-
-// Density per length along the world axes; one-sided at the box's faces, where the reach is cut.
-RAY_INLINE float3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, float3 c,
-                              float3 cells_per_length) {
-  const float3 lo = MOST(c - GRADIENT_REACH, (float3)(0.0f));
-  const float3 hi = LEAST(c + GRADIENT_REACH, grid_cells(grid));
-#if GRADIENT_IS_WIDE
-  if (b->record.base_around || (all(lo >= b->low) && all(hi < b->high))) {
-    const float8 v = sample6(field, grid, b, (float8)(lo.x, hi.x, c.x, c.x, c.x, c.x, c.x, c.x),
-                             (float8)(c.y, c.y, lo.y, hi.y, c.y, c.y, c.y, c.y),
-                             (float8)(c.z, c.z, c.z, c.z, lo.z, hi.z, c.z, c.z));
-    return ((float3)(v.s1, v.s3, v.s5) - (float3)(v.s0, v.s2, v.s4)) / (hi - lo) * cells_per_length;
-  }
-#endif
-  const float3 before = (float3)(sample_near(THE_FIELD, bricks, grid, b, (float3)(lo.x, c.y, c.z)),
-                                 sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, lo.y, c.z)),
-                                 sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, c.y, lo.z)));
-  const float3 after = (float3)(sample_near(THE_FIELD, bricks, grid, b, (float3)(hi.x, c.y, c.z)),
-                                sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, hi.y, c.z)),
-                                sample_near(THE_FIELD, bricks, grid, b, (float3)(c.x, c.y, hi.z)));
-  return (after - before) / (hi - lo) * cells_per_length;
-}
+RAY_INLINE V dot3(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+RAY_INLINE V3 scaled(V3 a, V s) { return v3(a.x * s, a.y * s, a.z * s); }
+RAY_INLINE V3 plus(V3 a, V3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }
+RAY_INLINE V3 pick3(I m, V3 a, V3 b) { return v3(PICK(m, a.x, b.x), PICK(m, a.y, b.y), PICK(m, a.z, b.z)); }
 
 // Phong with a light at the eye, two-sided. Where the gradient is weak its direction is noise: shading fades
 // out there.
-RAY_INLINE float3 shade(float3 rgb, float3 gradient, float3 view, float gradient_full) {
-  const float magnitude = sqrt(dot(gradient, gradient));
-  const float strength =
-      gradient_full > 0.0f ? LEAST(magnitude / gradient_full, 1.0f) : (magnitude > 0.0f ? 1.0f : 0.0f);
-  const float facing = magnitude > 0.0f ? LEAST(fabs(dot(gradient, view)) / magnitude, 1.0f) : 1.0f;
-  const float f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
-  const float lit = 0.25f + 0.75f * facing;
-  return rgb * (1.0f + strength * (lit - 1.0f)) + 0.2f * strength * f8 * f8 * f8;
+RAY_INLINE V3 shade(V3 rgb, V3 gradient, V3 view, float gradient_full) {
+  const V magnitude = sqrt(dot3(gradient, gradient));
+  const I known = magnitude > 0.0f;
+  const V none = (V)(0.0f), one = (V)(1.0f);
+  const V strength = gradient_full > 0.0f ? LEAST(magnitude / gradient_full, one) : PICK(known, one, none);
+  const V facing = PICK(known, LEAST(fabs(dot3(gradient, view)) / PICK(known, magnitude, one), one), one);
+  const V f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
+  const V lit = 1.0f + strength * ((0.25f + 0.75f * facing) - 1.0f);
+  const V highlight = 0.2f * strength * f8 * f8 * f8;
+  return v3(rgb.x * lit + highlight, rgb.y * lit + highlight, rgb.z * lit + highlight);
 }
 
-// The camera's ray through the centre of pixel (px, py), clipped. Returns 0 where it misses the box.
-RAY_INLINE int cast_ray(const VdvrRaycast* p, VdvrGrid grid, int px, int py, Ray* ray) {
-  const float across = (2.0f * ((float)px + 0.5f)) / (float)p->width - 1.0f;
-  const float above = 1.0f - (2.0f * ((float)py + 0.5f)) / (float)p->height;
-  const float3 world = (float3)(p->forward_x, p->forward_y, p->forward_z) +
-                       across * (float3)(p->right_x, p->right_y, p->right_z) +
-                       above * (float3)(p->up_x, p->up_y, p->up_z);
-  ray->world = world / sqrt(dot(world, world));
-  const float3 eye = (float3)(p->eye_x, p->eye_y, p->eye_z);
-  float3 d = ray->world * (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
-  ray->direction = d;
+// One axis of a ray and the two faces of the grid across it.
+RAY_INLINE V clip(V direction, float eye, int cells, V* inverse, V* far) {
   // A component of 1e-12 stands for 0 in the divisions: the slab test then decides by the sign alone, without
   // 0/0.
-  const float3 tiny = (float3)(1e-12f);
-  d = select(d, copysign(tiny, d), fabs(d) < tiny);
-  ray->inverse = 1.0f / d;
-  const float3 a = -eye * ray->inverse, b = (grid_cells(grid) - eye) * ray->inverse;
-  const float3 near = LEAST(a, b), far = MOST(a, b);
-  ray->first = MOST(MOST(MOST(near.x, near.y), near.z), 0.0f);
-  ray->length = LEAST(LEAST(far.x, far.y), far.z) - ray->first;
-  ray->entry = clamp_to_grid(eye + ray->first * ray->direction, grid);
-  return ray->length > 0.0f;
+  const V tiny = (V)(1e-12f);
+  const V d = PICK(fabs(direction) < tiny, copysign(tiny, direction), direction);
+  *inverse = 1.0f / d;
+  const V a = -eye * *inverse, b = ((float)cells - eye) * *inverse;
+  *far = MOST(a, b);
+  return LEAST(a, b);
 }
 
-RAY_INLINE float3 position_at(const Ray* ray, VdvrGrid grid, float t) {
-  return clamp_to_grid(ray->entry + t * ray->direction, grid);
+// The camera's rays through the centres of pixels (px, py), clipped. Where length is not above 0 they miss
+// the box.
+RAY_INLINE Ray cast_rays(const VdvrRaycast* p, VdvrGrid grid, I px, I py) {
+  Ray ray;
+  const V across = (2.0f * (TO_V(px) + 0.5f)) / (float)p->width - 1.0f;
+  const V above = 1.0f - (2.0f * (TO_V(py) + 0.5f)) / (float)p->height;
+  const V3 world = v3(p->forward_x + across * p->right_x + above * p->up_x,
+                      p->forward_y + across * p->right_y + above * p->up_y,
+                      p->forward_z + across * p->right_z + above * p->up_z);
+  const V norm = sqrt(dot3(world, world));
+  ray.world = v3(world.x / norm, world.y / norm, world.z / norm);
+  ray.direction = v3(ray.world.x * p->cells_per_length_x, ray.world.y * p->cells_per_length_y,
+                     ray.world.z * p->cells_per_length_z);
+  V3 far;
+  const V near_x = clip(ray.direction.x, p->eye_x, grid.cells_x, &ray.inverse.x, &far.x);
+  const V near_y = clip(ray.direction.y, p->eye_y, grid.cells_y, &ray.inverse.y, &far.y);
+  const V near_z = clip(ray.direction.z, p->eye_z, grid.cells_z, &ray.inverse.z, &far.z);
+  const V near_xy = MOST(near_x, near_y), near = MOST(near_xy, near_z), far_xy = LEAST(far.x, far.y);
+  ray.first = MOST(near, (V)(0.0f));
+  ray.length = LEAST(far_xy, far.z) - ray.first;
+  ray.entry = clamp_to_grid(v3(p->eye_x + ray.first * ray.direction.x, p->eye_y + ray.first * ray.direction.y,
+                               p->eye_z + ray.first * ray.direction.z),
+                            grid);
+  return ray;
 }
 
-// Where the ray leaves the cube of bricks [b - radius, b + radius], a margin before its faces.
-RAY_INLINE float leave_bricks(const Ray* ray, VdvrGrid grid, int3 b, int radius) {
-  const float3 low = convert_float3((b - radius) * grid.granularity) + LEAP_MARGIN;
-  const float3 high = convert_float3((b + radius + 1) * grid.granularity) - LEAP_MARGIN;
-  const float3 t = MOST((low - ray->entry) * ray->inverse, (high - ray->entry) * ray->inverse);
-  return LEAST(LEAST(t.x, t.y), t.z);
+RAY_INLINE V3 position_at(const Ray* ray, VdvrGrid grid, V t) {
+  return clamp_to_grid(v3(ray->entry.x + t * ray->direction.x, ray->entry.y + t * ray->direction.y,
+                          ray->entry.z + t * ray->direction.z),
+                       grid);
 }
 
-// The first sample index whose position at offset (index + shift) * step is not before t, and at least k + 1.
-RAY_INLINE int leap_to(float t, float inverse_step, float shift, int k, int end) {
-  const float next = ceil(t * inverse_step - shift);
+RAY_INLINE V leave_axis(V entry, V inverse, I b, I radius) {
+  const V low = TO_V((b - radius) * VDVR_GRANULARITY) + LEAP_MARGIN;
+  const V high = TO_V((b + radius + 1) * VDVR_GRANULARITY) - LEAP_MARGIN;
+  const V to_low = (low - entry) * inverse, to_high = (high - entry) * inverse;
+  return MOST(to_low, to_high);
+}
+// Where rays leave the cubes of bricks [b - radius, b + radius], a margin before their faces.
+RAY_INLINE V leave_bricks(const Ray* ray, I3 b, I radius) {
+  const V x = leave_axis(ray->entry.x, ray->inverse.x, b.x, radius);
+  const V y = leave_axis(ray->entry.y, ray->inverse.y, b.y, radius);
+  const V z = leave_axis(ray->entry.z, ray->inverse.z, b.z, radius);
+  const V xy = LEAST(x, y);
+  return LEAST(xy, z);
+}
+
+RAY_INLINE float least_lane(V v) {
+  float least = LANE(v, 0);
+#define LOWER(n) least = LEAST(LANE(v, n), least);
+  EACH(LOWER)
+#undef LOWER
+  return least;
+}
+RAY_INLINE int most_lane(I v) {
+  int most = LANE(v, 0);
+#define RAISE(n) most = max(LANE(v, n), most);
+  EACH(RAISE)
+#undef RAISE
+  return most;
+}
+
+// The first sample index whose position at offset (index + shift) * step is not before t in any active lane,
+// and at least k + 1.
+RAY_INLINE int leap_to(V t, I active, float inverse_step, float shift, int k, int end) {
+  const float next = ceil(least_lane(PICK(active, t, (V)(INFINITY))) * inverse_step - shift);
   return next >= (float)end ? end : max(k + 1, (int)next);
 }
 
-RAY_INLINE float4 look_up(__global const float4* restrict table, const VdvrRaycast* p, float value) {
-  const float at = (value - p->table_lo) * p->table_scale, last = (float)(p->table_size - 1);
-  const float x = at > 0.0f ? LEAST(at, last) : 0.0f;
-  const int i = min((int)x, p->table_size - 2);
-  const float f = x - (float)i;
-  return (1.0f - f) * table[i] + f * table[i + 1];
+typedef struct {
+  V3 rgb;
+  V opacity;
+} Emission;
+
+RAY_INLINE Emission look_up(__global const float4* restrict table, const VdvrRaycast* p, V value) {
+  const V at = (value - p->table_lo) * p->table_scale, last = (V)(float)(p->table_size - 1);
+  const V x = at > 0.0f ? LEAST(at, last) : (V)(0.0f);
+  I i = TO_I(x);
+  i = i > p->table_size - 2 ? (I)(p->table_size - 2) : i;
+  const V f = x - TO_V(i);
+  Emission e;
+#define ROW(n)                                                                                     \
+  {                                                                                                \
+    const float4 r = (1.0f - LANE(f, n)) * table[LANE(i, n)] + LANE(f, n) * table[LANE(i, n) + 1]; \
+    LANE(e.rgb.x, n) = r.x;                                                                        \
+    LANE(e.rgb.y, n) = r.y;                                                                        \
+    LANE(e.rgb.z, n) = r.z;                                                                        \
+    LANE(e.opacity, n) = r.w;                                                                      \
+  }
+  EACH(ROW)
+#undef ROW
+  return e;
 }
 
-RAY_INLINE float3 background(const VdvrRaycast* p, int py) {
-  const float f = ((float)py + 0.5f) / (float)p->height;
-  return (1.0f - f) * (float3)(p->background_top[0], p->background_top[1], p->background_top[2]) +
-         f * (float3)(p->background_bottom[0], p->background_bottom[1], p->background_bottom[2]);
+RAY_INLINE V3 background(const VdvrRaycast* p, I py) {
+  const V f = (TO_V(py) + 0.5f) / (float)p->height;
+  return v3((1.0f - f) * p->background_top[0] + f * p->background_bottom[0],
+            (1.0f - f) * p->background_top[1] + f * p->background_bottom[1],
+            (1.0f - f) * p->background_top[2] + f * p->background_bottom[2]);
 }
 
-// Emission and absorption, front to back; opacity in `table` is that of one step.
+// Of a gradient: where density falls, unit length; NaN where there is no gradient.
+RAY_INLINE V3 normal_of(V3 gradient) {
+  const V magnitude = -sqrt(dot3(gradient, gradient));
+  return v3(gradient.x / magnitude, gradient.y / magnitude, gradient.z / magnitude);
+}
+
+// Every lane's pixel, and how many samples its row took.
+RAY_INLINE void put(int width, int height, __global float4* restrict picture,
+                    __global uint* restrict row_samples, I px, I py, V3 rgb, V fourth, I samples) {
+#define PUT(n)                                                                           \
+  if (LANE(px, n) < width && LANE(py, n) < height) {                                     \
+    picture[(ulong)LANE(py, n) * (ulong)width + (ulong)LANE(px, n)] =                    \
+        (float4)(LANE(rgb.x, n), LANE(rgb.y, n), LANE(rgb.z, n), LANE(fourth, n));       \
+    if (LANE(samples, n)) atomic_add(&row_samples[LANE(py, n)], (uint)LANE(samples, n)); \
+  }
+  EACH(PUT)
+#undef PUT
+}
+
+// Samples per ray, and 0 for rays that miss the box or the picture.
+RAY_INLINE I ends_of(const VdvrRaycast* p, const Ray* ray, I px, I py, V samples) {
+  const I hits = (ray->length > 0.0f) & (px < p->width) & (py < p->height);
+  return PICK(hits, TO_I(ceil(samples)), (I)(0));
+}
+
+#define THE_PIXELS                                         \
+  const I px = (int)get_global_id(0) * PACKET_X + COLUMNS; \
+  const I py = (int)get_global_id(1) * PACKET_Y + ROWS;    \
+  if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height) return
+
+// Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
+// that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
-  const int px = (int)get_global_id(0), py = (int)get_global_id(1);
-  if (px >= p.width || py >= p.height) return;
-  grid.granularity = VDVR_GRANULARITY;
+  THE_PIXELS;
   const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-  float3 colour = (float3)(0.0f);
-  float alpha = 0.0f;
-  uint samples = 0;
-  Ray ray;
-  if (cast_ray(&p, grid, px, py, &ray)) {
-    const int end = (int)ceil(ray.length * p.inverse_step - 0.5f);
-    int k = 0;
-    while (k < end && alpha < p.termination) {
-      float3 c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
-      const int3 b = brick_at(grid, c);
-      const int away = p.skip ? distance[brick_index(grid, b.x, b.y, b.z)] : 0;
-      if (away > 0) {
-        k = leap_to(leave_bricks(&ray, grid, b, away - 1), p.inverse_step, 0.5f, k, end);
-        continue;
-      }
-      const OpenBrick brick = open_brick(bricks, grid, b);
-      do {
-        const float4 e = look_up(table, &p, sample_open(THE_FIELD, &brick, grid, c));
-        ++samples;
-        if (e.w > 0.0f) {
-          float3 rgb = e.xyz;
-          const float weight = (1.0f - alpha) * e.w;
-          if (p.shading && weight > SHADED_WEIGHT * p.step)
-            rgb = shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length), ray.world,
-                        p.gradient_full);
-          colour += weight * rgb;
-          alpha += weight;
+  const V none = (V)(0.0f), nothing = (V)(NAN);
+  V3 colour = v3(none, none, none);
+  V alpha = none, depth = nothing;
+  V3 normal = v3(nothing, nothing, nothing);
+  I samples = 0;
+  const Ray ray = cast_rays(&p, grid, px, py);
+  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
+  const int end = most_lane(ends);
+  OpenBrick brick = no_brick();
+  int k = 0;
+  while (k < end) {
+    const I active = (k < ends) & (alpha < p.termination);
+    if (!ANY(active)) break;
+    const float t = ((float)k + 0.5f) * p.step;
+    const V3 c = position_at(&ray, grid, (V)(t));
+    if (ANY(active & NOT(is_inside(&brick, c)))) {
+      const I3 at = brick_at(grid, c);
+      if (p.skip) {
+        const I away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
+        if (!ANY(active & (away == 0))) {
+          k = leap_to(leave_bricks(&ray, at, away - 1), active, p.inverse_step, 0.5f, k, end);
+          continue;
         }
-        ++k;
-        c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
-      } while (k < end && alpha < p.termination && is_inside(&brick, c));
+      }
+      brick = open_brick(bricks, grid, at);
     }
+    const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
+    const Emission e = look_up(table, &p, sampled.value);
+    samples += PICK(active, (I)(1), (I)(0));
+    const V weight = PICK(active, (1.0f - alpha) * e.opacity, none);
+    if (ANY(weight > 0.0f)) {
+#if VDVR_GEOMETRY
+      const I half_way = (alpha < 0.5f) & (alpha + weight >= 0.5f);
+      if (ANY(half_way)) {
+        const V3 g = gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, half_way);
+        normal = pick3(half_way, normal_of(g), normal);
+        depth = PICK(half_way, (ray.first + t) * p.length_unit, depth);
+      }
+#else
+      V3 rgb = e.rgb;
+      const I seen = weight > SHADED_WEIGHT * p.step;
+      if (p.shading && ANY(seen))
+        rgb = pick3(
+            seen,
+            shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, seen),
+                  ray.world, p.gradient_full),
+            rgb);
+      colour = plus(colour, scaled(rgb, weight));
+#endif
+      alpha += weight;
+    }
+    ++k;
   }
-  picture[(ulong)py * (ulong)p.width + (ulong)px] =
-      (float4)(colour + (1.0f - alpha) * background(&p, py), alpha);
-  if (samples) atomic_add(&row_samples[py], samples);
+#if VDVR_GEOMETRY
+  put(p.width, p.height, picture, row_samples, px, py, normal, depth, samples);
+#else
+  put(p.width, p.height, picture, row_samples, px, py, plus(colour, scaled(background(&p, py), 1.0f - alpha)),
+      alpha, samples);
+#endif
 }
 
-// The first crossing of `iso`: an interval test between successive samples t_k = k step (the last at the
-// box's exit), then bisection. Only bricks wholly below iso are leapt over, so the side of a sample that was
-// not taken is known.
+// How many surfaces a value lies on or above.
+RAY_INLINE I side_of(const VdvrRaycast* p, V value) {
+  I side = 0;
+  for (int i = 0; i < p->surfaces; ++i) side += PICK(value >= p->surface[i].value, (I)(1), (I)(0));
+  return side;
+}
+
+// The surface of each lane.
+typedef struct {
+  V3 rgb;
+  V value, opacity;
+} Surfaces;
+RAY_INLINE Surfaces surfaces_at(const VdvrRaycast* p, I number) {
+  Surfaces s;
+#define CHOOSE(n)                                             \
+  {                                                           \
+    const int i = clamp(LANE(number, n), 0, p->surfaces - 1); \
+    LANE(s.rgb.x, n) = p->surface[i].rgb[0];                  \
+    LANE(s.rgb.y, n) = p->surface[i].rgb[1];                  \
+    LANE(s.rgb.z, n) = p->surface[i].rgb[2];                  \
+    LANE(s.value, n) = p->surface[i].value;                   \
+    LANE(s.opacity, n) = p->surface[i].opacity;               \
+  }
+  EACH(CHOOSE)
+#undef CHOOSE
+  return s;
+}
+
+// Crossings of surfaces, front to back: between successive samples t_k = k step (the last at the box's exit)
+// that lie on different sides each surface between them is found by bisection. Only bricks wholly below the
+// lowest surface are leapt over, so the side of a sample that was not taken is known. Geometry: of the first.
 __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
-  const int px = (int)get_global_id(0), py = (int)get_global_id(1);
-  if (px >= p.width || py >= p.height) return;
-  grid.granularity = VDVR_GRANULARITY;
-  uint samples = 0;
-  Ray ray;
-  int hit = 0;
-  float before = 0.0f, behind = 0.0f;
-  int was_inside = 0;
-  if (cast_ray(&p, grid, px, py, &ray)) {
-    const int end = (int)ceil(ray.length * p.inverse_step) + 1;
-    int k = 0;
-    while (k < end && !hit) {
-      float t = LEAST((float)k * p.step, ray.length);
-      float3 c = position_at(&ray, grid, t);
-      const int3 b = brick_at(grid, c);
-      const int away = p.skip && !was_inside ? distance[brick_index(grid, b.x, b.y, b.z)] : 0;
-      if (away > 0) {
-        k = leap_to(leave_bricks(&ray, grid, b, away - 1), p.inverse_step, 0.0f, k, end);
-        continue;
-      }
-      const OpenBrick brick = open_brick(bricks, grid, b);
-      do {
-        const int inside = sample_open(THE_FIELD, &brick, grid, c) >= p.iso;
-        ++samples;
-        if (k > 0 && inside != was_inside) {
-          hit = 1;
-          before = (float)(k - 1) * p.step;
-          behind = t;
-          break;
+  THE_PIXELS;
+  const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
+  const V none = (V)(0.0f), nothing = (V)(NAN);
+  V3 colour = v3(none, none, none), normal = v3(nothing, nothing, nothing);
+  V alpha = none, depth = (V)(-1.0f);
+  I samples = 0, was = 0;
+  const Ray ray = cast_rays(&p, grid, px, py);
+  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step + 1.0f);
+  const int end = most_lane(ends);
+  OpenBrick brick = no_brick();
+  int k = 0;
+  while (k < end) {
+    const I active = (k < ends) & (alpha < p.termination);
+    if (!ANY(active)) break;
+    const V t = LEAST((V)((float)k * p.step), ray.length);
+    const V3 c = position_at(&ray, grid, t);
+    if (ANY(active & NOT(is_inside(&brick, c)))) {
+      const I3 at = brick_at(grid, c);
+      if (p.skip && !ANY(active & (was != 0))) {
+        const I away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
+        if (!ANY(active & (away == 0))) {
+          k = leap_to(leave_bricks(&ray, at, away - 1), active, p.inverse_step, 0.0f, k, end);
+          continue;
         }
-        was_inside = inside;
-        ++k;
-        t = LEAST((float)k * p.step, ray.length);
-        c = position_at(&ray, grid, t);
-      } while (k < end && is_inside(&brick, c));
+      }
+      brick = open_brick(bricks, grid, at);
     }
+    const I side = side_of(&p, sample_open(THE_FIELD, &brick, grid, c).value);
+    samples += PICK(active, (I)(1), (I)(0));
+    was = k == 0 ? side : PICK(active, was, side);
+    while (1) {
+      const I crossing = (was != side) & (alpha < p.termination);
+      if (!ANY(crossing)) break;
+      const I up = side > was;
+      const I number = PICK(up, was, was - 1);
+      Surfaces s = surfaces_at(&p, number);
+      V before = (V)((float)(k - 1) * p.step), behind = t;
+      for (int i = 0; i < BISECTIONS; ++i) {
+        const V middle = 0.5f * (before + behind);
+        const I inside =
+            sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)).value >= s.value;
+        const I is_before = inside != up;
+        before = PICK(is_before, middle, before);
+        behind = PICK(is_before, behind, middle);
+      }
+      const V at = 0.5f * (before + behind);
+      const I first = crossing & (depth < 0.0f);
+      depth = PICK(first, (ray.first + at) * p.length_unit, depth);
+      if (p.shading || VDVR_GEOMETRY) {
+        const V3 hit = position_at(&ray, grid, at);
+        const OpenBrick around = open_brick(bricks, grid, brick_at(grid, hit));
+        const Sampled sampled = sample_open(THE_FIELD, &around, grid, hit);
+        const V3 g = gradient_at(THE_FIELD, bricks, grid, &around, &sampled, hit, cells_per_length, crossing);
+        normal = pick3(first, normal_of(g), normal);
+        s.rgb = shade(s.rgb, g, ray.world, 0.0f);
+      }
+      const V weight = PICK(crossing, (1.0f - alpha) * s.opacity, none);
+      colour = plus(colour, scaled(s.rgb, weight));
+      alpha += weight;
+      was = PICK(crossing, PICK(up, was + 1, was - 1), PICK(was != side, side, was));
+    }
+    ++k;
   }
-  float3 rgb = background(&p, py);
-  float depth = -1.0f;
-  if (hit) {
-    for (int i = 0; i < BISECTIONS; ++i) {
-      const float middle = 0.5f * (before + behind);
-      const int inside = sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)) >= p.iso;
-      if (inside == was_inside) before = middle;
-      else behind = middle;
-    }
-    const float t = 0.5f * (before + behind);
-    const float3 c = position_at(&ray, grid, t);
-    rgb = look_up(table, &p, p.iso).xyz;
-    if (p.shading) {
-      const OpenBrick brick = open_brick(bricks, grid, brick_at(grid, c));
-      const float3 cells_per_length =
-          (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-      rgb = shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, c, cells_per_length), ray.world, 0.0f);
-    }
-    depth = (ray.first + t) * p.length_unit;
-  }
-  picture[(ulong)py * (ulong)p.width + (ulong)px] = (float4)(rgb, depth);
-  if (samples) atomic_add(&row_samples[py], samples);
+#if VDVR_GEOMETRY
+  put(p.width, p.height, picture, row_samples, px, py, normal, depth, samples);
+#else
+  put(p.width, p.height, picture, row_samples, px, py, plus(colour, scaled(background(&p, py), 1.0f - alpha)),
+      depth, samples);
+#endif
 }
 
-// The largest sample along the ray; a brick that cannot raise it is leapt over.
+// The largest sample along the ray; a brick that cannot raise it is leapt over. Geometry: where it lies; no
+// normal.
 __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const float2* restrict ranges,
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
-  const int px = (int)get_global_id(0), py = (int)get_global_id(1);
-  if (px >= p.width || py >= p.height) return;
-  grid.granularity = VDVR_GRANULARITY;
-  float largest = -INFINITY;
-  uint samples = 0;
-  Ray ray;
-  if (cast_ray(&p, grid, px, py, &ray)) {
-    // At least one sample, so that a ray that only grazes the box has a value.
-    const int end = max((int)ceil(ray.length * p.inverse_step - 0.5f), 1);
-    int k = 0;
-    while (k < end) {
-      float3 c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
-      const int3 b = brick_at(grid, c);
-      if (p.skip && ranges[brick_index(grid, b.x, b.y, b.z)].y + p.slack <= largest) {
-        k = leap_to(leave_bricks(&ray, grid, b, 0), p.inverse_step, 0.5f, k, end);
-        continue;
+  THE_PIXELS;
+  const V nothing = (V)(NAN);
+  V largest = (V)(-INFINITY), depth = nothing;
+  I samples = 0;
+  const Ray ray = cast_rays(&p, grid, px, py);
+  // At least one sample, so that a ray that only grazes the box has a value.
+  const I hits = ends_of(&p, &ray, px, py, (V)(1.0f));
+  const I by_length = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
+  const I ends = MOST(hits, by_length);
+  const int end = most_lane(ends);
+  OpenBrick brick = no_brick();
+  __global const float* most = (__global const float*)ranges + 1;
+  int k = 0;
+  while (k < end) {
+    const I active = k < ends;
+    const float t = ((float)k + 0.5f) * p.step;
+    const V3 c = position_at(&ray, grid, (V)(t));
+    if (ANY(active & NOT(is_inside(&brick, c)))) {
+      const I3 at = brick_at(grid, c);
+      if (p.skip) {
+        const V top = GATHER(V, most, 2 * brick_index(grid, at));
+        if (!ANY(active & (top + p.slack > largest))) {
+          k = leap_to(leave_bricks(&ray, at, (I)(0)), active, p.inverse_step, 0.5f, k, end);
+          continue;
+        }
       }
-      const OpenBrick brick = open_brick(bricks, grid, b);
-      do {
-        largest = MOST(largest, sample_open(THE_FIELD, &brick, grid, c));
-        ++samples;
-        ++k;
-        c = position_at(&ray, grid, ((float)k + 0.5f) * p.step);
-      } while (k < end && is_inside(&brick, c));
+      brick = open_brick(bricks, grid, at);
     }
+    const V value = sample_open(THE_FIELD, &brick, grid, c).value;
+    samples += PICK(active, (I)(1), (I)(0));
+    const I raised = active & (value > largest);
+    largest = PICK(raised, value, largest);
+    depth = PICK(raised, (ray.first + t) * p.length_unit, depth);
+    ++k;
   }
-  const float3 rgb = samples ? look_up(table, &p, largest).xyz : background(&p, py);
-  picture[(ulong)py * (ulong)p.width + (ulong)px] = (float4)(rgb, largest);
-  if (samples) atomic_add(&row_samples[py], samples);
+#if VDVR_GEOMETRY
+  put(p.width, p.height, picture, row_samples, px, py, v3(nothing, nothing, nothing), depth, samples);
+#else
+  const V3 rgb = pick3(samples > 0, look_up(table, &p, largest).rgb, background(&p, py));
+  put(p.width, p.height, picture, row_samples, px, py, rgb, largest, samples);
+#endif
 }
 
-// One orthogonal slice, grey; .w is the field itself, 0 outside the grid.
-__kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice s, __global float4* restrict picture) {
-  const int px = (int)get_global_id(0), py = (int)get_global_id(1);
-  if (px >= s.width || py >= s.height) return;
-  grid.granularity = VDVR_GRANULARITY;
-  float c[3] = {s.first[0], s.first[1], s.first[2]};
-  c[s.across] += (float)px * s.step_across;
-  c[s.down] += (float)py * s.step_down;
-  float4 e = (float4)(0.02f, 0.02f, 0.02f, 0.0f);
-  if (c[0] >= 0.0f && c[0] <= (float)grid.cells_x && c[1] >= 0.0f && c[1] <= (float)grid.cells_y &&
-      c[2] >= 0.0f && c[2] <= (float)grid.cells_z) {
-    const float value = sample_anywhere(THE_FIELD, bricks, grid, (float3)(c[0], c[1], c[2]));
-    const float grey = clamp((value - s.window_lo) * s.window_scale, 0.0f, 1.0f);
-    e = (float4)(grey, grey, grey, value);
-  }
-  picture[(ulong)py * (ulong)s.width + (ulong)px] = e;
+// One orthogonal slice, grey; .w is the field itself, NaN outside the grid.
+__kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice p, __global float4* restrict picture,
+                              __global uint* restrict row_samples) {
+  THE_PIXELS;
+  V c[3] = {(V)(p.first[0]), (V)(p.first[1]), (V)(p.first[2])};
+  c[p.across] += TO_V(px) * p.step_across;
+  c[p.down] += TO_V(py) * p.step_down;
+  const V3 point = v3(c[0], c[1], c[2]), nearest = clamp_to_grid(point, grid);
+  const I inside = (point.x == nearest.x) & (point.y == nearest.y) & (point.z == nearest.z);
+  const V value = sample_anywhere(THE_FIELD, bricks, grid, nearest).value, none = (V)(0.0f), one = (V)(1.0f);
+  const V grey = clamp((value - p.window_lo) * p.window_scale, none, one);
+  const V shown = PICK(inside, grey, (V)(0.02f));
+  put(p.width, p.height, picture, row_samples, px, py, v3(shown, shown, shown), PICK(inside, value, (V)(NAN)),
+      (I)(0));
 }

@@ -30,6 +30,7 @@ RenderOptions options_for(const Grid& grid, RenderMode mode, std::int64_t size =
   o.width = o.height = size;
   o.camera = orbit_camera(grid, 37, 21, 1);
   o.transfer = transfer_preset("default", 0, 1);
+  o.surfaces = {{0}};
   return o;
 }
 
@@ -46,7 +47,7 @@ double largest_difference(const std::vector<cl_float4>& a, const std::vector<cl_
   double worst = a.size() == b.size() ? 0.0 : std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < a.size() && i < b.size(); ++i)
     for (std::size_t c = 0; c < components; ++c) {
-      if (a[i].s[c] == b[i].s[c]) continue;  // also two infinities
+      if (a[i].s[c] == b[i].s[c] || (std::isnan(a[i].s[c]) && std::isnan(b[i].s[c]))) continue;
       const double d = std::abs(static_cast<double>(a[i].s[c]) - static_cast<double>(b[i].s[c]));
       if (!(d <= worst)) worst = std::isnan(d) ? std::numeric_limits<double>::infinity() : d;
     }
@@ -157,7 +158,7 @@ BOOST_AUTO_TEST_CASE(skipping_empty_bricks_changes_no_bit) {
         RenderOptions o = options_for(v.grid(), mode);
         o.camera = orbit_camera(v.grid(), azimuth, azimuth / 5, 1.3);
         o.step = step;
-        o.iso = 0.6;
+        o.surfaces = {{0.6}};
         const auto with = raycast_float(device(), v, o);
         o.skip_empty = false;
         const auto without = raycast_float(device(), v, o);
@@ -174,7 +175,7 @@ BOOST_AUTO_TEST_CASE(skipping_changes_no_bit_from_inside_the_volume) {
       o.camera.position = eye;
       o.camera.focal_point = {eye[0] + 1, eye[1], eye[2]};
       o.camera.view_angle_deg = 100;
-      o.iso = 0.6;
+      o.surfaces = {{0.6}};
       const auto with = raycast_float(device(), v, o);
       o.skip_empty = false;
       BOOST_TEST(same_bits(with.pixels, raycast_float(device(), v, o).pixels));
@@ -187,25 +188,29 @@ BOOST_AUTO_TEST_CASE(work_group_shape_changes_no_bit) {
   const ResidentVolume v(device(), mixed_blob());
   for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso}) {
     RenderOptions o = options_for(v.grid(), mode, 37);
-    o.iso = 0.5;
+    o.surfaces = {{0.5}};
     const auto square = raycast_float(device(), v, o, {8, 8, {}});
     BOOST_TEST(same_bits(square.pixels, raycast_float(device(), v, o, {16, 2, {}}).pixels));
   }
 }
 
-BOOST_AUTO_TEST_CASE(wide_gradients_change_no_bit) {
+BOOST_AUTO_TEST_CASE(the_number_of_rays_in_a_packet_changes_no_bit) {
   const auto levels_at_one_end = [](const Index3& b) {
     return b[0] < 2 ? scattered_levels(b) : LevelTriple{0, 0, 0};
   };
   const ResidentVolume mixed(device(), fields::mixed(centred_grid({30, 27, 33}), 4, levels_at_one_end, blob));
   const ResidentVolume scattered(device(), mixed_blob());
-  for (const ResidentVolume* v : {&mixed, &scattered})
-    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso}) {
-      RenderOptions o = options_for(v->grid(), mode);
+  const ResidentVolume uniform(device(), as_mixed(fields::uniform(centred_grid({30, 27, 33}), blob)));
+  for (const ResidentVolume* v : {&mixed, &scattered, &uniform})
+    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice}) {
+      RenderOptions o = options_for(v->grid(), mode, 37);
       o.sampler = SamplerKind::buffer;
-      o.iso = 0.5;
-      const auto wide = raycast_float(device(), *v, o, {8, 8, true});
-      BOOST_TEST(same_bits(wide.pixels, raycast_float(device(), *v, o, {8, 8, false}).pixels));
+      o.surfaces = {{0.5}};
+      const auto one = raycast_float(device(), *v, o, {8, 8, 1});
+      for (const int lanes : {4, 8, 16}) {
+        const auto packets = raycast_float(device(), *v, o, {8, 8, lanes});
+        BOOST_TEST(same_bits(one.pixels, packets.pixels));
+      }
     }
 }
 
@@ -253,12 +258,12 @@ BOOST_AUTO_TEST_CASE(integer_samples_give_the_picture_of_their_decoded_values_to
     const ResidentVolume a(device(), integers), b(device(), floats);
     BOOST_TEST(a.bytes() < b.bytes());
     for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
-      for (const bool wide : {false, true}) {
+      for (const int lanes : {1, 8}) {
         RenderOptions o = options_for(a.grid(), mode);
-        o.iso = 0.5;
+        o.surfaces = {{0.5}};
         o.sampler = SamplerKind::buffer;
-        BOOST_TEST(same_bits(raycast_float(device(), a, o, {8, 8, wide}).pixels,
-                             raycast_float(device(), b, o, {8, 8, wide}).pixels));
+        BOOST_TEST(same_bits(raycast_float(device(), a, o, {8, 8, lanes}).pixels,
+                             raycast_float(device(), b, o, {8, 8, lanes}).pixels));
       }
   }
 }
@@ -270,7 +275,7 @@ BOOST_AUTO_TEST_CASE(refined_bricks_of_a_linear_field_leave_no_seam) {
   const ResidentVolume mixed(device(), fields::mixed(grid, 4, scattered_levels, linear));
   for (const RenderMode mode : {RenderMode::dvr, RenderMode::mip, RenderMode::slice, RenderMode::iso}) {
     RenderOptions o = options_for(grid, mode);
-    o.iso = 0.55;
+    o.surfaces = {{0.55}};
     const auto a = raycast_float(device(), uniform, o), b = raycast_float(device(), mixed, o);
     // Values agree to 14 u each; a transfer function of slope 6 and a gradient over one cell (slope 0.01, so
     // an angle of 28 u / 0.01) with shading of slope 5 in the angle make of it what is allowed; alpha
@@ -291,7 +296,7 @@ BOOST_AUTO_TEST_CASE(sphere_is_hit_where_geometry_says) {
                            return -std::sqrt(x * x + y * y + z * z);
                          })));
   RenderOptions o = options_for(grid, RenderMode::iso, 41);
-  o.iso = -radius;
+  o.surfaces = {{-radius}};
   const auto picture = raycast_float(device(), v, o);
   const double surface = 2.0 / 8 / (radius - 1);
   int hits = 0;
@@ -324,7 +329,7 @@ BOOST_AUTO_TEST_CASE(iso_surface_facing_the_eye_is_brighter_than_its_rim) {
                            return -std::sqrt(x * x + y * y + z * z);
                          })));
   RenderOptions o = options_for(grid, RenderMode::iso, 41);
-  o.iso = -15;
+  o.surfaces = {{-15}};
   const auto p = raycast_float(device(), v, o).pixels;
   std::size_t first = 41 * 20;
   while (p[first].s[3] < 0) ++first;

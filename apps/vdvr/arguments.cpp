@@ -191,7 +191,7 @@ std::int64_t Arguments::integer_or(const std::string& name, std::int64_t fallbac
 std::optional<std::vector<double>> Arguments::numbers(const std::string& name, std::size_t count) const {
   if (!has(name)) return std::nullopt;
   const auto parts = split(text(name), ',');
-  if (parts.size() != count)
+  if (count != 0 && parts.size() != count)
     throw InputError(
         fmt::format("{}: '{}' is not {} numbers separated by commas", option(name), text(name), count));
   std::vector<double> result;

@@ -49,6 +49,7 @@ class Arguments {
   [[nodiscard]] std::int64_t integer_or(const std::string& name, std::int64_t fallback, std::int64_t lowest,
                                         std::int64_t highest) const;
   /// `count` numbers separated by commas.
+  /// Numbers separated by commas; a count of 0 takes any.
   [[nodiscard]] std::optional<std::vector<double>> numbers(const std::string& name, std::size_t count) const;
   [[nodiscard]] std::optional<Vec3> vec3(const std::string& name) const;
   /// `count` positive integers separated by 'x'.

@@ -1,6 +1,9 @@
 // vdvr render: a picture, the values behind it, or a turntable.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
@@ -14,6 +17,7 @@ namespace vdvr::cli {
 namespace {
 
 const std::vector<std::string> kMethods{"vdvr", "dvr", "d2vr"}, kSupportedMethods{"vdvr", "dvr"};
+const std::vector<std::string> kOutputs{"colour", "depth", "normal"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
 // Twenty pictures a second: a turn of 60 takes three.
@@ -29,7 +33,12 @@ void add_options(Arguments& args) {
   args.value("mode", "dvr|iso|mip|slice|error", "default dvr; error: |V - F| on a slice, needs --projections")
       .value("size", "512x512", "pixels");
   add_transfer(args);
-  args.value("iso", "V", "density of the iso-surface (default: between background and object)")
+  args.value("iso", "V[,V...]",
+             "densities of up to 8 iso-surfaces (default: one between background and object)")
+      .value("iso-opacity", "O[,O...]", "of each (default 1; of several the densest 1, others 0.3)")
+      .value("show", "colour|depth|normal",
+             "what a pixel says: its colour, how far what is seen lies from the eye, or which way it faces")
+      .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
       .value("step", "S", "in base cells (default 1)")
@@ -66,6 +75,38 @@ OutputKind output_kind(const std::filesystem::path& output, bool turntable) {
                                output.string()));
 }
 
+void set_background(const Arguments& args, RenderOptions& o) {
+  const auto given = args.numbers("background", 0);
+  if (!given) return;
+  if (given->size() != 3 && given->size() != 6)
+    throw InputError("--background: give three numbers, or six for the top and the bottom");
+  for (std::size_t c = 0; c < 3; ++c) {
+    o.background_top[c] = (*given)[c];
+    o.background_bottom[c] = (*given)[given->size() - 3 + c];
+  }
+  for (const double x : *given)
+    if (!(x >= 0 && x <= 1)) throw InputError(fmt::format("--background: {} is not within 0 and 1", x));
+}
+
+/// Flesh to bone, from the lightest surface to the densest; the last for one alone.
+std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
+  const std::vector<double> values = args.numbers("iso", 0).value_or(std::vector<double>{threshold});
+  const auto opacities = args.numbers("iso-opacity", args.has("iso-opacity") ? values.size() : 0);
+  constexpr std::array<std::array<double, 3>, 4> kVeils{
+      {{0.55, 0.72, 0.90}, {0.90, 0.62, 0.50}, {0.60, 0.82, 0.58}, {0.86, 0.62, 0.86}}};
+  std::vector<IsoSurface> surfaces;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    // How many are lighter gives the place in the row of colours.
+    const auto place = static_cast<std::size_t>(
+        std::count_if(values.begin(), values.end(), [&](double v) { return v < values[i]; }));
+    const bool densest = values[i] == *std::max_element(values.begin(), values.end());
+    IsoSurface s{values[i], opacities ? (*opacities)[i] : (densest ? 1 : 0.3)};
+    if (!densest) s.rgb = kVeils[place % kVeils.size()];
+    surfaces.push_back(s);
+  }
+  return surfaces;
+}
+
 /// Everything that the words alone decide; what depends on the volume is filled in by `complete`.
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
@@ -82,6 +123,11 @@ RenderOptions render_options(const Arguments& args) {
   }
   o.step = args.positive_or("step", o.step);
   o.shading = !args.has("no-shading");
+  const std::string output = args.choice("show", kOutputs, "colour");
+  o.output = output == "depth"    ? RenderOutput::depth
+             : output == "normal" ? RenderOutput::normal
+                                  : RenderOutput::colour;
+  set_background(args, o);
   const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
   o.slice_axis = axis[0] - 'x';
   o.slice_position = args.number("slice-position");
@@ -99,12 +145,18 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
-    refuse(args, {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading"},
+    refuse(args,
+           {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading",
+            "show", "background"},
            "does not apply to a slice");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
   if (o.mode == RenderMode::mip)
     refuse(args, {"no-shading"}, "does not apply to --mode mip, which has no light");
-  if (o.mode != RenderMode::iso) refuse(args, {"iso"}, "applies to --mode iso");
+  if (o.mode != RenderMode::iso) refuse(args, {"iso", "iso-opacity"}, "applies to --mode iso");
+  if (o.output != RenderOutput::colour)
+    refuse(args, {"axes", "box", "colorbar", "background", "no-shading"}, "applies to --show colour");
+  if (o.output == RenderOutput::normal && o.mode == RenderMode::mip)
+    throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode == RenderMode::iso) refuse(args, {"tf", "tf-range"}, "does not apply to --mode iso");
   if (o.mode != RenderMode::error) refuse(args, {"projections"}, "applies to --mode error");
   if (o.mode == RenderMode::error) {
@@ -236,17 +288,9 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
     write_png(output, result.image);
     return result;
   }
-  FloatImage values;
-  RenderResult result;
-  if (o.mode == RenderMode::slice) {
-    values = slice_values(stage.scene.volume, o);
-    result.sampler = SamplerKind::buffer;
-    result.sampler_reason = "values of a slice are sampled on the host";
-  } else {
-    result = raycast_with_values(stage.device, stage.resident, o, values);
-  }
+  RenderResult result = raycast(stage.device, stage.resident, o);
   throw_if_interrupted();
-  write_npy(output, values);
+  write_npy(output, result.values);
   return result;
 }
 
@@ -275,7 +319,7 @@ int render_command(Arguments& args) {
 
   const Scene scene = open_scene(path, args, args.text_or("method", "vdvr"), args.has("unverified"));
   const Brightness bright = brightness_of(scene.volume);
-  o.iso = args.number_or("iso", bright.threshold);
+  o.surfaces = surfaces_for(args, bright.threshold);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.sampler = safe_sampler(o.sampler, scene.certificate);

@@ -53,7 +53,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
   o.transfer = two_material_transfer(bright);
-  o.iso = bright.threshold;
+  o.surfaces = {{bright.threshold}};
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
@@ -72,7 +72,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     o.mode = RenderMode::dvr;
     draw("dvr.png", "direct volume rendering");
     o.mode = RenderMode::iso;
-    draw("iso.png", fmt::format("iso-surface at {:.4g}", o.iso));
+    draw("iso.png", fmt::format("iso-surface at {:.4g}", bright.threshold));
   }
   o.mode = RenderMode::slice;
   for (int axis = thin ? 2 : 0; axis < 3; ++axis) {

@@ -13,16 +13,18 @@ struct Image {
   std::vector<std::uint8_t> rgb;
 };
 
-/// float values[y][x], row 0 on top; NaN where there is nothing to say.
+/// float values[y][x][channels], row 0 on top; NaN where there is nothing to say.
 struct FloatImage {
   std::int64_t width = 0, height = 0;
   std::vector<float> values;
+  std::int64_t channels = 1;
 };
 
 /// Each is written whole or not at all. Throws InputError (size), ResourceError (disk) or FileError (folder
 /// missing, not writable).
 void write_png(const std::filesystem::path& path, const Image& image);
-/// NumPy's format 1.0: float32, little-endian, shape (height, width), C order.
+/// NumPy's format 1.0: float32, little-endian, shape (height, width) or, of several channels,
+/// (height, width, channels), C order.
 void write_npy(const std::filesystem::path& path, const FloatImage& image);
 /// Frames of one size, shown `frame_ms` each, for ever. APNG is lossless; a viewer without it shows frame 0.
 void write_apng(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);

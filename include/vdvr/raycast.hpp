@@ -62,16 +62,27 @@ Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optiona
                double view_angle_deg);
 
 enum class RenderMode { dvr, iso, mip, slice, error };
+/// What a picture shows of modes dvr and iso (depth also of mip): colours, or where and how what is seen
+/// stands.
+enum class RenderOutput { colour, depth, normal };
+
+/// An iso-surface; several may be translucent. At most 8 a picture.
+struct IsoSurface {
+  double value = 0, opacity = 1;
+  std::array<double, 3> rgb{0.93, 0.86, 0.74};
+};
+
 enum class SamplerKind { automatic, image3d, buffer };
 
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
+  RenderOutput output = RenderOutput::colour;
   std::int64_t width = 512, height = 512;
   Camera camera;
   TransferFunction transfer;
-  double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it
-  double iso = 0;
-  int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
+  double step = 1;                   ///< base cells (of the smallest spacing); opacities are corrected for it
+  std::vector<IsoSurface> surfaces;  ///< of mode iso, in any order
+  int slice_axis = 2;                ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;                  ///< world; default the middle
   std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
   bool shading = true;
@@ -84,6 +95,11 @@ struct RenderOptions {
 
 struct RenderResult {
   Image image;
+  /// What lies behind the pixels, NaN where nothing does. Colour: of dvr the opacity; of iso the distance
+  /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field.
+  /// Depth: that distance of iso, of dvr to the sample that brings the opacity to a half, of mip to the
+  /// maximum. Normal: three channels, x, y, z of the unit vector towards lower density there.
+  FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
   std::int64_t samples = 0;    ///< taken along rays
@@ -117,20 +133,12 @@ class ResidentVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One picture. Colours are display values (sRGB), composited as such. Cost: 16 bytes per pixel on the device
-/// and on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x.
-/// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
-/// Mode `error` throws InputError: error slices need the projections (`run`, `render --projections`).
+/// One picture and its values. Colours are display values (sRGB), composited as such. A depth is shown bright
+/// where near; a normal's components as colours, 0 as middle grey. Cost: 16 bytes per pixel on the device and
+/// on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws
+/// InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had. Mode
+/// `error` throws InputError: error slices need the projections (`run`, `render --projections`).
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
-
-/// The same picture, and in `values` what lies behind its pixels: dvr, the opacity; iso, the distance from
-/// the eye along the ray in world units, NaN where nothing is hit; mip, the maximum, NaN where the box is
-/// missed; slice, the field, 0 outside the grid.
-RenderResult raycast_with_values(Device& device, const ResidentVolume& volume, const RenderOptions& options,
-                                 FloatImage& values);
-/// The field at the pixel centres of the slice picture, by sample_at on the host; NaN outside the grid.
-/// Throws InputError.
-FloatImage slice_values(const MixedVolume& volume, const RenderOptions& options);
 
 /// What the device's filter of one image format does to weights and constants (docs/error-bounds.md, section
 /// on samplers).

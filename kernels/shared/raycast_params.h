@@ -4,7 +4,14 @@
 #ifndef VDVR_RAYCAST_PARAMS_H
 #define VDVR_RAYCAST_PARAMS_H
 
-// Scalars only: no alignment that two compilers could read differently. 160 bytes.
+#define VDVR_SURFACES 8
+
+// An iso-surface; `opacity` of the surface itself.
+typedef struct {
+  float value, opacity, rgb[3];
+} VdvrSurface;
+
+// Scalars only: no alignment that two compilers could read differently. 300 bytes.
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
@@ -16,7 +23,6 @@ typedef struct {
   float length_unit;         // world units per length
   float table_lo, table_scale;
   int table_size;
-  float iso;
   float termination;
   float gradient_full;  // gradient, density per length, from which on a sample is fully shaded
   float slack;          // rounding allowance of the sampler on a brick's range
@@ -24,7 +30,8 @@ typedef struct {
   int width, height;
   int shading;
   int skip;
-  int pad[5];
+  int surfaces;  // in order of their values
+  VdvrSurface surface[VDVR_SURFACES];
 } VdvrRaycast;
 
 // A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis

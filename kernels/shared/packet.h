@@ -1,0 +1,90 @@
+// A packet: VDVR_LANES rays that one work-item follows side by side. 1 suits devices whose work-items are
+// lanes themselves (GPUs), 8 or 16 those whose work-items are threads (CPUs). Every lane does the same
+// operations in the same order, whatever the others do, so that the number of lanes never changes a bit.
+// Included by raycast.cl.
+//
+// A mask is what comparisons give: 0 or 1 in scalars, 0 or -1 in vectors. Combine masks by & and |, ask them
+// by ANY, ALL, NOT and PICK.
+#ifndef VDVR_PACKET_H
+#define VDVR_PACKET_H
+
+// Tuning: rays of one packet.
+#ifndef VDVR_LANES
+#define VDVR_LANES 1
+#endif
+
+// LANE(v, n): component n of a vector. EACH(F): the statements F(n) of every lane. GATHER(T, p, i): elements
+// i of the array p. COLUMNS, ROWS: where the lanes' pixels lie in the packet's PACKET_X x PACKET_Y.
+#if VDVR_LANES == 1
+#define PACKET(NAME) NAME
+#define LANE(v, n) (v)
+#define EACH(F) F(0)
+#define GATHER(T, p, i) ((p)[i])
+#define PACKET_X 1
+#define PACKET_Y 1
+#define COLUMNS 0
+#define ROWS 0
+#define ANY(m) (m)
+#define NOT(m) (!(m))
+#else
+#define LANE(v, n) (v).s##n
+#define ANY(m) any(m)
+#define NOT(m) (~(m))
+#if VDVR_LANES == 4
+#define PACKET(NAME) NAME##4
+#define EACH(F) F(0) F(1) F(2) F(3)
+#define GATHER(T, p, i) ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3]))
+#define PACKET_X 2
+#define PACKET_Y 2
+#define COLUMNS (int4)(0, 1, 0, 1)
+#define ROWS (int4)(0, 0, 1, 1)
+#elif VDVR_LANES == 8
+#define PACKET(NAME) NAME##8
+#define EACH(F) F(0) F(1) F(2) F(3) F(4) F(5) F(6) F(7)
+#define GATHER(T, p, i)                                                                           \
+  ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], \
+       (p)[(i).s7]))
+#define PACKET_X 4
+#define PACKET_Y 2
+#define COLUMNS (int8)(0, 1, 2, 3, 0, 1, 2, 3)
+#define ROWS (int8)(0, 0, 0, 0, 1, 1, 1, 1)
+#elif VDVR_LANES == 16
+#define PACKET(NAME) NAME##16
+#define EACH(F) F(0) F(1) F(2) F(3) F(4) F(5) F(6) F(7) F(8) F(9) F(a) F(b) F(c) F(d) F(e) F(f)
+#define GATHER(T, p, i)                                                                           \
+  ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], \
+       (p)[(i).s7], (p)[(i).s8], (p)[(i).s9], (p)[(i).sa], (p)[(i).sb], (p)[(i).sc], (p)[(i).sd], \
+       (p)[(i).se], (p)[(i).sf]))
+#define PACKET_X 4
+#define PACKET_Y 4
+#define COLUMNS (int16)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3)
+#define ROWS (int16)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3)
+#else
+#error "VDVR_LANES must be 1, 4, 8 or 16"
+#endif
+#endif
+#define TO_V(x) PACKET(convert_float)(x)
+#define TO_I(x) PACKET(convert_int)(x)
+
+typedef PACKET(float) V;
+typedef PACKET(int) I;
+typedef PACKET(uint) U;
+typedef PACKET(ushort) U16;
+typedef PACKET(uchar) U8;
+
+#define ALL(m) (!ANY(NOT(m)))
+// m ? a : b, lane by lane.
+#define PICK(m, a, b) select((b), (a), (m))
+// Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
+#define LEAST(a, b) ((a) < (b) ? (a) : (b))
+#define MOST(a, b) ((a) > (b) ? (a) : (b))
+
+// Three coordinates of every lane.
+typedef struct {
+  V x, y, z;
+} V3;
+typedef struct {
+  I x, y, z;
+} I3;
+
+#endif
