@@ -193,11 +193,7 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
     words.insert(words.end(), more.begin(), more.end());
     check_refused(words, more[0]);
   };
-  build({"--coefficients", "midrange"});
   build({"--levels", "anisotropic"});
-  build({"--terms", "grid"});
-  build({"--epsilon-of", "max"});
-  build({"--paper"});
   check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
 }
