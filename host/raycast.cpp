@@ -356,8 +356,12 @@ void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
   if (f.row_samples.size() != rows) f.row_samples = DeviceArray<cl_uint>(*v.state, rows, "samples per row");
   f.row_samples.fill(0);
   if (table.entries.empty()) return;
-  if (f.table.size() == 0) f.table = DeviceArray<cl_float4>(*v.state, kTableSize, "transfer function");
-  f.table.write(table.entries);
+  // Once more the opacities alone, four a row.
+  std::vector<cl_float4> entries = table.entries;
+  entries.resize(kTableSize + kTableSize / 4);
+  for (std::size_t i = 0; i < kTableSize; ++i) entries[kTableSize + i / 4].s[i % 4] = table.entries[i].s[3];
+  if (f.table.size() == 0) f.table = DeviceArray<cl_float4>(*v.state, entries.size(), "transfer function");
+  f.table.write(entries);
 }
 
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.

@@ -6,8 +6,9 @@
 // rays of a packet share k; each counts from its own entry. So neither skipping nor packets change a bit.
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one worth sampling, at most 255),
-// ranges[bz][by][bx], table[table_size] (rgb, opacity of one step), picture[y][x] (r, g, b, alpha | depth |
-// maximum; with VDVR_GEOMETRY normal, depth). Called by: raycast() in host/raycast.cpp.
+// ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities alone), picture[y][x]
+// (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth). Called by: raycast() in
+// host/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
@@ -163,29 +164,49 @@ RAY_INLINE int leap_to(V t, I active, float inverse_step, float shift, int k, in
   return next >= (float)end ? end : max(k + 1, (int)next);
 }
 
+// Where values lie in the table: the entry below and the fraction above it.
 typedef struct {
-  V3 rgb;
-  V opacity;
-} Emission;
-
-RAY_INLINE Emission look_up(__global const float4* restrict table, const VdvrRaycast* p, V value) {
-  const V at = (value - p->table_lo) * p->table_scale, last = (V)(float)(p->table_size - 1);
+  I entry;
+  V fraction;
+} Row;
+RAY_INLINE Row row_of(const VdvrRaycast* p, V value) {
+  const V at = (value - p->table_lo) * p->table_scale, last = (V)((float)(p->table_size - 1));
   const V x = at > 0.0f ? LEAST(at, last) : (V)(0.0f);
-  I i = TO_I(x);
-  i = i > p->table_size - 2 ? (I)(p->table_size - 2) : i;
-  const V f = x - TO_V(i);
-  Emission e;
-#define ROW(n)                                                                                     \
-  {                                                                                                \
-    const float4 r = (1.0f - LANE(f, n)) * table[LANE(i, n)] + LANE(f, n) * table[LANE(i, n) + 1]; \
-    LANE(e.rgb.x, n) = r.x;                                                                        \
-    LANE(e.rgb.y, n) = r.y;                                                                        \
-    LANE(e.rgb.z, n) = r.z;                                                                        \
-    LANE(e.opacity, n) = r.w;                                                                      \
+  Row r;
+  r.entry = TO_I(x);
+  r.entry = r.entry > p->table_size - 2 ? (I)(p->table_size - 2) : r.entry;
+  r.fraction = x - TO_V(r.entry);
+  return r;
+}
+
+// Opacities stand behind the table once more, alone: most samples need no colour.
+RAY_INLINE V opacity_of(__global const float4* restrict table, const VdvrRaycast* p, Row r) {
+  __global const float* opacity = (__global const float*)(table + p->table_size);
+  V a, b;
+#define TWO(n)                                              \
+  {                                                         \
+    const float2 q = vload2(0, opacity + LANE(r.entry, n)); \
+    LANE(a, n) = q.x;                                       \
+    LANE(b, n) = q.y;                                       \
+  }
+  EACH(TWO)
+#undef TWO
+  return (1.0f - r.fraction) * a + r.fraction * b;
+}
+
+RAY_INLINE V3 colour_of(__global const float4* restrict table, Row r) {
+  V3 rgb;
+#define ROW(n)                                                                               \
+  {                                                                                          \
+    const float f = LANE(r.fraction, n);                                                     \
+    const float4 e = (1.0f - f) * table[LANE(r.entry, n)] + f * table[LANE(r.entry, n) + 1]; \
+    LANE(rgb.x, n) = e.x;                                                                    \
+    LANE(rgb.y, n) = e.y;                                                                    \
+    LANE(rgb.z, n) = e.z;                                                                    \
   }
   EACH(ROW)
 #undef ROW
-  return e;
+  return rgb;
 }
 
 RAY_INLINE V3 background(const VdvrRaycast* p, I py) {
@@ -259,9 +280,9 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
       brick = open_brick(bricks, grid, at);
     }
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
-    const Emission e = look_up(table, &p, sampled.value);
+    const Row row = row_of(&p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
-    const V weight = PICK(active, (1.0f - alpha) * e.opacity, none);
+    const V weight = PICK(active, (1.0f - alpha) * opacity_of(table, &p, row), none);
     if (ANY(weight > 0.0f)) {
 #if VDVR_GEOMETRY
       const I half_way = (alpha < 0.5f) & (alpha + weight >= 0.5f);
@@ -271,7 +292,7 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
         depth = PICK(half_way, (ray.first + t) * p.length_unit, depth);
       }
 #else
-      V3 rgb = e.rgb;
+      V3 rgb = colour_of(table, row);
       const I seen = weight > SHADED_WEIGHT * p.step;
       if (p.shading && ANY(seen))
         rgb = pick3(
@@ -441,7 +462,7 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
 #if VDVR_GEOMETRY
   put(p.width, p.height, picture, row_samples, px, py, v3(nothing, nothing, nothing), depth, samples);
 #else
-  const V3 rgb = pick3(samples > 0, look_up(table, &p, largest).rgb, background(&p, py));
+  const V3 rgb = pick3(samples > 0, colour_of(table, row_of(&p, largest)), background(&p, py));
   put(p.width, p.height, picture, row_samples, px, py, rgb, largest, samples);
 #endif
 }

@@ -228,6 +228,12 @@ BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
   render("x.png", {"--mode", "iso", "--colorbar"}, "--colorbar");
   render("x.png", {"--mode", "iso", "--tf", "bone"}, "--tf");
   render("x.png", {"--mode", "mip", "--no-shading"}, "--no-shading");
+  render("x.png", {"--mode", "mip", "--show", "normal"}, "--show");
+  render("x.png", {"--mode", "slice", "--show", "depth"}, "--show");
+  render("x.png", {"--mode", "iso", "--show", "depth", "--box"}, "--box");
+  render("x.png", {"--iso-opacity", "0.5"}, "--iso-opacity");
+  render("x.png", {"--background", "1,2,3"}, "--background");
+  render("x.png", {"--background", "0.5,0.5"}, "--background");
 }
 
 BOOST_AUTO_TEST_CASE(presets_are_listed_without_a_volume) {

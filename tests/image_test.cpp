@@ -88,6 +88,8 @@ BOOST_AUTO_TEST_CASE(npy_is_numpy_format_1_0_in_little_endian_floats) {
   BOOST_REQUIRE(bytes.size() == 10 + length + 24);
   // -2.5 is 0xC0200000.
   BOOST_TEST(bytes.substr(10 + length + 8, 4) == std::string("\x00\x00\x20\xC0", 4));
+  write_npy(folder / "n.npy", {1, 2, {1, 2, 3, 4, 5, 6}, 3});
+  BOOST_TEST(support::bytes_of(folder / "n.npy").find("'shape': (2, 1, 3), }") != std::string::npos);
   BOOST_CHECK_THROW(write_npy(folder / "w.npy", {3, 2, {0}}), InputError);
   BOOST_TEST(!std::filesystem::exists(folder / "w.npy"));
 }

@@ -28,7 +28,7 @@
 #define NOT(m) (!(m))
 #else
 #define LANE(v, n) (v).s##n
-#define ANY(m) any(m)
+#define ANY(m) any_lane(m)
 #define NOT(m) (~(m))
 #if VDVR_LANES == 4
 #define PACKET(NAME) NAME##4
@@ -72,7 +72,24 @@ typedef PACKET(uint) U;
 typedef PACKET(ushort) U16;
 typedef PACKET(uchar) U8;
 
-#define ALL(m) (!ANY(NOT(m)))
+// Without a branch per lane, which the any() of some compilers has.
+#if VDVR_LANES > 1
+RAY_INLINE int any_lane4(int4 m) {
+  const ulong2 halves = as_ulong2(m);
+  return (halves.x | halves.y) != 0;
+}
+#if VDVR_LANES == 4
+#define any_lane(m) any_lane4(m)
+#elif VDVR_LANES == 8
+#define any_lane(m) any_lane8(m)
+RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
+#else
+#define any_lane(m) any_lane16(m)
+RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
+RAY_INLINE int any_lane16(int16 m) { return any_lane8(m.lo | m.hi); }
+#endif
+#endif
+
 // m ? a : b, lane by lane.
 #define PICK(m, a, b) select((b), (a), (m))
 // Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
