@@ -55,9 +55,9 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   if (settings.midrange)
     fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
   halo_ = fit_halo_;
-  // About 24 x 24 x 32 base cells at once: large enough that halos are cheap, small enough for caches and
+  // About 16 x 16 x 32 base cells at once: large enough that halos are cheap, small enough for caches and
   // --max-memory.
-  block_bricks_ = std::max<std::int64_t>(1, 192 / (g * settings.rate));
+  block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
   slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
   while (slab_bricks_ > 1 &&
          slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() / 2, state.info.max_allocation))

@@ -339,9 +339,12 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
   const ProjectionSet scan = simulated(shepp_logan(8), 17, 13, 24);
   const Grid grid = grid_of(scan, {17, 17, 12}, 1.0);
   Device device("", 20 << 20);
-  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.2, {}});
+  PlanSettings sampled;
+  sampled.coefficients = "sampled";
+  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.15, {}}, sampled);
   BuildOptions options;
   options.granularity = 2;
+  options.storage = StorageChoice::f32;
   const BuildResult whole = build(device, scan, plan, options);
   const support::TemporaryFolder folder;
   int reports = 0;
