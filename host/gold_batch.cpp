@@ -265,4 +265,16 @@ void GoldStream::Batch::fit_base(std::vector<float>& base) {
   }
 }
 
+float GoldStream::Batch::largest_value() const {
+  const std::vector<float> gold = gold_.to_host(), margins = margin_.to_host();
+  const std::int64_t h = shape_.halo, wide = shape_.nx + 2 * h, deep = shape_.ny + 2 * h;
+  float largest = 0;
+  for (std::int64_t column = 0; column < shape_.count * wide * deep; ++column) {
+    if (!(margins[at(column)] >= 0)) continue;
+    for (std::int64_t z = std::max(-h, shape_.z_first); z <= std::min(shape_.nz - 1 + h, shape_.z_last); ++z)
+      largest = std::max(largest, std::fabs(gold[at(column * shape_.gold_stride + z + h)]));
+  }
+  return largest;
+}
+
 }  // namespace vdvr

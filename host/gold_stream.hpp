@@ -169,6 +169,9 @@ class GoldStream::Batch {
   /// kept.
   void fit_base(std::vector<float>& base);
 
+  /// The largest |gold| at a covered node of the blocks.
+  float largest_value() const;
+
   /// Per brick of bricks(): the largest and the smallest P of its base cells.
   std::vector<std::pair<float, float>> largest_p();
 

@@ -250,6 +250,20 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
         "--epsilon-abs");
 }
 
+// The largest |F| that gold shows, between base samples too: what the paper takes its thresholds of. Cost: a
+// pass of gold.
+double largest_of_gold(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
+                       const FieldSups& sups, const Grid& grid, const Rates& r) {
+  GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.u_filter};
+  settings.base_only = true;
+  GoldStream stream(state, filtered, upsampler, sups, settings);
+  float largest = 0;
+  stream.run(
+      stream.bricks_near_coverage(),
+      [&](GoldStream::Batch& batch) { largest = std::max(largest, batch.largest_value()); }, {}, "maximum");
+  return static_cast<double>(largest);
+}
+
 }  // namespace
 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
@@ -292,18 +306,17 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     high = static_cast<double>(*highest);
   }
   plan.reference_range = high - low;
-  set_epsilon(plan, tolerance, std::max(std::fabs(low), std::fabs(high)));
+  const FieldSups sups = field_sups(state, upsampler, filtered);
+  const auto all = candidates(rates);
+  set_epsilon(plan, tolerance,
+              tolerance.of_max ? largest_of_gold(state, filtered, upsampler, sups, grid, all.front()) : 0);
   report(progress, "plan", 0.3);
 
-  start = now();
-  const FieldSups sups = field_sups(state, upsampler, filtered);
-  preparation += since(start);
   plan.bounds = global_bounds(state, filtered, sups, plan.base);
   report(progress, "plan", 0.6);
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
   // all.
-  const auto all = candidates(rates);
   const bool grid_only = settings.terms == "grid";
   const auto stream_at = [&](const Rates& r) {
     GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
