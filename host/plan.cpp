@@ -76,7 +76,7 @@ void check_rates(const RateOptions& rates) {
 
 // Global bounds at every rate, the paper's beside ours.
 std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                                 const Volume& base) {
+                                 const Volume& base, bool with_paper) {
   const Grid& grid = base.grid;
   std::vector<Bound> out;
   const ParallelGeometry& g = scan.geometry;
@@ -93,13 +93,13 @@ std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan,
   const auto append = [&](const std::vector<Bound>& more) {
     out.insert(out.end(), more.begin(), more.end());
   };
-  if (10 * static_cast<double>(g.views() * g.rows * g.columns) *
-          static_cast<double>(std::max(g.rows, g.columns)) <
-      4e10)
+  if (with_paper && 10 * static_cast<double>(g.views() * g.rows * g.columns) *
+                            static_cast<double>(std::max(g.rows, g.columns)) <
+                        4e10)
     append(paper_projection_bounds(state, scan, bound_rates));
-  if (18 * static_cast<double>(grid.sample_count()) *
-          static_cast<double>(*std::max_element(grid.cells.begin(), grid.cells.end())) <
-      2e10)
+  if (with_paper && 18 * static_cast<double>(grid.sample_count()) *
+                            static_cast<double>(*std::max_element(grid.cells.begin(), grid.cells.end())) <
+                        2e10)
     append(paper_gold_bounds(state, base, bound_rates));
   for (const int rate : bound_rates) {
     const double du = g.pitch_u / rate, h = std::max(grid.spacing[0], grid.spacing[1]) / rate,
@@ -312,7 +312,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
               tolerance.of_max ? largest_of_gold(state, filtered, upsampler, sups, grid, all.front()) : 0);
   report(progress, "plan", 0.3);
 
-  plan.bounds = global_bounds(state, filtered, sups, plan.base);
+  plan.bounds = global_bounds(state, filtered, sups, plan.base, settings.foresee);
   report(progress, "plan", 0.6);
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
