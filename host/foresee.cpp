@@ -85,7 +85,7 @@ void classify(opencl::State& state, GoldStream& stream, const DeviceField& field
       {}, "foresee", GoldStream::For::samples);
 }
 
-// Whole blocks of the middle slab, from the axis outwards.
+// Whole blocks of the middle slab, at several radii.
 std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n) {
   std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
   const Index3 block = stream.block_bricks();
@@ -94,7 +94,8 @@ std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n)
   };
   const std::int64_t z0 = begin(2, 0.5);
   for (std::int64_t i = 0; i < timed_blocks; ++i) {
-    const double f = 0.5 - 0.15 * static_cast<double>(i);
+    // Radii that stand for equal areas of the covered disc: blocks on the axis fit more than most.
+    const double f = 0.5 - 0.5 * std::sqrt((2.0 * static_cast<double>(i) + 1) / (2.0 * timed_blocks));
     const std::int64_t x0 = begin(0, f), y0 = begin(1, 0.5);
     for (std::int64_t z = z0; z < std::min(n[2], z0 + block[2]); ++z)
       for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)

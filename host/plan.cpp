@@ -329,7 +329,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
     const double step = filtered.geometry.pitch_u / r.upsampling;
     if (!grid_only && r.u_filter == "linear" && &r != &all.back() &&
-        2.5 * 0.25 * step * step / 8 * sups.second_u > share * plan.epsilon_abs)
+        2.5 * 0.25 * step * step / 8 * sups.second_u > linear_share * plan.epsilon_abs)
       continue;
     GoldStream stream = stream_at(r);
     const Trial t = try_rates(state, stream, plan.base, plan.epsilon_abs);
