@@ -388,7 +388,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
                          "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
-  c.comparison = is_comparison(plan, options);
+  c.comparison = is_comparison(plan.settings, options);
   c.holds_buffer = !c.comparison && c.total_buffer <= c.epsilon_abs;
   if (sampler.image3d) {
     c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
@@ -475,7 +475,7 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
                       atlas_length(device.info(), result.volume), plan.epsilon_abs, plan.gold_rate);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || attempt == 2 || is_comparison(plan, options)) {
+    if (holds || attempt == 2 || is_comparison(plan.settings, options)) {
       result.seconds = builder.seconds();
       return result;
     }

@@ -144,19 +144,6 @@ std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, std
   return lines;
 }
 
-TransferPoint at_value(const std::vector<TransferPoint>& points, double value) {
-  if (!(value > points.front().value)) return points.front();
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const auto &a = points[i - 1], &b = points[i];
-    if (value > b.value || !(b.value > a.value)) continue;
-    const double f = (value - a.value) / (b.value - a.value);
-    TransferPoint p{value, {}, (1 - f) * a.opacity + f * b.opacity};
-    for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
-    return p;
-  }
-  return points.back();
-}
-
 }  // namespace
 
 void draw_box(Image& image, const Camera& camera, const Grid& grid, const std::vector<float>& hidden) {
@@ -258,14 +245,14 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
       })->opacity;
   for (std::int64_t j = 0; j < height; ++j) {
     const double f = 1 - static_cast<double>(j) / static_cast<double>(height - 1);
-    const TransferPoint p = at_value(bar.points, lo + f * (hi - lo));
+    const TransferPoint p = transfer_at(bar.points, lo + f * (hi - lo));
     Colour c{};
     for (std::size_t k = 0; k < 3; ++k) c[k] = static_cast<std::uint8_t>(std::lround(255 * p.rgb[k]));
     fill(image, x, top + j, width, 1, c);
   }
   for (std::int64_t j = 0; bar.opacity && most > 0 && j < height; ++j) {
     const double f = 1 - static_cast<double>(j) / static_cast<double>(height - 1);
-    const double part = at_value(bar.points, lo + f * (hi - lo)).opacity / most;
+    const double part = transfer_at(bar.points, lo + f * (hi - lo)).opacity / most;
     const glm::dvec2 here{static_cast<double>(x) + 0.5 + part * static_cast<double>(width - 1),
                           static_cast<double>(top + j) + 0.5};
     if (before) line(image, *before, here, 1, kShadow, [](std::int64_t, std::int64_t) { return 0.8; });

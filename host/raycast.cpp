@@ -117,19 +117,6 @@ struct Table {
   }
 };
 
-TransferPoint evaluate(const std::vector<TransferPoint>& points, double value) {
-  if (!(value > points.front().value)) return points.front();
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const auto &a = points[i - 1], &b = points[i];
-    if (value > b.value || !(b.value > a.value)) continue;
-    const double f = (value - a.value) / (b.value - a.value);
-    TransferPoint p{value, {}, (1 - f) * a.opacity + f * b.opacity};
-    for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
-    return p;
-  }
-  return points.back();
-}
-
 Table bake(const TransferFunction& transfer, double step) {
   Table t;
   // Iso-surfaces have colours of their own.
@@ -141,7 +128,7 @@ Table bake(const TransferFunction& transfer, double step) {
   // A range that fp32 cannot tell from a point has one colour.
   if (!std::isfinite(t.scale)) t.scale = 0;
   for (int i = 0; i < kTableSize; ++i) {
-    const TransferPoint p = evaluate(points, lo + (hi - lo) * i / (kTableSize - 1));
+    const TransferPoint p = transfer_at(points, lo + (hi - lo) * i / (kTableSize - 1));
     cl_float4 e{};
     for (std::size_t c = 0; c < 3; ++c) e.s[c] = static_cast<float>(p.rgb[c]);
     // `opacity` is over one base cell: what passes n steps of length s passes as much as n s base cells.

@@ -79,7 +79,7 @@ struct ResidentVolume::Impl {
   Grid grid;
   std::vector<cl_float2> host_ranges;  ///< what ranges() holds
   std::pair<float, float> value_range{0, 0};
-  float largest = 0;  ///< that a texel can decode to, in magnitude
+  float largest = 0;        ///< that a texel can decode to, in magnitude
   bool is_uniform = false;  ///< every brick reads a float32 base
   AtlasLayout layout;
 

@@ -98,6 +98,19 @@ TransferFunction transfer_preset(const std::string& name, double lo, double hi) 
       fmt::format("there is no transfer function '{}'; take one of {}, or a JSON file", name, known));
 }
 
+TransferPoint transfer_at(const std::vector<TransferPoint>& points, double value) {
+  if (!(value > points.front().value)) return points.front();
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto &a = points[i - 1], &b = points[i];
+    if (value > b.value || !(b.value > a.value)) continue;
+    const double f = (value - a.value) / (b.value - a.value);
+    TransferPoint p{value, {}, (1 - f) * a.opacity + f * b.opacity};
+    for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
+    return p;
+  }
+  return points.back();
+}
+
 TransferFunction stretched(TransferFunction f, double lo, double hi) {
   if (!std::isfinite(lo) || !std::isfinite(hi) || hi < lo)
     throw InputError(fmt::format("transfer function '{}' cannot be stretched over [{}, {}]", f.name, lo, hi));

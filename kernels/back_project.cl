@@ -55,8 +55,8 @@
 
 // Into sum_low the column's samples at q, into sum_high those of the vector above.
 #if VDVR_VECTORS == 2
-#define INTO(sum, w, q)                                \
-  sum##_low = fma((VEC)(w), LOAD(q), sum##_low);       \
+#define INTO(sum, w, q)                          \
+  sum##_low = fma((VEC)(w), LOAD(q), sum##_low); \
   sum##_high = fma((VEC)(w), LOAD(q + above), sum##_high);
 #else
 #define INTO(sum, w, q) sum##_low = fma((VEC)(w), LOAD(q), sum##_low);
@@ -80,11 +80,11 @@
 #endif
 // Named sums, not an array: compilers keep these in registers.
 #define CLEAR(sum, i, c, r) VEC sum##_low = (VEC)(0.0f), sum##_high = (VEC)(0.0f);
-#define PUT(sum, i, c, r)                                                                         \
-  if (x + c < nx && y + r < ny) {                                                                 \
-    STORE(sum##_low, target + (size_t)(r * nx + c) * out_stride);                                 \
-    if (VDVR_VECTORS == 2 && above > 0)                                                           \
-      STORE(sum##_high, target + (size_t)(r * nx + c) * out_stride + VDVR_LANES);                 \
+#define PUT(sum, i, c, r)                                                         \
+  if (x + c < nx && y + r < ny) {                                                 \
+    STORE(sum##_low, target + (size_t)(r * nx + c) * out_stride);                 \
+    if (VDVR_VECTORS == 2 && above > 0)                                           \
+      STORE(sum##_high, target + (size_t)(r * nx + c) * out_stride + VDVR_LANES); \
   }
 
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
@@ -105,7 +105,7 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
   __global const float* plane = filtered + (size_t)(z / 16) * views * columns * 16 + z % 16;
   // From one vector of z to the next, in the same chunk or the next one; beyond the last the same one again.
   const int next = z + VDVR_LANES;
-  const size_t above = next >= z_padded    ? 0
+  const size_t above = next >= z_padded ? 0
                        : next % 16 != 0 ? VDVR_LANES
                                         : (size_t)views * columns * 16 - z % 16;
   __global const float4* view = steps + (size_t)block * views;

@@ -1,6 +1,6 @@
 // The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
 // chosen tiles. Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l samples every
-// (rate >> l)-th gold node. Called by host/gold_stream.cpp.
+// (rate >> l)-th gold node. Called by host/gold_batch.cpp.
 #include "shared/largest.h"
 
 #ifndef VDVR_BRICK_NODES
@@ -19,10 +19,9 @@
 __kernel void level_error(volatile __global int* error, __global const int* before,
                           __global const float* along, __global const float* gold,
                           __global const float* above, __global const float* below,
-                          __global const float* margin, float lowest, int nx,
-                          int ny, int nz, int halo, int gold_stride, int stride, int spacing, int reach,
-                          int cx, int cy, int bricks_x, int bricks_y, int bricks_z, int blocks,
-                          float tolerance) {
+                          __global const float* margin, float lowest, int nx, int ny, int nz, int halo,
+                          int gold_stride, int stride, int spacing, int reach, int cx, int cy, int bricks_x,
+                          int bricks_y, int bricks_z, int blocks, float tolerance) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
   if (x >= nx || y >= ny || block >= blocks) return;
@@ -56,7 +55,8 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   int z = 0;
   for (; z + 16 <= last - first + 1; z += 16) {
     const float16 e = ERROR_AT(z);
-    largest = fmax(largest, largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
+    largest = fmax(largest,
+                   largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
   }
   for (; z <= last - first; ++z) {
     const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[gold_stride + z]) +

@@ -1,9 +1,9 @@
 // Samples fitted to the trilinear filter (docs/error-bounds.md, section on coefficients): starting from gold
 // at the nodes of a level, each step takes from a sample 0.8 of the middle between the largest and the
-// smallest error of the interpolant around it, half a sample spacing to every side. Errors count from the middle
-// of where F may lie between gold nodes: gold less `curvature` times its second differences. Layouts: gold
-// float[block][y + halo][x + halo][gold_stride], node z at z + halo; margin float[block][y + halo][x + halo];
-// a lattice of every `spacing`-th gold node, `reach` of them in the halo on every side: lattice
+// smallest error of the interpolant around it, half a sample spacing to every side. Errors count from the
+// middle of where F may lie between gold nodes: gold less `curvature` times its second differences. Layouts:
+// gold float[block][y + halo][x + halo][gold_stride], node z at z + halo; margin float[block][y + halo][x +
+// halo]; a lattice of every `spacing`-th gold node, `reach` of them in the halo on every side: lattice
 // float[block][cy][cx][lattice_stride], node n at n / spacing + reach; along, low and high
 // float[block][cy][cx][gold_stride], gold node z at z + halo. Called by host/fit_coefficients.cpp.
 

@@ -1,10 +1,11 @@
 // Bounds that go with a block of gold samples (docs/error-bounds.md): P from derivatives of the filtered
 // projections, T from second differences of gold, and the node slack that the node test adds to |V - gold|.
-// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted sup of
-// the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
+// Layouts: derivatives float d[z / 16][view][column n][16]; table float2 table[cell z][view][n] = weighted
+// sup of the positive and of the negative part over the rows of a cell and the stencil of column cell n; p
 // float[block][cell z][y][x]; gold float[block][y + halo][x + halo][gold stride], node z at z + halo, with a
-// halo of at least one node; margin float[block][y + halo][x + halo]; cells float[block][y][x][stride] with cell z
-// at z + 1; slack float[block][y][x][stride], node z at z. Called by host/gold_stream.cpp and host/bound_table.cpp.
+// halo of at least one node; margin float[block][y + halo][x + halo]; cells float[block][y][x][stride] with
+// cell z at z + 1; slack float[block][y][x][stride], node z at z. Called by host/node_slack.cpp and
+// host/bound_table.cpp.
 #include "shared/largest.h"
 
 #define UNTESTED (-1e30f)
@@ -114,27 +115,30 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
     low = fmin(low, v);                 \
     high = fmax(high, v);               \
   }
-#define CORNERS(M)                                                                                  \
-  M(at)                                                                                             \
-  M(at + 1)                                                                                         \
-  M(at + gold_stride) M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
+#define CORNERS(M)                                                              \
+  M(at)                                                                         \
+  M(at + 1)                                                                     \
+  M(at + gold_stride)                                                           \
+  M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
       M(at + row + gold_stride + 1)
 
-// Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it lies
-// below, so `below` is the sum of the largest positive second differences at the cell's corners, by axis, / 8,
-// `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by base cell, plus
-// t_constant. Cells beyond the block, and with `windowed` those whose range misses the window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
+// Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it
+// lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
+// axis, / 8, `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by
+// base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
+// window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
 // room.
-__kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold, __global const float* addend, int nx,
-                         int ny, int nz, int halo, int gold_stride, int stride, int rate, int cells_x,
-                         int cells_y, int blocks, float counted, float t_constant, int windowed, float window_low, float window_high) {
+__kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
+                         __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
+                         int stride, int rate, int cells_x, int cells_y, int blocks, float counted,
+                         float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
     return;  // one cell more than there is: it must be marked UNTESTED
   const int row = (nx + 2 * halo) * gold_stride;
-  __global const float* at = gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row +
-                             (size_t)(x + halo) * gold_stride + z + halo;
+  __global const float* at =
+      gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row + (size_t)(x + halo) * gold_stride + z + halo;
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
   const float16 bound =
@@ -158,9 +162,9 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   if (z == 0) cells_above[column] = cells_below[column] = UNTESTED;
 }
 
-// Slack of each node: the largest of either of the cells around it, UNTESTED where no such cell meets the covered
-// region. margin: per block and column the coverage margin across z; nodes with less than `lowest` are
-// untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
+// Slack of each node: the largest of either of the cells around it, UNTESTED where no such cell meets the
+// covered region. margin: per block and column the coverage margin across z; nodes with less than `lowest`
+// are untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
 __kernel void node_slack(__global float* above, __global float* below, __global const float* cells_above,
                          __global const float* cells_below, __global const float* margin,
                          __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,

@@ -1,8 +1,8 @@
 // Measures the stored field V against gold at every tested node of a block, through the sampler that renders
-// it (kernels/shared/mixed_sampler.h). Per brick: the largest that |V - F| may be, from V - gold and from how far F
-// may lie above and below gold's interpolant; the largest |V - gold|; the largest slack to either side; and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance.
-// Layouts as in gold_bounds.cl; results [block][brick z][brick y][brick x].
-// Called by host/gold_stream.cpp.
+// it (kernels/shared/mixed_sampler.h). Per brick: the largest that |V - F| may be, from V - gold and from how
+// far F may lie above and below gold's interpolant; the largest |V - gold|; the largest slack to either side;
+// and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance. Layouts as in
+// gold_bounds.cl; results [block][brick z][brick y][brick x]. Called by host/gold_batch.cpp.
 #include "shared/largest.h"
 #include "shared/mixed_sampler.h"
 
@@ -19,11 +19,10 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
                            volatile __global int* slack_max, volatile __global int* violated,
                            __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
                            __global const float* gold, __global const float* above,
-                           __global const float* below,
-                           __global const float* margin, __global const int4* first_brick,
-                           __global const uchar* selected, float lowest, int nx, int ny, int halo,
-                           int gold_stride, int stride, int rate, int bricks_x, int bricks_y, int bricks_z, int blocks,
-                           float tolerance) {
+                           __global const float* below, __global const float* margin,
+                           __global const int4* first_brick, __global const uchar* selected, float lowest,
+                           int nx, int ny, int halo, int gold_stride, int stride, int rate, int bricks_x,
+                           int bricks_y, int bricks_z, int blocks, float tolerance) {
   const int g = grid.granularity, side = g * rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
   const int iy = (int)get_global_id(1) % side, brick_y = (int)get_global_id(1) / side;
@@ -35,8 +34,9 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
   const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
   if (ix > last_x || iy > last_y) return;
   const size_t column = ((size_t)block * ny + brick_y * g * rate + iy) * nx + brick_x * g * rate + ix;
-  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + brick_y * g * rate + iy + halo) * (nx + 2 * halo) +
-                         brick_x * g * rate + ix + halo;
+  const size_t gold_at =
+      ((size_t)block * (ny + 2 * halo) + brick_y * g * rate + iy + halo) * (nx + 2 * halo) +
+      brick_x * g * rate + ix + halo;
   if (margin[gold_at] < lowest) return;
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
@@ -71,7 +71,7 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
         const float8 up = vload8(0, above_column + first_node + i),
                      down = vload8(0, below_column + first_node + i);
         const float8 e = ((1.0f - t) * low + t * high) -
-                              vload8(0, gold_column + first_node + i);  // vdvr_lerp, eight at once
+                         vload8(0, gold_column + first_node + i);  // vdvr_lerp, eight at once
         const float8 both = fmax(e + down, up - e);
         // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the
         // comparison.

@@ -161,8 +161,8 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
         yz = fmax(yz, select(fabs(mixed(p, row, 1)), none, outside));
       }
     }
-  out[(size_t)i * side + y] = (float8)(largest_of_16(xx), largest_of_16(yy), largest_of_16(zz), largest_of_16(xy),
-                                       largest_of_16(xz), largest_of_16(yz), 0.0f, 0.0f);
+  out[(size_t)i * side + y] = (float8)(largest_of_16(xx), largest_of_16(yy), largest_of_16(zz),
+                                       largest_of_16(xy), largest_of_16(xz), largest_of_16(yz), 0.0f, 0.0f);
 }
 
 // --- cells ------------------------------------------------------------------------------------------------

@@ -182,7 +182,7 @@ int run_command(Arguments& args) {
   const CommonOptions common = common_options(args);
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;
-  if (options.plan.terms != "all" || options.build.closing == Closing::none)
+  if (is_comparison(options.plan, options.build))
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);

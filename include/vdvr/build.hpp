@@ -31,8 +31,8 @@ struct BuildOptions {
 };
 
 /// Whether these options make a volume to compare with, which no certificate goes with.
-inline bool is_comparison(const Plan& plan, const BuildOptions& options) {
-  return plan.settings.terms != "all" || options.closing == Closing::none;
+inline bool is_comparison(const PlanSettings& settings, const BuildOptions& options) {
+  return settings.terms != "all" || options.closing == Closing::none;
 }
 
 struct BuildResult {

@@ -40,6 +40,9 @@ TransferFunction transfer_preset(const std::string& name, double lo, double hi);
 /// Told apart by content: our {"points": [{"value", "rgb", "opacity"}]}, a 3D Slicer volume property
 /// (.vp.json) or a ParaView preset (docs/rendering.md). Values as in the file. Throws FileError.
 TransferFunction read_transfer_function(const std::filesystem::path& path);
+/// Colour and opacity at a value: linear between points, the nearest point's beyond them; the last of several
+/// points at one value.
+TransferPoint transfer_at(const std::vector<TransferPoint>& points, double value);
 /// The same with values mapped linearly so that the first lies at lo and the last at hi. Throws InputError.
 TransferFunction stretched(TransferFunction transfer, double lo, double hi);
 /// The same with opacities of one base cell, the smallest spacing of the grid.
