@@ -53,18 +53,27 @@ LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& b, const opencl
   along();
   if (steps == 0) return l;
 
+  const opencl::DeviceArray<float> errors(state, gold.size(), "errors of an interpolant");
   const opencl::DeviceArray<float> low(state, columns * count(b.gold_stride), "smallest errors"),
       high(state, columns * count(b.gold_stride), "largest errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+      err(state, "fit_coefficients", "lattice_errors");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int>
       pool(state, "fit_coefficients", "pool_errors");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_float>
       shift(state, "fit_coefficients", "shift_lattice");
+  const std::uint64_t chunks = count(b.gold_stride / 16);
+  // Columns that have a lattice column on every side within half a spacing.
+  const std::int64_t wide = (l.cx - 1) * spacing + 1 - 2 * (spacing / 2),
+                     deep = (l.cy - 1) * spacing + 1 - 2 * (spacing / 2);
   for (int step = 0; step < steps; ++step) {
-    pool({{count(b.gold_stride / 16), count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low.buffer(),
-         high.buffer(), l.along.buffer(), gold.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s,
-         reach, cx, cy, blocks, curvature);
+    err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors.buffer(), l.along.buffer(),
+        gold.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s, reach, cx, cy, blocks, curvature);
+    pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low.buffer(), high.buffer(),
+         errors.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s, reach, cx, cy, blocks);
     shift(per_sample, l.samples.buffer(), low.buffer(), high.buffer(), halo, stride, s, reach, cx, cy, cz,
           to_int(l.stride), blocks, to_int(b.z_first), to_int(b.z_last), share);
     along();

@@ -1,4 +1,4 @@
-// Launches kernels/cosine_spectrum.cl with matrices of derivatives.
+// The paper's bounds, from derivatives by cosine series.
 #include "host/paper_bounds.hpp"
 
 #include <algorithm>
@@ -6,16 +6,13 @@
 #include <cmath>
 #include <map>
 
+#include "host/axis_product.hpp"
 #include "host/cosine_series.hpp"
-#include "host/opencl/kernel.hpp"
 
 namespace vdvr {
 namespace {
 
 using opencl::DeviceArray;
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 // Derivatives of `batch` boxes of samples [z][y][x] under mirror extension, at the samples.
 class Derivatives {
@@ -29,7 +26,7 @@ class Derivatives {
         samples_(state, samples, "samples"),
         a_(state, samples.size(), "derivatives"),
         b_(state, samples.size(), "derivatives"),
-        axis_(state, "cosine_spectrum", "cosine_axis") {}
+        axis_(state) {}
 
   // The sum over the boxes of the largest |derivative| of these orders along x, y, z; 0 along an axis of one
   // sample.
@@ -61,11 +58,7 @@ class Derivatives {
     for (std::size_t j = 0; j < axis; ++j) inner *= size_[j];
     for (std::size_t j = axis + 1; j < 3; ++j) outer *= size_[j];
     const std::int64_t n = size_[axis];
-    const DeviceArray<float>& m = matrix(axis, order);
-    const opencl::Range range = inner == 1
-                                    ? opencl::Range{{count(n), 1, count(outer)}, {64, 1, 1}}
-                                    : opencl::Range{{count(inner), count(n), count(outer)}, {64, 1, 1}};
-    axis_(range, out.buffer(), in.buffer(), m.buffer(), to_int(outer), to_int(n), to_int(inner));
+    axis_(out, in, matrix(axis, order), outer, n, inner);
   }
 
   const DeviceArray<float>& matrix(std::size_t axis, int order) {
@@ -75,12 +68,7 @@ class Derivatives {
     std::vector<double> positions(n);
     for (std::size_t i = 0; i < n; ++i) positions[i] = static_cast<double>(i);
     const auto exact = resampling_matrix(size_[axis], positions, order, spacing_[axis], 1);
-    std::vector<float> transposed(n * n);
-    for (std::size_t m = 0; m < n; ++m)
-      for (std::size_t j = 0; j < n; ++j) transposed[j * n + m] = static_cast<float>(exact[m * n + j]);
-    return matrices_
-        .emplace(std::pair{axis, order},
-                 DeviceArray<float>(state_, std::span<const float>(transposed), "derivative matrix"))
+    return matrices_.emplace(std::pair{axis, order}, transposed_on_device(state_, exact, size_[axis]))
         .first->second;
   }
 
@@ -89,7 +77,7 @@ class Derivatives {
   Vec3 spacing_;
   std::int64_t batch_;
   DeviceArray<float> samples_, a_, b_;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> axis_;
+  AxisProduct axis_;
   std::map<std::pair<std::size_t, int>, DeviceArray<float>> matrices_;
 };
 

@@ -40,38 +40,53 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
   to[(cz - 1) * spacing] = from[cz - 1];
 }
 
-// Smallest and largest error of the interpolant over the gold columns within half a spacing of a lattice
-// column, at 16 gold nodes along z; columns with a margin below `lowest` do not count. Lattice columns on the
-// rim have no cell on one side: they are left out.
-__kernel void pool_errors(__global float* low, __global float* high, __global const float* along,
-                          __global const float* gold, __global const float* margin, float lowest, int nx,
-                          int ny, int halo, int gold_stride, int spacing, int reach, int cx, int cy,
-                          int blocks, float curvature) {
+// Error of the interpolant at 16 gold nodes along z: errors float[block][y + halo][x + halo][gold_stride].
+// Columns nearer to the rim than half a spacing are left out, and so are those with a margin below `lowest`,
+// which do not count.
+__kernel void lattice_errors(__global float* errors, __global const float* along, __global const float* gold,
+                             __global const float* margin, float lowest, int nx, int ny, int halo,
+                             int gold_stride, int spacing, int reach, int cx, int cy, int blocks,
+                             float curvature) {
+  const int z = (int)get_global_id(0) * 16,
+            x = (int)get_global_id(1) + spacing / 2;  // from the lattice's rim
+  const int deep = (cy - 1) * spacing + 1 - 2 * (spacing / 2);
+  const int block = (int)get_global_id(2) / deep, y = (int)get_global_id(2) - block * deep + spacing / 2;
+  if (z + 16 > gold_stride || x > (cx - 1) * spacing - spacing / 2 || block >= blocks) return;
+  const int row = nx + 2 * halo, gx = x - reach * spacing + halo, gy = y - reach * spacing + halo;
+  const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * row + gx;
+  if (margin[column] < lowest) return;
+  const int ix = x / spacing, iy = y / spacing;
+  const float step = 1.0f / (float)spacing;
+  const float fx = (float)(x - ix * spacing) * step, fy = (float)(y - iy * spacing) * step;
+  __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * gold_stride + z;
+  __global const float* b = a + (size_t)cx * gold_stride;
+  __global const float* centre = gold + column * gold_stride + z;
+  const float16 f = vload16(0, centre);
+  const float16 around = vload16(0, centre - 1) + vload16(0, centre + 1) + vload16(0, centre - gold_stride) +
+                         vload16(0, centre + gold_stride) + vload16(0, centre - (size_t)row * gold_stride) +
+                         vload16(0, centre + (size_t)row * gold_stride);
+  const float16 e = (1.0f - fy) * ((1.0f - fx) * vload16(0, a) + fx * vload16(0, a + gold_stride)) +
+                    fy * ((1.0f - fx) * vload16(0, b) + fx * vload16(0, b + gold_stride)) -
+                    (f - curvature * (around - 6.0f * f));
+  vstore16(e, 0, errors + column * gold_stride + z);
+}
+
+// Smallest and largest error over the gold columns within half a spacing of a lattice column, at 16 gold
+// nodes along z. Lattice columns on the rim have no cell on one side: they are left out.
+__kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
+                          __global const float* margin, float lowest, int nx, int ny, int halo,
+                          int gold_stride, int spacing, int reach, int cx, int cy, int blocks) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cy, y = (int)get_global_id(2) - block * cy;
   if (z + 16 > gold_stride || x < 1 || y < 1 || x >= cx - 1 || y >= cy - 1 || block >= blocks) return;
-  const int half_spacing = spacing / 2, row = nx + 2 * halo;
-  const float step = 1.0f / (float)spacing;
+  const int half_spacing = spacing / 2;
   float16 smallest = (float16)(INFINITY), largest = (float16)(-INFINITY);
   for (int dy = -half_spacing; dy <= half_spacing; ++dy)
     for (int dx = -half_spacing; dx <= half_spacing; ++dx) {
       const int gx = (x - reach) * spacing + halo + dx, gy = (y - reach) * spacing + halo + dy;
-      const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * row + gx;
+      const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * (nx + 2 * halo) + gx;
       if (margin[column] < lowest) continue;
-      const int ix = x - (dx < 0), iy = y - (dy < 0);
-      const float fx = (float)(dx < 0 ? dx + spacing : dx) * step,
-                  fy = (float)(dy < 0 ? dy + spacing : dy) * step;
-      __global const float* a = along + (((size_t)block * cy + iy) * cx + ix) * gold_stride + z;
-      __global const float* b = a + (size_t)cx * gold_stride;
-      __global const float* centre = gold + column * gold_stride + z;
-      const float16 f = vload16(0, centre);
-      const float16 around = vload16(0, centre - 1) + vload16(0, centre + 1) +
-                             vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) +
-                             vload16(0, centre - (size_t)row * gold_stride) +
-                             vload16(0, centre + (size_t)row * gold_stride);
-      const float16 e = (1.0f - fy) * ((1.0f - fx) * vload16(0, a) + fx * vload16(0, a + gold_stride)) +
-                        fy * ((1.0f - fx) * vload16(0, b) + fx * vload16(0, b + gold_stride)) -
-                        (f - curvature * (around - 6.0f * f));
+      const float16 e = vload16(0, errors + column * gold_stride + z);
       smallest = fmin(smallest, e);
       largest = fmax(largest, e);
     }
