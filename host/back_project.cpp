@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "host/opencl/kernel.hpp"
 
@@ -48,6 +49,10 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                   const ColumnTuning& tuning) {
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
+  const std::int64_t rows_wanted = blocks.rows < 0 ? slab.rows : blocks.rows;
+  const auto padded = static_cast<std::int64_t>(opencl::round_up(count(rows_wanted), 16));
+  if (blocks.first_row % 16 != 0 || blocks.first_row + padded > slab.rows_padded)
+    throw std::logic_error("back_project: rows outside the slab");
 
   std::vector<cl_float4> steps(n * views);
   for (std::size_t b = 0; b < n; ++b)
@@ -82,7 +87,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
 
   const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int>
+                 cl_int, cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
@@ -90,12 +95,12 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
               {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
   const std::int64_t carried = tuning.lanes * tuning.vectors;
-  kernel({{count((slab.rows_padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
+  kernel({{count((padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},
          out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
-         ints(slab.columns.count), ints(slab.rows_padded), ints(column_stride(slab.rows)), ints(blocks.nx),
-         ints(blocks.ny), ints(n));
+         ints(slab.columns.count), ints(padded), ints(column_stride(rows_wanted)), ints(blocks.nx),
+         ints(blocks.ny), ints(n), ints(blocks.first_row / 16));
 }
 
 }  // namespace vdvr

@@ -18,6 +18,8 @@ struct ColumnBlocks {
   std::vector<std::array<double, 2>> first;
   /// [block][y]: first and last column wanted; others keep what `out` held. Empty: all.
   std::vector<std::array<std::int32_t, 2>> wanted{};
+  /// Of the slab's rows, a multiple of 16 first; -1: all.
+  std::int64_t first_row = 0, rows = -1;
 };
 
 /// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear

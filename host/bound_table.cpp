@@ -81,16 +81,17 @@ BoundTable make_table(opencl::State& state, Upsampler& upsampler, const Filtered
 
 }  // namespace
 
-BoundCells base_cells(const ParallelGeometry& geometry, const Grid& grid, int rate, double first_z,
-                      std::int64_t cells_z) {
+BoundCells base_cells(const ParallelGeometry& geometry, const Grid& grid, int rate, int coarsest,
+                      double first_z, std::int64_t cells_z) {
   BoundCells cells;
   const double hz = grid.spacing[2] / rate;
-  cells.rows = detector_rows(geometry, first_z - hz, hz, cells_z * rate + 3);
+  const int beyond = rate / coarsest;  // second differences at the cell's nodes reach one gold row beyond it
+  cells.rows = detector_rows(geometry, first_z - beyond * hz, hz, cells_z * rate + 1 + 2 * beyond);
   cells.row_step = rate;
-  cells.row_count = rate + 3;  // second differences at the cell's nodes reach one gold row beyond it
+  cells.row_count = rate + 1 + 2 * beyond;
   cells.cells_z = cells_z;
-  cells.half_x = (0.5 + 1.0 / rate) * grid.spacing[0];
-  cells.half_y = (0.5 + 1.0 / rate) * grid.spacing[1];
+  cells.half_x = (0.5 + 1.0 / coarsest) * grid.spacing[0];
+  cells.half_y = (0.5 + 1.0 / coarsest) * grid.spacing[1];
   return cells;
 }
 
@@ -170,29 +171,31 @@ BoundTable remainder_table(opencl::State& state, Upsampler& upsampler, const Fil
 }
 
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table,
-                   const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int cell,
-                   double offset, opencl::DeviceArray<float>& bound) {
+                   const ColumnBlocks& blocks, const BlockCells& cells, double offset,
+                   opencl::DeviceArray<float>& bound) {
   const ParallelGeometry& g = scan.geometry;
   const std::size_t views = static_cast<std::size_t>(g.views());
   const double scale = table.columns.rate / g.pitch_u;
-  const double cell_x = blocks.step_x * cell, cell_y = blocks.step_y * cell;
   std::vector<cl_float4> steps(blocks.first.size() * views);
   for (std::size_t b = 0; b < blocks.first.size(); ++b)
     for (std::size_t k = 0; k < views; ++k) {
       const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]);
       const double t = (blocks.first[b][0] + offset * blocks.step_x) * c +
                        (blocks.first[b][1] + offset * blocks.step_y) * s;
-      steps[b * views + k] = {{static_cast<float>(cell_x * c * scale), static_cast<float>(cell_y * s * scale),
+      steps[b * views + k] = {{static_cast<float>(blocks.step_x * c * scale),
+                               static_cast<float>(blocks.step_y * s * scale),
                                static_cast<float>(table.columns.column_of(t / g.pitch_u + g.center)), 0.0f}};
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps),
                                                     "cell positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_float>
       kernel(state, "gold_bounds", "project_bound");
-  kernel({{count(cells_x), count(cells_y), count(table.cells_z) * blocks.first.size()}, {8, 8, 1}},
-         bound.buffer(), table.values.buffer(), device_steps.buffer(), to_int(g.views()),
-         to_int(table.columns.count), to_int(cells_x), to_int(cells_y), to_int(table.cells_z),
-         to_int(static_cast<std::int64_t>(blocks.first.size())), static_cast<cl_float>(table.factor));
+  kernel({{count(cells.x), count(cells.y), count(cells.z) * blocks.first.size()}, {8, 8, 1}}, bound.buffer(),
+         table.values.buffer(), device_steps.buffer(), to_int(g.views()), to_int(table.columns.count),
+         to_int(cells.x), to_int(cells.y), to_int(cells.z),
+         to_int(static_cast<std::int64_t>(blocks.first.size())), to_int(cells.first_z),
+         static_cast<cl_float>(table.factor));
 }
 
 std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,
@@ -208,7 +211,7 @@ std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& up
   const ColumnBlocks blocks{
       nodes[0], nodes[1], grid.spacing[0] / rate, grid.spacing[1] / rate, {{first[0], first[1]}}, {}};
   opencl::DeviceArray<float> bound(state, count(nodes[0] * nodes[1] * nodes[2]), "node bounds");
-  project_bound(state, scan, table, blocks, nodes[0], nodes[1], 1, 0.0, bound);
+  project_bound(state, scan, table, blocks, {nodes[0], nodes[1], nodes[2]}, 0.0, bound);
   return bound.to_host();
 }
 

@@ -21,10 +21,10 @@ struct BoundCells {
   std::int64_t cells_z = 1;
   double half_x = 0, half_y = 0;  ///< half widths of the box
 };
-/// Base cells of a slab: their gold nodes and one gold step around. `first_z`: world z of the first gold
-/// node.
-BoundCells base_cells(const ParallelGeometry& geometry, const Grid& grid, int rate, double first_z,
-                      std::int64_t cells_z);
+/// Base cells of a slab: their gold nodes at `rate` and a gold step of the coarser rate `coarsest` around.
+/// `first_z`: world z of the first gold node.
+BoundCells base_cells(const ParallelGeometry& geometry, const Grid& grid, int rate, int coarsest,
+                      double first_z, std::int64_t cells_z);
 /// The gold nodes of a slab, each a cell of its own.
 BoundCells gold_nodes(const ParallelGeometry& geometry, const Grid& grid, int rate, double first_z,
                       std::int64_t nodes_z);
@@ -51,11 +51,15 @@ BoundTable remainder_table(opencl::State& state, Upsampler& upsampler, const Fil
                            const FieldSups& sups, const Grid& grid, int rate, double first_z,
                            std::int64_t cells_z);
 
-/// The bound of every cell of blocks of cells_x x cells_y: float bound[block][z][y][x]. Cells are `cell`
-/// steps of `blocks` wide and centred `offset` steps from its columns. Enqueues; does not wait.
+/// Cells of blocks whose bounds are wanted, counted x, y, z; the first along z is the table's `first_z`.
+struct BlockCells {
+  std::int64_t x = 1, y = 1, z = 1, first_z = 0;
+};
+/// The bound of every cell: float bound[block][z][y][x]. Cells are one step of `blocks` wide and centred
+/// `offset` steps from its columns. Enqueues; does not wait.
 void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTable& table,
-                   const ColumnBlocks& blocks, std::int64_t cells_x, std::int64_t cells_y, int cell,
-                   double offset, opencl::DeviceArray<float>& bound);
+                   const ColumnBlocks& blocks, const BlockCells& cells, double offset,
+                   opencl::DeviceArray<float>& bound);
 
 /// P at every gold node of a box of nodes that begins at a base cell's corner: float p[z][y][x], `nodes`
 /// counted x, y, z. The sharpest form, at the cost of gold itself: the certificate takes base cells.

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "host/build_journal.hpp"
+#include "host/classify_bricks.hpp"
 #include "host/close_boundaries.hpp"
 #include "host/gold_stream.hpp"
 #include "host/host_memory.hpp"
@@ -58,13 +59,6 @@ std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b,
   return selected;
 }
 
-// What the classification pass learns besides the levels.
-struct Slack {
-  double total = 0;       // largest T + P of a tested node
-  double projection = 0;  // largest P
-  double gold = 0;        // largest T
-};
-
 class Builder {
  public:
   Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
@@ -102,7 +96,9 @@ class Builder {
                           plan.upsampling_u, plan.u_filter,       options.window};
     settings.midrange = plan.settings.coefficients == "midrange";
     settings.grid_only = plan.settings.terms == "grid";
-    stream_.emplace(state_, filtered_, *upsampler_, sups_, settings);
+    gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
+    node_test_.emplace(state_, *gold_, bricks_, host_, journal_, progress_,
+                       [this](float slack, double tolerance) { refuse(slack, tolerance); });
     watch_.lap("bounds");
     probe_ = probe_sampler(device);
     watch_.lap("probe");
@@ -118,8 +114,8 @@ class Builder {
 
   // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
   double node_tolerance(const SamplerTerms& sampler) const {
-    if (stream_->settings().grid_only) return plan_.epsilon_abs;
-    return plan_.epsilon_abs - stream_->arithmetic() -
+    if (stream().settings().grid_only) return plan_.epsilon_abs;
+    return plan_.epsilon_abs - stream().arithmetic() -
            std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
   }
 
@@ -128,24 +124,15 @@ class Builder {
     // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
     double largest = 0;
     for (const float v : bricks_.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
-    const double strict = tolerance - std::min(2 * stream_->arithmetic(), 0x1p-15 * largest);
+    const double strict = tolerance - std::min(2 * stream().arithmetic(), 0x1p-15 * largest);
     const DeviceField base(state_, as_mixed({bricks_.grid, bricks_.base}, bricks_.granularity));
-    const std::vector<std::uint8_t> near = classified();
-    const opencl::DeviceArray<std::uint8_t> device_near(state_, std::span<const std::uint8_t>(near),
-                                                        "bricks to classify");
-    measures_.assign(bricks_.level.size(), {});
-    stream_->run(near,
-                 {[&](GoldStream::Batch& batch) {
-                    return class_record(batch, batch.classify(base, static_cast<float>(strict), device_near));
-                  },
-                  [&](ByteReader in) { apply_classes(in, strict); }},
-                 journal_, progress_, "classify", GoldStream::For::samples);
+    node_test_->classify(base, strict, classified());
     watch_.lap("classify");
   }
 
   // Bricks that may hold a tested node.
   std::vector<std::uint8_t> classified() const {
-    std::vector<std::uint8_t> near = stream_->bricks_near_coverage();
+    std::vector<std::uint8_t> near = stream().bricks_near_coverage();
     for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && selected_[i];
     return near;
   }
@@ -159,7 +146,7 @@ class Builder {
     HostMemory closed(state_);
     for (int round = 0;; ++round) {
       // A repair compares with the volume before it.
-      if (round < 2) closed.count(4 * bricks_.base.size() + tile_bytes_, "the closed volume");
+      if (round < 2) closed.count(4 * bricks_.base.size() + node_test_->tile_bytes(), "the closed volume");
       MixedVolume volume = close_boundaries(bricks_, closing_);
       // Where integers round, a raised brick can change more than those it touches.
       const std::vector<std::uint8_t> changed =
@@ -169,38 +156,16 @@ class Builder {
             bricks_.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
       watch_.lap("close");
       const DeviceField field(state_, volume);
-      const opencl::DeviceArray<std::uint8_t> device_pending(state_, std::span<const std::uint8_t>(pending),
-                                                             "bricks to verify");
-      stream_->run(
-          pending,
-          {[&](GoldStream::Batch& batch) {
-             ByteWriter out;
-             for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), device_pending))
-               put(out, m);
-             return out.take();
-           },
-           [&](ByteReader in) {
-             while (!in.empty()) {
-               const BrickMeasure m = get_measure(in);
-               measures_.at(at(m.brick)) = m;
-             }
-           }},
-          journal_, progress_, round == 0 ? "verify" : "repair");
+      node_test_->measure(field, tolerance, pending, round == 0 ? "verify" : "repair");
       watch_.lap("verify");
       const std::vector<std::uint8_t> raised = raise_violating(pending);
       repaired_ += std::count(raised.begin(), raised.end(), 1);
-      if (std::find(raised.begin(), raised.end(), 1) == raised.end()) return volume;
-      stream_->run(raised,
-                   {[&](GoldStream::Batch& batch) {
-                      Tiles tiles;
-                      for (const std::int64_t id : batch.bricks())
-                        tiles.emplace_back(id, bricks_.level[at(id)]);
-                      ByteWriter out;
-                      put_tiles(out, batch, tiles);
-                      return out.take();
-                    },
-                    [&](ByteReader in) { take_tiles(in); }},
-                   journal_, progress_, "repair", GoldStream::For::samples);
+      if (std::find(raised.begin(), raised.end(), 1) == raised.end()) {
+        node_test_->sharpen(field, tolerance);
+        watch_.lap("verify");
+        return volume;
+      }
+      node_test_->extract(raised);
       watch_.lap("repair");
       before = std::move(volume);
     }
@@ -211,23 +176,24 @@ class Builder {
     std::vector<std::uint8_t> one(bricks_.level.size(), 0);
     one[at(brick)] = 1;
     Vec3 where{};
-    stream_->run(
+    stream().run(
         one, [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, brick); }, {}, "worst");
     return where;
   }
 
-  const std::vector<BrickMeasure>& measures() const { return measures_; }
+  const std::vector<BrickMeasure>& measures() const { return node_test_->measures(); }
   const std::vector<std::uint8_t>& involved() const { return bricks_.involved; }
-  const Slack& slack() const { return slack_; }
+  const ClassifyBricks::Bounds& slack() const { return node_test_->bounds(); }
   const SamplerProbe& probe() const { return probe_; }
   const FilteredScan& filtered() const { return filtered_; }
-  GoldStream& stream() { return *stream_; }
+  GoldStream& stream() { return gold_->fine(); }
+  [[nodiscard]] const GoldStream& stream() const { return gold_->fine(); }
   std::map<std::string, double>& seconds() { return seconds_; }
   std::int64_t repaired() const { return repaired_; }
 
  private:
   [[noreturn]] void refuse(float slack, double strict) const {
-    const bool projection = slack_.projection > slack_.gold;
+    const bool projection = this->slack().projection > this->slack().gold;
     throw ToleranceError(
         fmt::format("epsilon {:.4g} is out of reach at these rates: interpolating {} alone may err by {:.4g} "
                     "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
@@ -236,94 +202,15 @@ class Builder {
                     plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
   }
 
-  using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
-
-  static LevelTriple triple(int level) {
-    const auto l = static_cast<std::uint8_t>(level);
-    return {l, l, l};
-  }
-
-  void put_tiles(ByteWriter& out, GoldStream::Batch& batch, const Tiles& tiles) const {
-    std::vector<std::int64_t> bricks;
-    std::vector<std::uint8_t> levels;
-    for (const auto& [brick, level] : tiles) {
-      bricks.push_back(brick);
-      levels.push_back(level[0]);
-    }
-    out.put(bricks);
-    out.put(levels);
-    out.put(batch.extract(tiles));
-  }
-
-  void take_tiles(ByteReader& in) {
-    const auto bricks = in.get_vector<std::int64_t>();
-    const auto levels = in.get_vector<std::uint8_t>();
-    const auto samples = in.get_vector<float>();
-    auto next = samples.begin();
-    const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}, 0};
-    for (std::size_t i = 0; i < bricks.size(); ++i) {
-      const std::int64_t size = shape.tile_size(triple(levels.at(i)));
-      if (size > samples.end() - next)
-        throw FileError("a journal record lacks samples; start without --resume");
-      const auto end = next + size;
-      std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
-      const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();
-      host_.count(more, "the tiles before closing");
-      host_.uncount(less);
-      tile_bytes_ += more - less;
-      tile.assign(next, end);
-      next = end;
-    }
-  }
-
-  // What a batch's classes are, with the bounds behind them and the tiles that they ask for.
-  Bytes class_record(GoldStream::Batch& batch, const std::vector<BrickClass>& classes) const {
-    ByteWriter out;
-    const auto p = batch.largest_p();
-    Tiles tiles;
-    out.put(static_cast<std::uint64_t>(classes.size()));
-    for (std::size_t i = 0; i < classes.size(); ++i) {
-      const BrickClass& c = classes[i];
-      put(out, c.base);
-      out.put(c.level);
-      out.put(p[i].first);
-      out.put(p[i].second);
-      if (c.base.total >= 0 && c.level > 0) tiles.emplace_back(c.base.brick, triple(c.level));
-    }
-    put_tiles(out, batch, tiles);
-    return out.take();
-  }
-
-  void apply_classes(ByteReader& in, double strict) {
-    const auto n = in.get<std::uint64_t>();
-    for (std::uint64_t i = 0; i < n; ++i) {
-      const BrickMeasure base = get_measure(in);
-      const auto level = in.get<int>();
-      const auto largest_p = static_cast<double>(in.get<float>()),
-                 smallest_p = static_cast<double>(in.get<float>());
-      const std::size_t id = at(base.brick);
-      bricks_.involved.at(id) = base.total >= 0;
-      if (!bricks_.involved[id]) continue;
-      measures_[id] = base;
-      const auto slack = static_cast<double>(base.slack);
-      slack_.total = std::max(slack_.total, slack);
-      slack_.projection = std::max(slack_.projection, largest_p);
-      slack_.gold = std::max(slack_.gold, slack - smallest_p);
-      if (!(slack <= strict)) refuse(base.slack, strict);
-      bricks_.level[id] = triple(level);
-    }
-    take_tiles(in);
-  }
-
   // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels
   // only rise.
   std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
     const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
     std::vector<std::uint8_t> raise(bricks_.level.size(), 0);
     for (std::size_t i = 0; i < pending.size(); ++i) {
-      if (!pending[i] || measures_[i].violated == 0) continue;
+      if (!pending[i] || measures()[i].violated == 0) continue;
       for (int part = 0; part < 27; ++part) {
-        if (!(measures_[i].violated >> part & 1)) continue;
+        if (!(measures()[i].violated >> part & 1)) continue;
         const auto incident =
             incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9});
         bool any_coarser = false;
@@ -333,12 +220,13 @@ class Builder {
             any_coarser = true;
           }
         if (any_coarser) continue;
-        if (bricks_.level[i][0] == top) refuse(measures_[i].total, plan_.epsilon_abs);
+        if (bricks_.level[i][0] == top) refuse(measures()[i].total, plan_.epsilon_abs);
         raise[i] = 1;
       }
     }
     for (std::size_t i = 0; i < raise.size(); ++i)
-      if (raise[i]) bricks_.level[i] = triple(bricks_.level[i][0] + 1);
+      if (raise[i])
+        for (std::uint8_t& l : bricks_.level[i]) ++l;
     return raise;
   }
 
@@ -347,7 +235,6 @@ class Builder {
   const Progress& progress_;
   Journal* journal_;
   HostMemory host_;
-  std::uint64_t tile_bytes_ = 0;  // of bricks_.samples
   OpenBricks bricks_;
   Closing closing_ = Closing::coarse;
   std::vector<std::uint8_t> selected_;
@@ -356,10 +243,9 @@ class Builder {
   FilteredScan filtered_;
   std::optional<Upsampler> upsampler_;
   FieldSups sups_;
-  std::optional<GoldStream> stream_;
+  std::optional<GoldRates> gold_;
+  std::optional<ClassifyBricks> node_test_;
   SamplerProbe probe_;
-  Slack slack_;
-  std::vector<BrickMeasure> measures_;
   std::int64_t repaired_ = 0;
 };
 

@@ -56,7 +56,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "1"},
+      {"record format", "2"},
       {"version", VDVR_VERSION},
       {"device", device.info().name},
       {"driver", device.info().driver},
@@ -90,6 +90,7 @@ void put(ByteWriter& out, const BrickMeasure& m) {
   out.put(m.error);
   out.put(m.slack);
   out.put(m.violated);
+  out.put(m.rate);
 }
 
 BrickMeasure get_measure(ByteReader& in) {
@@ -99,6 +100,7 @@ BrickMeasure get_measure(ByteReader& in) {
   m.error = in.get<float>();
   m.slack = in.get<float>();
   m.violated = in.get<std::uint32_t>();
+  m.rate = in.get<int>();
   return m;
 }
 

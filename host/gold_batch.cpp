@@ -129,8 +129,12 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
     BrickMeasure m;
     m.brick = brick;
     if (totals[i] >= 0)
-      m = {brick, std::bit_cast<float>(totals[i]), std::bit_cast<float>(errors[i]),
-           std::bit_cast<float>(slacks[i]), static_cast<std::uint32_t>(bits[i])};
+      m = {brick,
+           std::bit_cast<float>(totals[i]),
+           std::bit_cast<float>(errors[i]),
+           std::bit_cast<float>(slacks[i]),
+           static_cast<std::uint32_t>(bits[i]),
+           settings_.rate};
     out.push_back(m);
   }
   return out;
@@ -172,8 +176,12 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
     BrickClass c;
     c.base.brick = brick;
     if (totals[i] >= 0) {
-      c.base = {brick, std::bit_cast<float>(totals[i]), std::bit_cast<float>(errors0[i]),
-                std::bit_cast<float>(slacks[i]), 0};
+      c.base = {brick,
+                std::bit_cast<float>(totals[i]),
+                std::bit_cast<float>(errors0[i]),
+                std::bit_cast<float>(slacks[i]),
+                0,
+                settings_.rate};
       while (c.level < static_cast<int>(by_level.size()) && fails(by_level[at(c.level)][i])) ++c.level;
     }
     out.push_back(c);

@@ -21,7 +21,10 @@ struct GoldSettings {
   bool base_only = false;  ///< only fitted base samples are asked for: no slack, no other level
   /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
   float curvature = 0.0625f;
+  int coarse_rate = 0;     ///< of a coarser gold that shares this one's bounds of base cells; 0: none
   bool grid_only = false;  ///< slack counts as 0: the paper's test, for comparison
+
+  [[nodiscard]] int coarsest() const { return coarse_rate > 0 ? coarse_rate : rate; }
 };
 
 /// The largest granularity up to `wanted` that does not waste tiles on a grid thinner than a brick.

@@ -43,13 +43,14 @@ class Stopwatch {
 }  // namespace
 
 GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                       const FieldSups& sups, const GoldSettings& settings)
+                       const FieldSups& sups, const GoldSettings& settings, std::shared_ptr<CellBounds> cells)
     : state_(state),
       scan_(scan),
       upsampler_(upsampler),
       settings_(settings),
       coverage_(scan.geometry),
-      columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)) {
+      columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)),
+      cells_(std::move(cells)) {
   const std::int64_t g = settings.granularity;
   // Second differences look one node beyond a block, fits further.
   if (settings.midrange)
@@ -79,15 +80,21 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   const ColumnBlocks largest{
       side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}, {}};
   arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.u_filter);
-  if (!settings.base_only)
-    node_slack_.emplace(state, scan, upsampler, sups, settings_, arithmetic_,
-                        arithmetic_ - filter_error_bound(upsampler, scan, columns_));
+  if (settings.base_only) return;
+  if (!cells_) cells_ = std::make_shared<CellBounds>(state, scan, upsampler, sups, settings);
+  node_slack_.emplace(state, *cells_, scan, sups, settings_, arithmetic_,
+                      arithmetic_ - filter_error_bound(upsampler, scan, columns_));
 }
 
 GoldStream::~GoldStream() = default;
 
 std::uint64_t GoldStream::slab_bytes(std::int64_t cells_z) const {
   return upsampler_.slab_bytes(columns_, cells_z * settings_.rate + 1 + 2 * halo_);
+}
+
+std::int64_t GoldStream::padded_rows(std::int64_t height) const {
+  return static_cast<std::int64_t>(
+      opencl::round_up(count(height * settings_.granularity * settings_.rate + 1 + 2 * halo_), 16));
 }
 
 double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const {
@@ -109,7 +116,7 @@ std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8
     const std::int64_t height = std::min(slab_bricks_, bricks[2] - z0);
     std::map<std::array<std::int64_t, 2>, Work> large;
     std::vector<Work> small;
-    for (std::int64_t dz = 0; dz < height; ++dz) small.push_back({z0 + dz, 1, 1, 1, {}});
+    for (std::int64_t dz = 0; dz < height; ++dz) small.push_back({z0 + dz, 1, 1, 1, {}, {}});
     for (std::int64_t y0 = 0; y0 < bricks[1]; y0 += block_bricks_)
       for (std::int64_t x0 = 0; x0 < bricks[0]; x0 += block_bricks_) {
         const std::int64_t wx = std::min(block_bricks_, bricks[0] - x0),
@@ -122,13 +129,23 @@ std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8
         if (wanted.empty()) continue;
         if (static_cast<double>(wanted.size()) * samples(1, 1, 1) >= samples(wx, wy, height) ||
             block_bricks_ * slab_bricks_ == 1)
-          large.try_emplace({wx, wy}, Work{z0, height, wx, wy, {}}).first->second.first.push_back({x0, y0});
+          large.try_emplace({wx, wy}, Work{z0, height, wx, wy, {}, {}})
+              .first->second.first.push_back({x0, y0});
         else
           for (const auto& m : wanted) small[at(m[2] - z0)].first.push_back({m[0], m[1]});
       }
-    for (auto& [size, w] : large) all.push_back(std::move(w));
+    std::vector<Work> works;
+    for (auto& [size, w] : large) works.push_back(std::move(w));
     for (auto& w : small)
-      if (!w.first.empty()) all.push_back(std::move(w));
+      if (!w.first.empty()) works.push_back(std::move(w));
+    // Rows shared by all where that is fewer, and where a layer begins with a chunk of 16.
+    std::int64_t apart = 0;
+    for (const Work& w : works) apart += padded_rows(w.height);
+    const bool share = apart > padded_rows(height) && g * settings_.rate % 16 == 0;
+    for (Work& w : works) {
+      w.slab = share ? Slab{z0, height} : Slab{w.z, w.height};
+      all.push_back(std::move(w));
+    }
   }
   return all;
 }
@@ -154,9 +171,9 @@ double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& 
 GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose) {
   halo_ = purpose == For::samples ? fit_halo_ : 1;
   GoldWork out;
+  Slab slab;
   for (const Work& w : partition(selected)) {
-    out.rows += static_cast<double>(
-        opencl::round_up(count(w.height * settings_.granularity * settings_.rate + 1 + 2 * halo_), 16));
+    if (!(w.slab == std::exchange(slab, w.slab))) out.rows += static_cast<double>(padded_rows(w.slab.height));
     for (const auto& first : w.first)
       out.samples += samples(w.width_x, w.width_y, w.height) * kept_share(w, first);
   }
@@ -191,6 +208,7 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const Pass& pass
 void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                              const Known& known, const Progress& progress, const std::string& stage) {
   const std::vector<Work> all = partition(selected);
+  upsampled_ = {};  // an earlier run may have ended early
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
@@ -206,19 +224,23 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
       from += n;
       tick(static_cast<double>(n));
     }
-    if (from < w.first.size()) run_slab(w, from, selected, on_batch, tick);
+    if (from < w.first.size()) run_blocks(w, from, selected, on_batch, tick);
   }
+  upsampled_ = {};
+  projections_ = {};
+  if (cells_) cells_->end();
 }
 
 // A record says which blocks of which pass it is of: how many share a batch depends on the memory left, which
 // a resumed process need not have alike.
 Bytes GoldStream::record(std::int64_t pass, const Batch& batch, const Bytes& payload) const {
   ByteWriter out;
-  for (const std::int64_t n : {pass, batch.first_brick_.front()[2], batch.bricks_x_, batch.bricks_y_,
-                               batch.bricks_z_, batch.first_brick_.front()[0], batch.first_brick_.front()[1],
-                               static_cast<std::int64_t>(batch.blocks())})
+  for (const std::int64_t n :
+       {std::int64_t{settings_.rate}, pass, batch.first_brick_.front()[2], batch.bricks_x_, batch.bricks_y_,
+        batch.bricks_z_, batch.first_brick_.front()[0], batch.first_brick_.front()[1],
+        static_cast<std::int64_t>(batch.blocks())})
     out.put(n);
-  out.put(node_slack_ ? node_slack_->new_cells(batch.slab_, batch.first_brick_) : std::vector<float>{});
+  out.put(cells_ ? cells_->new_cells(batch.slab_, batch.first_brick_) : std::vector<float>{});
   Bytes bytes = out.take();
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   return bytes;
@@ -228,8 +250,8 @@ std::size_t GoldStream::replay(std::int64_t pass, const Work& work, std::size_t 
                                const std::function<void(ByteReader)>& apply) {
   ByteReader in(record);
   bool same = true;
-  for (const std::int64_t n :
-       {pass, work.z, work.width_x, work.width_y, work.height, work.first[from][0], work.first[from][1]})
+  for (const std::int64_t n : {std::int64_t{settings_.rate}, pass, work.z, work.width_x, work.width_y,
+                               work.height, work.first[from][0], work.first[from][1]})
     same = in.get<std::int64_t>() == n && same;
   const auto n = in.get<std::int64_t>();
   if (!same || n < 1 || count(n) > work.first.size() - from)
@@ -240,7 +262,7 @@ std::size_t GoldStream::replay(std::int64_t pass, const Work& work, std::size_t 
   for (std::size_t i = from; i < from + at(n); ++i)
     first.push_back({work.first[i][0], work.first[i][1], work.z});
   const auto cells = in.get_vector<float>();
-  if (node_slack_) node_slack_->restore(slab_of(work), first, cells);
+  if (cells_) cells_->restore(slab_of(work), first, cells);
   apply(in);
   return at(n);
 }
@@ -361,31 +383,44 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
 SlabShape GoldStream::slab_of(const Work& work) const {
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity;
-  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0};
+  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0, {}};
   slab.cells_z = std::min(work.height * g, grid.cells[2] - slab.cell_z);
   slab.z_first = grid.origin[2] + static_cast<double>(slab.cell_z) * grid.spacing[2];
   slab.stride = column_stride(slab.cells_z * settings_.rate + 17);
+  slab.slab = {work.slab.z * g, std::min(work.slab.height * g, grid.cells[2] - work.slab.z * g)};
   return slab;
 }
 
-void GoldStream::run_slab(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
-                          const OnBatch& on_batch, const std::function<void(double)>& tick) {
-  Stopwatch watch(state_);
+void GoldStream::upsample(const Slab& slab) {
+  if (slab == upsampled_) return;
+  projections_ = {};  // before the next one is allocated
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  const double hz = grid.spacing[2] / static_cast<double>(rate);
+  const double first = grid.origin[2] + static_cast<double>(slab.z * g) * grid.spacing[2];
+  const std::int64_t cells = std::min(slab.height * g, grid.cells[2] - slab.z * g);
+  projections_ = upsampler_(columns_, detector_rows(scan_.geometry, first - static_cast<double>(halo_) * hz,
+                                                    hz, cells * rate + 1 + 2 * halo_));
+  upsampled_ = slab;
+  spent_.work.rows += static_cast<double>(projections_.rows_padded);
+}
+
+void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
+                            const OnBatch& on_batch, const std::function<void(double)>& tick) {
+  Stopwatch watch(state_);
+  const Grid& grid = settings_.grid;
+  const std::int64_t g = settings_.granularity;
   const SlabShape slab = slab_of(work);
-  const double hx = grid.spacing[0] / static_cast<double>(rate),
-               hy = grid.spacing[1] / static_cast<double>(rate),
-               hz = grid.spacing[2] / static_cast<double>(rate);
-  const auto rows = detector_rows(scan_.geometry, slab.z_first - static_cast<double>(halo_) * hz, hz,
-                                  slab.cells_z * rate + 1 + 2 * halo_);
-  const UpsampledSlab projections = upsampler_(columns_, rows);
-  spent_.work.rows += static_cast<double>(projections.rows_padded);
+  const double hx = grid.spacing[0] / static_cast<double>(settings_.rate),
+               hy = grid.spacing[1] / static_cast<double>(settings_.rate);
+  upsample(work.slab);
   spent_.slab_seconds += watch.lap();
 
   Batch batch(state_, settings_);
   const std::int64_t together = begin_batch(batch, work, slab);
   ColumnBlocks columns{batch.shape_.nx + 2 * halo_, batch.shape_.ny + 2 * halo_, hx, hy, {}, {}};
+  columns.first_row = (work.z - work.slab.z) * g * settings_.rate;
+  columns.rows = batch.shape_.nz + 2 * halo_;
   for (std::size_t begin = from; begin < work.first.size(); begin += at(together)) {
     const std::size_t n = std::min(at(together), work.first.size() - begin);
     batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -400,7 +435,7 @@ void GoldStream::run_slab(const Work& work, std::size_t from, const std::vector<
     const std::vector<float> margins = this->margins(columns);
     columns.wanted = wanted(margins, columns.nx, columns.ny);
     batch.margin_.write(margins);
-    back_project(state_, scan_.geometry, projections, columns, settings_.u_filter, batch.gold_);
+    back_project(state_, scan_.geometry, projections_, columns, settings_.u_filter, batch.gold_);
     if (node_slack_)
       (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_,
                      batch.p_);
@@ -413,7 +448,7 @@ void GoldStream::run_slab(const Work& work, std::size_t from, const std::vector<
   spent_.block_seconds += watch.lap();
   if (node_slack_) {
     node_slack_->end();
-    const double tables = node_slack_->take_table_seconds();
+    const double tables = cells_->take_table_seconds();
     spent_.table_seconds += tables;
     spent_.block_seconds -= tables;
   }

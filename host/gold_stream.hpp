@@ -18,6 +18,7 @@
 
 #include "host/back_project.hpp"
 #include "host/bytes.hpp"
+#include "host/cell_bounds.hpp"
 #include "host/coverage.hpp"
 #include "host/device_field.hpp"
 #include "host/fit_coefficients.hpp"
@@ -48,7 +49,8 @@ struct BrickMeasure {
   float error = 0;   ///< largest |V - gold|
   float slack = 0;   ///< largest T + P to either side: what even gold may err
   std::uint32_t violated =
-      0;  ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
+      0;         ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
+  int rate = 0;  ///< of the gold
 };
 
 /// Result of the node test of one brick.
@@ -68,8 +70,10 @@ struct GoldSpent {
 
 class GoldStream {
  public:
+  /// `cells`: bounds of base cells that another stream of the same grid and rates in u has, of gold finer or
+  /// coarser (settings.coarse_rate); none: its own.
   GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
-             const GoldSettings& settings);
+             const GoldSettings& settings, std::shared_ptr<CellBounds> cells = nullptr);
   ~GoldStream();
 
   /// The blocks of one batch on the device, as handed to the callback.
@@ -101,6 +105,7 @@ class GoldStream {
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
   /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
   [[nodiscard]] double rounding_in_slack() const { return node_slack_ ? node_slack_->rounding() : 0; }
+  [[nodiscard]] const std::shared_ptr<CellBounds>& cells() const { return cells_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
@@ -111,10 +116,16 @@ class GoldStream {
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
-  // Equal blocks of one slab, by their first bricks.
+  // A run of brick layers whose rows are upsampled together.
+  struct Slab {
+    std::int64_t z = 0, height = 0;  // bricks
+    bool operator==(const Slab&) const = default;
+  };
+  // Equal blocks in one slab, by their first bricks.
   struct Work {
     std::int64_t z, height, width_x, width_y;  // bricks
     std::vector<std::array<std::int64_t, 2>> first;
+    Slab slab;
   };
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] std::vector<float> margins(const ColumnBlocks& columns) const;
@@ -122,13 +133,15 @@ class GoldStream {
                                                                 std::int64_t nx, std::int64_t ny) const;
   std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
+  [[nodiscard]] std::int64_t padded_rows(std::int64_t height) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   // How many blocks of a work, from the given one on, need not be computed.
   using Known = std::function<std::size_t(const Work&, std::size_t)>;
   void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
                    const Progress& progress, const std::string& stage);
-  void run_slab(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
-                const OnBatch& on_batch, const std::function<void(double)>& tick);
+  void upsample(const Slab& slab);
+  void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
+                  const OnBatch& on_batch, const std::function<void(double)>& tick);
   [[nodiscard]] SlabShape slab_of(const Work& work) const;
   [[nodiscard]] Bytes record(std::int64_t pass, const Batch& batch, const Bytes& payload) const;
   std::size_t replay(std::int64_t pass, const Work& work, std::size_t from, const Bytes& record,
@@ -142,9 +155,12 @@ class GoldStream {
   UpsampledColumns columns_;
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
+  Slab upsampled_;                        // what projections_ holds, in a run
+  UpsampledSlab projections_;
   GoldSpent spent_;
   std::int64_t passes_ = 0;  // begun with a journal
   double arithmetic_ = 0;
+  std::shared_ptr<CellBounds> cells_;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
 

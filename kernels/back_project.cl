@@ -6,7 +6,7 @@
 // tile of neighbours in x and y: position, index and weights are shared by the whole column, and the loads
 // are contiguous. Positions are relative to the block, so fp32 holds them (docs/error-bounds.md). rows
 // int2[block][y]: the first and last column of that row (and of the tile's rows above it) that anyone wants.
-// Called by host/back_project.cpp.
+// first_chunk: where in filtered the rows wanted begin. Called by host/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #include "shared/lanes.h"
@@ -89,7 +89,7 @@
 
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
                            __global const int2* rows, int views, int columns, int z_padded, int out_stride,
-                           int nx, int ny, int blocks) {
+                           int nx, int ny, int blocks, int first_chunk) {
   const int z = (int)get_global_id(0) * (VDVR_LANES * VDVR_VECTORS);
   const int x = (int)get_global_id(1) * TILE_X;
   const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
@@ -102,7 +102,7 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
 
   const TILE tile_x = (float)x + OFFSET_X, tile_y = (float)y + OFFSET_Y;
   FOR_TILE(CLEAR)
-  __global const float* plane = filtered + (size_t)(z / 16) * views * columns * 16 + z % 16;
+  __global const float* plane = filtered + (size_t)(first_chunk + z / 16) * views * columns * 16 + z % 16;
   // From one vector of z to the next, in the same chunk or the next one; beyond the last the same one again.
   const int next = z + VDVR_LANES;
   const size_t above = next >= z_padded ? 0

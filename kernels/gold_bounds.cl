@@ -66,10 +66,11 @@ __kernel void dilate_table(__global float2* out, __global const float2* table, _
 }
 
 // The bound of each cell: for each view the dilated table's entry under the cell's centre.
+// first_z: the table's cell that the blocks begin at.
 // steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}.
 __kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps,
                             int views, int columns, int cells_x, int cells_y, int cells_z, int blocks,
-                            float factor) {
+                            int first_z, float factor) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cells_z, z = (int)get_global_id(2) - block * cells_z;
   if (x >= cells_x || y >= cells_y || block >= blocks) return;
@@ -77,7 +78,7 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
   for (int k = 0; k < views; ++k) {
     const float4 step = steps[(size_t)block * views + k];
     const int n = clamp((int)floor(step.z + step.x * (float)x + step.y * (float)y), 0, columns - 1);
-    sum += table[((size_t)z * views + k) * columns + n];
+    sum += table[((size_t)(first_z + z) * views + k) * columns + n];
   }
   p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
 }
@@ -115,12 +116,11 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
     low = fmin(low, v);                 \
     high = fmax(high, v);               \
   }
-#define CORNERS(M)                                                              \
-  M(at)                                                                         \
-  M(at + 1)                                                                     \
-  M(at + gold_stride)                                                           \
-  M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) \
-      M(at + row + gold_stride + 1)
+#define CORNERS(M)    \
+  M(at)               \
+  M(at + 1)           \
+  M(at + gold_stride) \
+  M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) M(at + row + gold_stride + 1)
 
 // Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it
 // lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
