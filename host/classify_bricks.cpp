@@ -59,13 +59,13 @@ Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
 }
 
 ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
-                               Journal* journal, const Progress& progress, Refuse refuse)
+                               Journal* journal, Progress progress, Refuse refuse)
     : state_(state),
       gold_(gold),
       bricks_(bricks),
       host_(host),
       journal_(journal),
-      progress_(progress),
+      progress_(std::move(progress)),
       refuse_(std::move(refuse)) {}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {

@@ -46,9 +46,9 @@ class ClassifyBricks {
   /// Called with the slack of a brick that even gold cannot bring within the tolerance.
   using Refuse = std::function<void(float slack, double tolerance)>;
 
-  /// Everything is referred to. `bricks`: levels, involved and tiles are written.
+  /// All but `progress` is referred to. `bricks`: levels, involved and tiles are written.
   ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
-                 Journal* journal, const Progress& progress, Refuse refuse);
+                 Journal* journal, Progress progress, Refuse refuse);
 
   /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
   /// that stay at level 0 are measured on the stored base samples, which closing does not change.
@@ -95,7 +95,7 @@ class ClassifyBricks {
   OpenBricks& bricks_;
   HostMemory& host_;
   Journal* journal_;
-  const Progress& progress_;
+  Progress progress_;
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;
   std::vector<float> coarse_slack_;  // by brick; negative: not known

@@ -2,9 +2,12 @@
 #include "host/foresee.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <random>
+
+#include "host/host_memory.hpp"
 
 namespace vdvr {
 namespace {
@@ -58,32 +61,14 @@ int stratum_of(double error, double tolerance) {
       std::clamp(std::round(2 * std::log2(std::max(error / tolerance, 1e-9))), -8.0, 16.0));
 }
 
+// What becomes of a brick: level 0 by coarse gold or by fine, a tile from coarse gold or from fine.
+enum Fate { coarse_stays, fine_stays, coarse_refined, fine_refined, fates };
+
 struct Stratum {
   std::vector<std::int64_t> bricks, candidates;  // all, and those in the layers looked at
-  double seen = 0, tile_samples = 0, refined = 0;
+  double seen = 0, tile_samples = 0;
+  std::array<double, fates> share{};  // of the bricks seen
 };
-
-// Levels of the selected bricks, with the tiles extracted as build does.
-template <class Visit>
-void classify(opencl::State& state, GoldStream& stream, const DeviceField& field, double tolerance,
-              const std::vector<std::uint8_t>& selected, Visit&& visit) {
-  const opencl::DeviceArray<std::uint8_t> on_device(state, std::span<const std::uint8_t>(selected),
-                                                    "sampled bricks");
-  stream.run(
-      selected,
-      [&](GoldStream::Batch& batch) {
-        const auto classes = batch.classify(field, static_cast<float>(tolerance), on_device);
-        std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
-        for (const BrickClass& c : classes) {
-          const int level = c.base.total < 0 ? 0 : c.level;
-          const auto l = static_cast<std::uint8_t>(level);
-          if (level > 0) tiles.emplace_back(c.base.brick, LevelTriple{l, l, l});
-          visit(c.base.brick, level);
-        }
-        batch.extract(tiles);
-      },
-      {}, "foresee", GoldStream::For::samples);
-}
 
 // Whole blocks of the middle slab, at several radii.
 std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n) {
@@ -105,40 +90,46 @@ std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n)
   return selected;
 }
 
-GoldSpent difference(const GoldSpent& after, const GoldSpent& before) {
-  GoldSpent d = after;
-  d.work.rows -= before.work.rows;
-  d.work.samples -= before.work.samples;
-  d.slab_seconds -= before.slab_seconds;
-  d.table_seconds -= before.table_seconds;
-  d.block_seconds -= before.block_seconds;
-  return d;
+// Seconds per upsampled row and per gold sample.
+struct Pace {
+  double row = 0, sample = 0;
+  [[nodiscard]] double operator()(const GoldWork& work) const {
+    return work.rows * row + work.samples * sample;
+  }
+};
+
+Pace pace_of(const GoldSpent& s) {
+  return {(s.slab_seconds + s.table_seconds) / std::max(1.0, s.work.rows),
+          s.block_seconds / std::max(1.0, s.work.samples)};
 }
 
-double seconds_of(const GoldWork& work, const GoldSpent& spent, bool tables) {
-  return work.rows * (spent.slab_seconds + (tables ? spent.table_seconds : 0)) /
-             std::max(1.0, spent.work.rows) +
-         work.samples * spent.block_seconds / std::max(1.0, spent.work.samples);
-}
+// How fast each stream was at each purpose; where one had nothing to do, nothing is foreseen for it either.
+class Paces {
+ public:
+  explicit Paces(GoldRates& gold) : gold_(gold) { reset(); }
+  // What was done before does not count.
+  void reset() {
+    for (const bool fine : {false, true})
+      for (const auto purpose : {GoldStream::For::samples, GoldStream::For::measuring})
+        if (GoldStream* s = stream(fine)) before_[{fine, purpose}] = s->spent(purpose);
+  }
+  double seconds(bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
+    GoldStream* s = stream(fine);
+    if (!s) return 0;
+    GoldSpent spent = s->spent(purpose);
+    spent -= before_[{fine, purpose}];
+    return pace_of(spent)(s->work(bricks, purpose));
+  }
 
-}  // namespace
+ private:
+  GoldStream* stream(bool fine) { return fine ? &gold_.fine() : gold_.coarse(); }
+  GoldRates& gold_;
+  std::map<std::pair<bool, GoldStream::For>, GoldSpent> before_;
+};
 
-Foreseen foresee_build(opencl::State& state, GoldStream& stream, const Volume& base, double tolerance) {
-  const GoldSettings& settings = stream.settings();
-  const Index3 n = bricks_of(settings);
-  const std::vector<std::uint8_t> near = stream.bricks_near_coverage();
-  const DeviceField field(state, as_mixed(base, settings.granularity));
-
-  // Time, after one brick that builds kernels.
-  std::vector<std::uint8_t> one(near.size(), 0);
-  one[at((n[2] / 2 * n[1] + n[1] / 2) * n[0] + n[0] / 2)] = 1;
-  classify(state, stream, field, tolerance, one, [](std::int64_t, int) {});
-  const GoldSpent warm = stream.spent();
-  classify(state, stream, field, tolerance, some_blocks(stream, n), [](std::int64_t, int) {});
-  const GoldSpent large = difference(stream.spent(), warm);
-
-  // Storage.
-  const auto error = expected_error(base, settings.granularity, n);
+// The strata of the bricks, and which of them to look at.
+std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const std::vector<double>& error,
+                                 double tolerance, const Index3& n) {
   const std::int64_t looked_at = std::min(layers, n[2]);
   std::vector<std::uint8_t> in_layer(at(n[2]), 0);
   for (std::int64_t i = 0; i < looked_at; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * looked_at))] = 1;
@@ -157,40 +148,100 @@ Foreseen foresee_build(opencl::State& state, GoldStream& stream, const Volume& b
   double all_weights = 0;
   for (const auto& [key, s] : strata) all_weights += weight(key, s);
   std::mt19937 random(1);
-  std::vector<std::uint8_t> sampled(near.size(), 0);
   for (auto& [key, s] : strata) {
     std::shuffle(s.candidates.begin(), s.candidates.end(), random);
     const double wanted = std::max(fewest_of_stratum, sampled_bricks * weight(key, s) / all_weights);
     s.candidates.resize(std::min(s.candidates.size(), static_cast<std::size_t>(wanted)));
-    for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
+    // Bricks that err more lie together, as those that are refined do.
+    std::stable_sort(s.bricks.begin(), s.bricks.end(),
+                     [&](std::int64_t a, std::int64_t b) { return error[at(a)] > error[at(b)]; });
   }
-  const GoldSpent before = stream.spent();
-  classify(state, stream, field, tolerance, sampled, [&](std::int64_t brick, int level) {
-    Stratum& s = strata[stratum_of(error[at(brick)], tolerance)];
-    s.seen += 1;
-    s.refined += level > 0 ? 1 : 0;
-    s.tile_samples += level > 0 ? std::pow((settings.granularity << level) + 1, 3) : 0.0;
-  });
-  const GoldSpent small = difference(stream.spent(), before);
+  return strata;
+}
+
+}  // namespace
+
+Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base, double tolerance) {
+  const GoldSettings& settings = gold.fine().settings();
+  const Index3 n = bricks_of(settings);
+  const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
+  const DeviceField field(state, as_mixed(base, settings.granularity));
+  HostMemory host(state);
+  const auto classify = [&](const std::vector<std::uint8_t>& selected) {
+    OpenBricks bricks{base.grid, settings.granularity, settings.rate, {}, {}, {}, {}, {}, false};
+    bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
+    bricks.involved.assign(near.size(), 0);
+    bricks.samples.resize(near.size());
+    ClassifyBricks test(state, gold, bricks, host, nullptr, {}, [](float, double) {});
+    test.classify(field, tolerance, selected);
+    std::vector<std::pair<int, BrickMeasure>> out;
+    for (std::size_t i = 0; i < near.size(); ++i) out.emplace_back(bricks.level[i][0], test.measures()[i]);
+    return out;
+  };
+
+  // One brick builds the kernels; then whole blocks tell the pace of the first pass, and bricks of every
+  // stratum what follows it.
+  std::vector<std::uint8_t> one(near.size(), 0);
+  one[at((n[2] / 2 * n[1] + n[1] / 2) * n[0] + n[0] / 2)] = 1;
+  classify(one);
+  const bool screens = gold.coarse() != nullptr;
+  GoldStream& first = screens ? *gold.coarse() : gold.fine();
+  const auto first_purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
+  Paces large(gold);
+  classify(some_blocks(first, n));
+  const double first_pass = large.seconds(!screens, first_purpose, near);
+
+  const auto error = expected_error(base, settings.granularity, n);
+  std::map<int, Stratum> strata = strata_of(near, error, tolerance, n);
+  std::vector<std::uint8_t> sampled(near.size(), 0);
+  for (const auto& [key, s] : strata)
+    for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
+  Paces small(gold);
+  const auto classes = classify(sampled);
+  for (auto& [key, s] : strata)
+    for (const std::int64_t i : s.candidates) {
+      const auto& [level, m] = classes[at(i)];
+      s.seen += 1;
+      s.tile_samples += level > 0 ? std::pow((settings.granularity << level) + 1, 3) : 0.0;
+      const bool fine = m.rate == settings.rate;
+      if (m.total >= 0)
+        s.share[level > 0 ? (fine ? fine_refined : coarse_refined) : fine ? fine_stays : coarse_stays] += 1;
+    }
 
   // A stratum without a brick in the layers takes after the one below it.
-  double tile_samples = 0, mean = 0, share = 0;
-  std::vector<std::uint8_t> refined(near.size(), 0);
-  std::uniform_real_distribution<double> unit(0, 1);
+  double tile_samples = 0, mean = 0;
+  std::array<double, fates> share{};
+  std::array<std::vector<std::uint8_t>, fates> bricks;
+  for (auto& b : bricks) b.assign(near.size(), 0);
   for (const auto& [key, s] : strata) {
     if (s.seen > 0) {
       mean = s.tile_samples / s.seen;
-      share = s.refined / s.seen;
+      for (std::size_t f = 0; f < fates; ++f) share[f] = s.share[f] / s.seen;
     }
     tile_samples += mean * static_cast<double>(s.bricks.size());
-    for (const std::int64_t i : s.bricks) refined[at(i)] = unit(random) < share ? 1 : 0;
+    std::size_t next = 0;
+    for (const Fate fate : {fine_refined, coarse_refined, fine_stays})
+      for (double i = 0; i < share[fate] * static_cast<double>(s.bricks.size()) && next < s.bricks.size();
+           ++i)
+        bricks[fate][at(s.bricks[next++])] = 1;
   }
   Foreseen out;
   const auto samples = static_cast<double>(base.samples.size());
   out.samples_ratio = (samples + static_cast<double>(near.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
-  out.seconds = seconds_of(stream.work(near, GoldStream::For::samples), large, true) +
-                seconds_of(stream.work(refined, GoldStream::For::measuring), small, false);
+  out.seconds = first_pass;
+  const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {
+    out.seconds += small.seconds(fine, purpose, bricks[fate]);
+  };
+  using For = GoldStream::For;
+  if (screens) {
+    add(true, For::measuring, fine_stays);
+    add(false, For::samples, coarse_refined);
+    add(true, For::samples, fine_refined);
+  }
+  // Verification.
+  add(false, For::measuring, coarse_refined);
+  add(true, For::measuring, fine_refined);
   return out;
 }
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "host/gold_stream.hpp"
+#include "host/classify_bricks.hpp"
 
 namespace vdvr {
 
@@ -17,6 +17,6 @@ struct Foreseen {
 /// which tells the storage. `base` holds the base samples, `tolerance` is what the node test may take.
 /// Raising bricks after closing is not foreseen: it concerns few. Cost: about 1 % of the build, and six
 /// layers of rows.
-Foreseen foresee_build(opencl::State& state, GoldStream& stream, const Volume& base, double tolerance);
+Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base, double tolerance);
 
 }  // namespace vdvr

@@ -128,6 +128,7 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
     const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
     BrickMeasure m;
     m.brick = brick;
+    m.rate = settings_.rate;
     if (totals[i] >= 0)
       m = {brick,
            std::bit_cast<float>(totals[i]),
@@ -175,6 +176,7 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
     const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
     BrickClass c;
     c.base.brick = brick;
+    c.base.rate = settings_.rate;
     if (totals[i] >= 0) {
       c.base = {brick,
                 std::bit_cast<float>(totals[i]),

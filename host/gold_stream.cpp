@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/gold_blocks.hpp"
 #include "host/parallel.hpp"
 #include "host/reconstruct_field.hpp"
 #include "vdvr/error.hpp"
@@ -60,6 +61,8 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   // --max-memory.
   block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
   slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
+  // Tables of bounds are as large for coarse gold as for fine.
+  if (!settings.base_only) slab_bricks_ = std::clamp<std::int64_t>(32 / g, 1, slab_bricks_);
   while (slab_bricks_ > 1 &&
          slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() / 2, state.info.max_allocation))
     slab_bricks_ /= 2;
@@ -105,45 +108,28 @@ double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int6
          static_cast<double>(opencl::round_up(count(nz + more), 16));
 }
 
-// Work by slab: as large blocks, or brick by brick where few of a block's bricks are wanted: whichever
-// computes fewer samples, halos included. Blocks at the grid's end are cut to it.
+// Work by slab, equal blocks together.
 std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8_t>& selected) const {
   const std::int64_t g = settings_.granularity;
   Index3 bricks{};
   for (std::size_t a = 0; a < 3; ++a) bricks[a] = (settings_.grid.cells[a] + g - 1) / g;
+  std::map<std::int64_t, std::vector<Work>> by_slab;
+  for (const BrickBox& box : cover_bricks(bricks, selected, block_bricks(),
+                                          [&](const Index3& n) { return samples(n[0], n[1], n[2]); })) {
+    std::vector<Work>& works = by_slab[box.first[2] / slab_bricks_];
+    if (works.empty() || works.back().z != box.first[2] || works.back().size() != box.size)
+      works.push_back({box.first[2], box.size[2], box.size[0], box.size[1], {}, {}});
+    works.back().first.push_back({box.first[0], box.first[1]});
+  }
   std::vector<Work> all;
-  for (std::int64_t z0 = 0; z0 < bricks[2]; z0 += slab_bricks_) {
-    const std::int64_t height = std::min(slab_bricks_, bricks[2] - z0);
-    std::map<std::array<std::int64_t, 2>, Work> large;
-    std::vector<Work> small;
-    for (std::int64_t dz = 0; dz < height; ++dz) small.push_back({z0 + dz, 1, 1, 1, {}, {}});
-    for (std::int64_t y0 = 0; y0 < bricks[1]; y0 += block_bricks_)
-      for (std::int64_t x0 = 0; x0 < bricks[0]; x0 += block_bricks_) {
-        const std::int64_t wx = std::min(block_bricks_, bricks[0] - x0),
-                           wy = std::min(block_bricks_, bricks[1] - y0);
-        std::vector<std::array<std::int64_t, 3>> wanted;
-        for (std::int64_t z = z0; z < z0 + height; ++z)
-          for (std::int64_t y = y0; y < y0 + wy; ++y)
-            for (std::int64_t x = x0; x < x0 + wx; ++x)
-              if (selected[at((z * bricks[1] + y) * bricks[0] + x)]) wanted.push_back({x, y, z});
-        if (wanted.empty()) continue;
-        if (static_cast<double>(wanted.size()) * samples(1, 1, 1) >= samples(wx, wy, height) ||
-            block_bricks_ * slab_bricks_ == 1)
-          large.try_emplace({wx, wy}, Work{z0, height, wx, wy, {}, {}})
-              .first->second.first.push_back({x0, y0});
-        else
-          for (const auto& m : wanted) small[at(m[2] - z0)].first.push_back({m[0], m[1]});
-      }
-    std::vector<Work> works;
-    for (auto& [size, w] : large) works.push_back(std::move(w));
-    for (auto& w : small)
-      if (!w.first.empty()) works.push_back(std::move(w));
+  for (auto& [index, works] : by_slab) {
+    const Slab whole{index * slab_bricks_, std::min(slab_bricks_, bricks[2] - index * slab_bricks_)};
     // Rows shared by all where that is fewer, and where a layer begins with a chunk of 16.
     std::int64_t apart = 0;
     for (const Work& w : works) apart += padded_rows(w.height);
-    const bool share = apart > padded_rows(height) && g * settings_.rate % 16 == 0;
+    const bool share = apart > padded_rows(whole.height) && g * settings_.rate % 16 == 0;
     for (Work& w : works) {
-      w.slab = share ? Slab{z0, height} : Slab{w.z, w.height};
+      w.slab = share ? whole : Slab{w.z, w.height};
       all.push_back(std::move(w));
     }
   }
@@ -168,8 +154,13 @@ double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& 
   return static_cast<double>(kept) / (raster * raster);
 }
 
-GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose) {
+void GoldStream::begin(For purpose) {
+  purpose_ = purpose;
   halo_ = purpose == For::samples ? fit_halo_ : 1;
+}
+
+GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose) {
+  begin(purpose);
   GoldWork out;
   Slab slab;
   for (const Work& w : partition(selected)) {
@@ -182,14 +173,14 @@ GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
-  halo_ = purpose == For::samples ? fit_halo_ : 1;
+  begin(purpose);
   run_unknown(
       selected, on_batch, [](const Work&, std::size_t) { return 0; }, progress, stage);
 }
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const Pass& pass, Journal* journal,
                      const Progress& progress, const std::string& stage, For purpose) {
-  halo_ = purpose == For::samples ? fit_halo_ : 1;
+  begin(purpose);
   const std::int64_t number = passes_++;
   run_unknown(
       selected,
@@ -402,7 +393,7 @@ void GoldStream::upsample(const Slab& slab) {
   projections_ = upsampler_(columns_, detector_rows(scan_.geometry, first - static_cast<double>(halo_) * hz,
                                                     hz, cells * rate + 1 + 2 * halo_));
   upsampled_ = slab;
-  spent_.work.rows += static_cast<double>(projections_.rows_padded);
+  spent_[at(static_cast<std::int64_t>(purpose_))].work.rows += static_cast<double>(projections_.rows_padded);
 }
 
 void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
@@ -414,7 +405,7 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
   const double hx = grid.spacing[0] / static_cast<double>(settings_.rate),
                hy = grid.spacing[1] / static_cast<double>(settings_.rate);
   upsample(work.slab);
-  spent_.slab_seconds += watch.lap();
+  spent_[at(static_cast<std::int64_t>(purpose_))].slab_seconds += watch.lap();
 
   Batch batch(state_, settings_);
   const std::int64_t together = begin_batch(batch, work, slab);
@@ -441,16 +432,16 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
                      batch.p_);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
-      spent_.work.samples +=
+      spent_[at(static_cast<std::int64_t>(purpose_))].work.samples +=
           samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
     tick(static_cast<double>(n));
   }
-  spent_.block_seconds += watch.lap();
+  spent_[at(static_cast<std::int64_t>(purpose_))].block_seconds += watch.lap();
   if (node_slack_) {
     node_slack_->end();
     const double tables = cells_->take_table_seconds();
-    spent_.table_seconds += tables;
-    spent_.block_seconds -= tables;
+    spent_[at(static_cast<std::int64_t>(purpose_))].table_seconds += tables;
+    spent_[at(static_cast<std::int64_t>(purpose_))].block_seconds -= tables;
   }
 }
 

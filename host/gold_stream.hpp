@@ -66,6 +66,14 @@ struct GoldWork {
 struct GoldSpent {
   GoldWork work;
   double slab_seconds = 0, table_seconds = 0, block_seconds = 0;
+  GoldSpent& operator-=(const GoldSpent& earlier) {
+    work.rows -= earlier.work.rows;
+    work.samples -= earlier.work.samples;
+    slab_seconds -= earlier.slab_seconds;
+    table_seconds -= earlier.table_seconds;
+    block_seconds -= earlier.block_seconds;
+    return *this;
+  }
 };
 
 class GoldStream {
@@ -81,8 +89,8 @@ class GoldStream {
   using OnBatch = std::function<void(Batch&)>;
 
   /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a
-  /// block without a selected brick is skipped, and a few selected bricks are streamed as blocks of one
-  /// brick. Fitted samples look further around a block than measuring does.
+  /// block without a selected brick is skipped, and one with few is cut to smaller ones around them. Fitted
+  /// samples look further around a block than measuring does.
   enum class For { samples, measuring };
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
            const std::string& stage, For purpose = For::measuring);
@@ -111,8 +119,10 @@ class GoldStream {
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
   /// What `run` would compute for these bricks.
   [[nodiscard]] GoldWork work(const std::vector<std::uint8_t>& selected, For purpose);
-  /// What it has computed so far, and what that took.
-  [[nodiscard]] const GoldSpent& spent() const { return spent_; }
+  /// What it has computed so far for a purpose, and what that took.
+  [[nodiscard]] const GoldSpent& spent(For purpose) const {
+    return spent_[static_cast<std::size_t>(purpose)];
+  }
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
@@ -126,6 +136,7 @@ class GoldStream {
     std::int64_t z, height, width_x, width_y;  // bricks
     std::vector<std::array<std::int64_t, 2>> first;
     Slab slab;
+    [[nodiscard]] Index3 size() const { return {width_x, width_y, height}; }
   };
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] std::vector<float> margins(const ColumnBlocks& columns) const;
@@ -139,6 +150,7 @@ class GoldStream {
   using Known = std::function<std::size_t(const Work&, std::size_t)>;
   void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
                    const Progress& progress, const std::string& stage);
+  void begin(For purpose);
   void upsample(const Slab& slab);
   void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
@@ -157,8 +169,9 @@ class GoldStream {
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
   Slab upsampled_;                        // what projections_ holds, in a run
   UpsampledSlab projections_;
-  GoldSpent spent_;
-  std::int64_t passes_ = 0;  // begun with a journal
+  For purpose_ = For::measuring;    // of this run
+  std::array<GoldSpent, 2> spent_;  // by purpose
+  std::int64_t passes_ = 0;         // begun with a journal
   double arithmetic_ = 0;
   std::shared_ptr<CellBounds> cells_;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted

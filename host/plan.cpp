@@ -318,11 +318,14 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
   // all.
   const bool grid_only = settings.terms == "grid";
-  const auto stream_at = [&](const Rates& r) {
+  const auto settings_at = [&](const Rates& r) {
     GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
     s.midrange = settings.coefficients == "midrange";
     s.grid_only = grid_only;
-    return GoldStream(state, filtered, upsampler, sups, s);
+    return s;
+  };
+  const auto stream_at = [&](const Rates& r) {
+    return GoldStream(state, filtered, upsampler, sups, settings_at(r));
   };
   std::optional<std::pair<Rates, Trial>> chosen, finest;
   for (const Rates& r : all) {
@@ -379,18 +382,19 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   if (settings.coefficients == "midrange") {
     start = now();
     plan.fitted = plan.base.samples;
-    GoldStream stream = stream_at(r);
-    fit_base_samples(state, filtered, upsampler, sups, stream.settings(), stream.bricks_near_coverage(),
+    fit_base_samples(state, filtered, upsampler, sups, settings_at(r), stream_at(r).bricks_near_coverage(),
                      plan.fitted, {});
     preparation += since(start);
   }
   if (settings.foresee) {
-    GoldStream stream = stream_at(r);
+    GoldRates gold(state, filtered, upsampler, sups, settings_at(r));
     const Foreseen foreseen =
-        foresee_build(state, stream, plan.fitted.empty() ? plan.base : Volume{grid, plan.fitted},
+        foresee_build(state, gold, plan.fitted.empty() ? plan.base : Volume{grid, plan.fitted},
                       plan.epsilon_abs - t.arithmetic);
     plan.samples_ratio = foreseen.samples_ratio;
-    plan.seconds = preparation + foreseen.seconds;
+    start = now();
+    probe_sampler(device);  // as build will
+    plan.seconds = preparation + foreseen.seconds + since(start);
     // What the trial took, the scan and the base samples twice included; the base samples once more, the
     // stored field on the device, and the tiles before and after closing.
     plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan.base.samples.size();

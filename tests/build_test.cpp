@@ -341,7 +341,7 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
   Device device("", 20 << 20);
   PlanSettings sampled;
   sampled.coefficients = "sampled";
-  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.15, {}}, sampled);
+  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.1, {}}, sampled);
   BuildOptions options;
   options.granularity = 2;
   options.storage = StorageChoice::f32;

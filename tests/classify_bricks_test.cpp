@@ -1,0 +1,158 @@
+// The node test at two rates of gold against the fine rate alone: what coarse gold accepts is within the
+// tolerance.
+#define BOOST_TEST_MODULE classify_bricks
+#include "host/classify_bricks.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+
+#include "host/reconstruct_field.hpp"
+#include "tests/support/attack_chain.hpp"
+#include "tests/support/scans.hpp"
+#include "vdvr/simulate.hpp"
+
+namespace vdvr {
+namespace {
+
+using testing::noise_scan;
+
+ProjectionSet simulated(const Phantom& phantom, std::int64_t columns, std::int64_t rows, int angles) {
+  SimulateOptions options;
+  options.columns = columns;
+  options.rows = rows;
+  options.angles = angles;
+  return simulate(phantom, options);
+}
+
+Grid grid_around_axis(const Index3& cells, double spacing) {
+  Grid grid;
+  grid.cells = cells;
+  grid.spacing = {spacing, spacing, spacing};
+  for (std::size_t a = 0; a < 3; ++a) grid.origin[a] = -0.5 * spacing * static_cast<double>(cells[a]);
+  return grid;
+}
+
+// A build up to its levels, measured once more on the fine gold.
+struct Case {
+  Case(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range)
+      : chain(scan),
+        state(attacks::device().state()),
+        base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, "cubic", {})),
+        host(state),
+        gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate)),
+        classify(state, gold, bricks, host, nullptr, {},
+                 [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
+    const auto [low, high] = std::minmax_element(base.samples.begin(), base.samples.end());
+    tolerance = tolerance_of_range * static_cast<double>(*high - *low);
+    const GoldSettings& s = gold.fine().settings();
+    const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
+    bricks = {grid, s.granularity, s.rate, base.samples, {}, {}, {}, {}, false};
+    bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
+    bricks.involved.assign(near.size(), 0);
+    bricks.samples.resize(near.size());
+    const DeviceField field(state, as_mixed(base, s.granularity));
+    classify.classify(field, tolerance, near);
+    decided = classify.measures();
+    classify.sharpen(field, tolerance);
+    const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
+    fine.resize(near.size());
+    gold.fine().run(
+        near,
+        [&](GoldStream::Batch& batch) {
+          for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), selected))
+            fine[static_cast<std::size_t>(m.brick)] = m;
+        },
+        {}, "fine");
+  }
+  static GoldSettings settings_of(const Grid& grid, int rate) {
+    GoldSettings s{grid, 2, rate, 8, "cubic"};
+    s.midrange = true;
+    return s;
+  }
+  [[nodiscard]] bool stays(std::size_t i) const {
+    return bricks.involved[i] && bricks.level[i] == LevelTriple{0, 0, 0};
+  }
+
+  attacks::Chain chain;
+  opencl::State& state;
+  Volume base;
+  HostMemory host;
+  GoldRates gold;
+  OpenBricks bricks;
+  ClassifyBricks classify;
+  double tolerance = 0;
+  std::vector<BrickMeasure> decided, fine;
+};
+
+// Rounding of gold and of the sampler differs between blocks of different sizes.
+double rounding(Case& c) { return 2 * c.gold.fine().arithmetic(); }
+
+// Returns how many bricks coarse gold decided.
+std::size_t check(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range) {
+  Case c(scan, grid, rate, tolerance_of_range);
+  BOOST_REQUIRE(c.gold.coarse() != nullptr);
+  std::size_t by_coarse = 0, refined = 0;
+  double largest = 0, reported = 0;
+  for (std::size_t i = 0; i < c.decided.size(); ++i) {
+    if (!c.bricks.involved[i]) continue;
+    const BrickMeasure& m = c.decided[i];
+    if (!c.stays(i)) {
+      ++refined;
+      // Refined because the fine test fails, too. (Slack at a brick's border grows with the block around it.)
+      BOOST_TEST(static_cast<double>(c.fine[i].total) > c.tolerance - rounding(c));
+      continue;
+    }
+    BOOST_TEST(static_cast<double>(m.total) <= c.tolerance);
+    if (m.rate < rate) {
+      ++by_coarse;
+      // The theorem of the coarse rate speaks of the fine nodes too.
+      BOOST_TEST(static_cast<double>(c.fine[i].error) <= static_cast<double>(m.total) + rounding(c));
+      // And `verify` agrees.
+      BOOST_TEST(static_cast<double>(c.fine[i].total) <= c.tolerance + rounding(c));
+    }
+    largest = std::max(largest, static_cast<double>(c.fine[i].error));
+    const BrickMeasure& last = c.classify.measures()[i];
+    if (last.rate == rate) reported = std::max(reported, static_cast<double>(last.error));
+  }
+  BOOST_TEST_MESSAGE(by_coarse << " bricks by coarse gold, " << refined << " refined of "
+                               << c.decided.size());
+  BOOST_TEST(std::abs(largest - reported) <= rounding(c));
+  return by_coarse;
+}
+
+BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_noise_is_within_the_tolerance) {
+  const ProjectionSet scan = noise_scan(20, 14, 17, 5);
+  for (const int rate : {4, 8, 16})
+    for (const double share : {0.1, 0.15, 0.25})
+      check(scan, grid_around_axis({10, 10, 11}, 0.7), rate, share);
+}
+
+BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_phantoms_is_within_the_tolerance) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  for (const double share : {0.03, 0.1, 0.2})
+    BOOST_TEST(check(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, share) > 0u);
+  const ProjectionSet head = simulated(shepp_logan(10), 21, 17, 30);
+  for (const double share : {0.08, 0.2})
+    BOOST_TEST(check(head, grid_around_axis({16, 16, 12}, 0.9), 8, share) > 0u);
+}
+
+BOOST_AUTO_TEST_CASE(comparison_without_slack_and_windows_take_the_fine_gold_alone) {
+  const ProjectionSet scan = noise_scan(12, 9, 11, 7);
+  attacks::Chain chain(scan);
+  GoldSettings settings = Case::settings_of(grid_around_axis({6, 6, 6}, 0.7), 8);
+  opencl::State& state = attacks::device().state();
+  const auto has_coarse = [&](const GoldSettings& s) {
+    return GoldRates(state, chain.filtered, chain.upsampler, chain.sups, s).coarse() != nullptr;
+  };
+  BOOST_TEST(has_coarse(settings));
+  GoldSettings grid_only = settings, window = settings, low = settings;
+  grid_only.grid_only = true;
+  window.window = {0.0, 1.0};
+  low.rate = 2;
+  BOOST_TEST(!has_coarse(grid_only));
+  BOOST_TEST(!has_coarse(window));
+  BOOST_TEST(!has_coarse(low));
+}
+
+}  // namespace
+}  // namespace vdvr
