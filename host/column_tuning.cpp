@@ -13,7 +13,7 @@ const ColumnTuning recorded[] = {
      .lanes = 16,
      .tile = 8,
      .vectors = 2,
-     .local = {1, 8, 16},
+     .local = {1, 16, 16},
      .product_columns = 2048},
     {.device_class = "gpu", .lanes = 1, .tile = 1, .vectors = 1, .local = {32, 4, 2}, .product_columns = 0},
 };
