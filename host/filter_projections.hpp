@@ -58,6 +58,8 @@ class DirectFilter {
  public:
   /// Keeps references to the state and the scan.
   DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field);
+  DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
+  DirectFilter& operator=(const DirectFilter&) = delete;
   /// Nothing where the slab needs upsampling. Cost: views * rows * columns^2 multiply-adds, or half of them.
   /// Throws InputError for a view that is not finite.
   std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
