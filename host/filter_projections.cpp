@@ -84,11 +84,29 @@ void measure_views(FilteredScan& out, const ProjectionSet& scan, const ViewWeigh
   });
   for (std::size_t k = 0; k < norms.size(); ++k) {
     if (!std::isfinite(out.view_max[k]) || !std::isfinite(norms[k]))
-      throw InputError(fmt::format(
-          "view {} of the scan is not finite after filtering in fp32; check or scale its line integrals", k));
+      throw not_finite(static_cast<std::int64_t>(k));
     out.ramp_error +=
         weights.weight[k] * filter.error(norms[k]) + 0x1p-126;  // the weighted sample may be flushed
   }
+}
+
+// The scan's geometry with the centre in use.
+ParallelGeometry centred(ParallelGeometry geometry, const FieldOptions& field) {
+  if (field.center) geometry.center = *field.center;
+  return geometry;
+}
+
+UpsampledSlab empty_slab(opencl::State& state, const UpsampledColumns& columns, std::size_t rows,
+                         std::int64_t first_view, std::int64_t views) {
+  UpsampledSlab slab;
+  slab.columns = columns;
+  slab.first_view = first_view;
+  slab.views = views;
+  slab.rows = static_cast<std::int64_t>(rows);
+  slab.rows_padded = static_cast<std::int64_t>(opencl::round_up(rows, 16));
+  slab.values = opencl::DeviceArray<float>(
+      state, static_cast<std::uint64_t>(views * columns.count * slab.rows_padded), "upsampled projections");
+  return slab;
 }
 
 }  // namespace
@@ -96,8 +114,7 @@ void measure_views(FilteredScan& out, const ProjectionSet& scan, const ViewWeigh
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                                 const Progress& progress, FilterMethod method) {
   FilteredScan out;
-  out.geometry = scan.geometry;
-  if (field.center) out.geometry.center = *field.center;
+  out.geometry = centred(scan.geometry, field);
   const ParallelGeometry& g = out.geometry;
   const ViewWeights weights = view_weights(g.theta_rad);
   out.limited_angle = weights.limited_angle;
@@ -146,10 +163,35 @@ void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, con
         error[k] + static_cast<double>(U) * 0x1p-52 * weights.weight[k] * kernel_sum * largest;
 }
 
-std::uint64_t Upsampler::slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const {
-  const auto lanes = static_cast<std::uint64_t>(std::max(column_tuning(state_->info).lanes, 16));
-  return static_cast<std::uint64_t>(scan_->geometry.views() * columns.count) *
+std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
+                         const UpsampledColumns& columns, std::int64_t rows) {
+  const auto lanes = static_cast<std::uint64_t>(std::max(column_tuning(device).lanes, 16));
+  return static_cast<std::uint64_t>(geometry.views() * columns.count) *
          opencl::round_up(static_cast<std::uint64_t>(rows), lanes) * sizeof(float);
+}
+
+DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field)
+    : state_(&state), scan_(&scan), geometry_(centred(scan.geometry, field)) {
+  const ViewWeights weights = view_weights(geometry_.theta_rad);
+  weights_.assign(weights.weight.begin(), weights.weight.end());
+  filter_ = make_row_filter(state, geometry_, ramp_kernel(field, geometry_.pitch_u, geometry_.columns),
+                            FilterMethod::automatic);
+}
+
+std::optional<UpsampledSlab> DirectFilter::operator()(const UpsampledColumns& columns,
+                                                      std::span<const double> rows,
+                                                      const Progress& progress) {
+  const ParallelGeometry& g = geometry_;
+  const auto v = pixels_at(rows, g.rows, 0);
+  if (columns.rate != 1 || columns.first != 0 || columns.pad > g.columns || v.empty()) return std::nullopt;
+  UpsampledSlab slab = empty_slab(*state_, columns, v.size(), 0, g.views());
+  if (!filter_->to_device(scan_->data, weights_, {&slab.values, -columns.pad, columns.count, v}, progress))
+    return std::nullopt;
+  return slab;
+}
+
+std::uint64_t Upsampler::slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const {
+  return vdvr::slab_bytes(state_->info, scan_->geometry, columns, rows);
 }
 
 const Upsampler::Matrix& Upsampler::matrix_u(const UpsampledColumns& columns, int order) {
@@ -210,15 +252,8 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
                                     std::int64_t views) {
   const ParallelGeometry& g = scan_->geometry;
   if (views < 0) views = g.views() - first_view;
-  UpsampledSlab slab;
-  slab.columns = columns;
-  slab.first_view = first_view;
-  slab.views = views;
-  slab.rows = static_cast<std::int64_t>(rows.size());
-  slab.rows_padded = static_cast<std::int64_t>(opencl::round_up(rows.size(), 16));
+  UpsampledSlab slab = empty_slab(*state_, columns, rows.size(), first_view, views);
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
-  slab.values = opencl::DeviceArray<float>(*state_, count(views * columns.count * slab.rows_padded),
-                                           "upsampled projections");
   const auto u = pixels_at(positions_of(columns), g.columns, order_u), v = pixels_at(rows, g.rows, order_v);
   if (!u.empty() && !v.empty()) {
     copy_slab(slab, u, v);

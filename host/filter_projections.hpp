@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -44,6 +46,31 @@ struct UpsampledSlab {
   opencl::DeviceArray<float> values;
   UpsampledColumns columns;
   std::int64_t first_view = 0, views = 0, rows = 0, rows_padded = 0;
+};
+
+/// Bytes of a slab.
+std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
+                         const UpsampledColumns& columns, std::int64_t rows);
+
+/// Slabs straight from the scan, where columns and rows are the detector's own and the device filters by
+/// products: the filtered scan stays on the device. The values are those of filter_projections and Upsampler.
+class DirectFilter {
+ public:
+  /// Keeps references to the state and the scan.
+  DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field);
+  DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
+  DirectFilter& operator=(const DirectFilter&) = delete;
+  /// Nothing where the slab needs upsampling. Cost: views * rows * columns^2 multiply-adds, or half of them.
+  /// Throws InputError for a view that is not finite.
+  std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
+                                          const Progress& progress);
+
+ private:
+  opencl::State* state_;
+  const ProjectionSet* scan_;
+  ParallelGeometry geometry_;
+  std::vector<float> weights_;
+  std::unique_ptr<RowFilter> filter_;
 };
 
 /// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.

@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "host/opencl/state.hpp"
+#include "host/opencl/array.hpp"
+#include "vdvr/error.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 
@@ -15,18 +16,34 @@ namespace vdvr {
 
 enum class FilterMethod { automatic, fourier, product };
 
+/// float values[z / 16][view][column][16] on the device: `count` columns from detector column `first`, which
+/// may be negative (mirrored about the outer edges, once), of the detector rows `rows`.
+struct DeviceColumns {
+  opencl::DeviceArray<float>* values = nullptr;
+  std::int64_t first = 0, count = 0;
+  std::span<const std::int64_t> rows;
+};
+
 /// q[view][u][v] = weight[view] * sum_m kernel[|u - m|] rows[view][v][m], the linear convolution.
 class RowFilter {
  public:
   virtual ~RowFilter() = default;
-  /// Cost: views * rows FFTs of twice the columns, or views * rows * columns^2 multiply-adds. Memory on the
+  /// Cost: views * rows FFTs of twice the columns, or views * rows * columns^2 multiply-adds (half
+  /// of them for a ramp without window). Memory on the
   /// device: about 64 MiB, or one view.
   virtual void operator()(std::span<const float> rows, std::span<const float> weights, std::span<float> out,
                           const Progress& progress) = 0;
+  /// The same values, put where the back-projection reads them without a round trip through the host. False,
+  /// with nothing done, where the method cannot. Throws InputError for a view that is not finite.
+  virtual bool to_device(std::span<const float> rows, std::span<const float> weights,
+                         const DeviceColumns& target, const Progress& progress) = 0;
   /// A bound on the error of a filtered sample before the weight, from the row's 2-norm
   /// (docs/error-bounds.md, section 7); the weight's two roundings are in it.
   [[nodiscard]] virtual double error(double row_norm) const = 0;
 };
+
+/// What a view is refused with whose line integrals overflow fp32.
+InputError not_finite(std::int64_t view);
 
 /// `kernel`: g[0 .. columns - 1] of an even kernel. `automatic` takes what the device's tuning says.
 std::unique_ptr<RowFilter> make_row_filter(opencl::State& state, const ParallelGeometry& geometry,

@@ -5,8 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <future>
+#include <optional>
 
 #include "host/back_project.hpp"
 #include "host/coverage.hpp"
@@ -57,75 +61,126 @@ UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int up
   return upsampled_columns(g.columns, upsampling, (kept_margin(grid, 1) + grid.spacing[0]) / g.pitch_u);
 }
 
-Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
-                         const Grid& grid, int upsampling, const std::string& u_filter,
-                         const Progress& progress, StageSeconds* seconds) {
-  StageWatch watch(seconds);
-  const ParallelGeometry& g = filtered.geometry;
+namespace {
+
+using SlabMaker = std::function<UpsampledSlab(const UpsampledColumns&, std::span<const double>)>;
+
+// Rows of a slab whose projections take half of what is left.
+std::int64_t slab_rows(const opencl::State& state, const ParallelGeometry& g, const UpsampledColumns& columns,
+                       std::int64_t all) {
+  const std::uint64_t budget = state.memory.left() / 2;
+  const auto bytes = [&](std::int64_t rows) { return slab_bytes(state.info, g, columns, rows); };
+  std::int64_t rows = std::min<std::int64_t>(all, 256);
+  while (rows > 16 && bytes(rows) > budget) rows = (rows + 1) / 2;
+  if (bytes(rows) > std::min(budget, state.info.max_allocation)) {
+    throw ResourceError(fmt::format(
+        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise --max-memory "
+        "or lower --upsampling",
+        g.views(), columns.count, static_cast<double>(bytes(rows)) / (1 << 20), rows));
+  }
+  return rows;
+}
+
+// By row y, the first and last column that is kept: the region is convex, so that all between them are.
+std::vector<std::array<std::int32_t, 2>> kept_columns(const ParallelGeometry& g, const Grid& grid) {
   const Coverage coverage(g);
   const Index3 n = grid.samples();
-  const UpsampledColumns columns = columns_for(g, grid, upsampling);
+  std::vector<std::array<std::int32_t, 2>> kept(static_cast<std::size_t>(n[1]));
+  parallel_for(n[1], {}, "", [&](std::int64_t y) {
+    const auto keep = [&](std::int64_t x) {
+      const Vec3 p = grid.position({x, y, 0});
+      return coverage.margin(p[0], p[1]) >= -kept_margin(grid, 1);
+    };
+    std::int64_t first = 0, last = n[0] - 1;
+    while (first <= last && !keep(first)) ++first;
+    while (last > first && !keep(last)) --last;
+    // An empty row wants nothing, wherever its neighbour's interval lies.
+    if (first > last) kept[static_cast<std::size_t>(y)] = {static_cast<std::int32_t>(n[0]), -1};
+    else
+      kept[static_cast<std::size_t>(y)] = {static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)};
+  });
+  return kept;
+}
 
-  // A slab's projections take half of what is left, its columns at most a quarter.
-  const std::uint64_t budget = state.memory.left() / 2;
-  std::int64_t rows = std::min<std::int64_t>(n[2], 256);
-  while (rows > 16 && upsampler.slab_bytes(columns, rows) > budget) rows = (rows + 1) / 2;
-  if (upsampler.slab_bytes(columns, rows) > std::min(budget, state.info.max_allocation)) {
-    throw ResourceError(fmt::format(
-        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise --max-memory or "
-        "lower --upsampling",
-        g.views(), columns.count, static_cast<double>(upsampler.slab_bytes(columns, rows)) / (1 << 20),
-        rows));
+// Columns of z become rows of x. The planes of a volume lie a power of two apart and would share a few cache
+// sets: 16 of them are gathered aside and written row by row.
+void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
+                   std::array<std::int32_t, 2> kept, float* target, std::int64_t plane) {
+  const std::int64_t width = kept[1] - kept[0] + 1, aside = width + 16;
+  if (width <= 0) return;
+  std::vector<float> rows(static_cast<std::size_t>(16 * aside));
+  for (std::int64_t first = 0; first < nz; first += 16) {
+    const float* from = columns.data() + kept[0] * stride + first;
+    for (std::int64_t x = 0; x < width; ++x, from += stride)
+      for (std::int64_t z = 0; z < 16; ++z) rows[static_cast<std::size_t>(z * aside + x)] = from[z];
+    for (std::int64_t z = 0; z < std::min<std::int64_t>(16, nz - first); ++z)
+      std::copy_n(rows.data() + z * aside, width, target + (first + z) * plane + kept[0]);
   }
+}
+
+Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
+                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Progress& progress, StageWatch& watch) {
+  const Index3 n = grid.samples();
+  const UpsampledColumns columns = columns_for(g, grid, upsampling);
+  const std::int64_t rows = slab_rows(state, g, columns, n[2]);
+  // A slab's columns take at most a quarter of what it leaves.
   const std::int64_t wanted =
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
-  Volume volume{grid, large_zeros(static_cast<std::size_t>(grid.sample_count()))};
-  std::vector<std::uint8_t> kept(static_cast<std::size_t>(n[0] * n[1]));
-  parallel_for(n[1], {}, "", [&](std::int64_t y) {
-    for (std::int64_t x = 0; x < n[0]; ++x) {
-      const Vec3 p = grid.position({x, y, 0});
-      kept[static_cast<std::size_t>(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= -kept_margin(grid, 1);
-    }
-  });
+  // Fresh pages cost a core's time, which the device leaves between its kernels.
+  std::future<std::vector<float>> samples = std::async(
+      std::launch::async, [&] { return large_zeros(static_cast<std::size_t>(grid.sample_count())); });
+  const auto kept = kept_columns(g, grid);
+  Volume volume{grid, {}};
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
-    const std::int64_t nz = std::min(rows, n[2] - z0);
-    const auto positions =
-        detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz);
-    const UpsampledSlab slab = upsampler(columns, positions);
-    watch.lap(state, "upsample");
-    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * column_stride(nz)),
+    const std::int64_t nz = std::min(rows, n[2] - z0), stride = column_stride(nz);
+    const UpsampledSlab slab = make_slab(
+        columns,
+        detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz));
+    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * stride),
                                    "reconstructed columns");
     for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
       report(progress, "reconstruct",
              (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) /
                  static_cast<double>(n[2]));
-      ColumnBlocks blocks{n[0],
-                          std::min(band, n[1] - y0),
-                          grid.spacing[0],
-                          grid.spacing[1],
-                          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}},
-                          {}};
+      const std::int64_t ny = std::min(band, n[1] - y0);
+      const ColumnBlocks blocks{
+          n[0],
+          ny,
+          grid.spacing[0],
+          grid.spacing[1],
+          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}},
+          {kept.begin() + y0, kept.begin() + y0 + ny}};
       back_project(state, g, slab, blocks, u_filter, out);
       watch.lap(state, "back-project");
-      // Columns of z become planes of z, a band of 16 at a time so that both sides stay in cache.
-      const std::int64_t stride = column_stride(nz);
+      if (samples.valid()) volume.samples = samples.get();
       out.read_mapped([&](std::span<const float> columns_host) {
-        parallel_for(blocks.ny, {}, "", [&](std::int64_t y) {
-          const std::uint8_t* keep = kept.data() + (y0 + y) * n[0];
-          const float* row = columns_host.data() + y * n[0] * stride;
-          for (std::int64_t first = 0; first < nz; first += 16)
-            for (std::int64_t x = 0; x < n[0]; ++x)
-              for (std::int64_t z = first; keep[x] && z < std::min(first + 16, nz); ++z)
-                volume.samples[static_cast<std::size_t>(((z0 + z) * n[1] + y0 + y) * n[0] + x)] =
-                    row[x * stride + z];
+        parallel_for(ny, {}, "", [&](std::int64_t y) {
+          transpose_row(columns_host.subspan(static_cast<std::size_t>(y * n[0] * stride)), stride, nz,
+                        kept[static_cast<std::size_t>(y0 + y)],
+                        volume.samples.data() + (z0 * n[1] + y0 + y) * n[0], n[0] * n[1]);
         });
       });
       watch.lap(state, "read back");
     }
   }
   return volume;
+}
+
+}  // namespace
+
+Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
+                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Progress& progress, StageSeconds* seconds) {
+  StageWatch watch(seconds);
+  const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
+    UpsampledSlab slab = upsampler(columns, rows);
+    watch.lap(state, "upsample");
+    return slab;
+  };
+  return reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, u_filter, progress, watch);
 }
 
 Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
@@ -136,11 +191,32 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
     throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
   if (options.u_filter != "linear" && options.u_filter != "cubic")
     throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
-  const FilteredScan filtered = filter_projections(device.state(), scan, options.field, progress);
-  watch.lap(device.state(), "filter");
-  Upsampler upsampler(device.state(), filtered);
-  return reconstruct_field(device.state(), filtered, upsampler, grid, options.upsampling, options.u_filter,
-                           progress, seconds);
+  opencl::State& state = device.state();
+  // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
+  // it.
+  std::optional<DirectFilter> direct;
+  if (options.upsampling == 1) direct.emplace(state, scan, options.field);
+  std::optional<FilteredScan> filtered;
+  std::optional<Upsampler> upsampler;
+  const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
+    if (direct && !filtered) {
+      std::optional<UpsampledSlab> slab = (*direct)(columns, rows, progress);
+      watch.lap(state, "filter");
+      if (slab) return std::move(*slab);
+    }
+    if (!filtered) {
+      filtered = filter_projections(state, scan, options.field, progress);
+      watch.lap(state, "filter");
+      upsampler.emplace(state, *filtered);
+    }
+    UpsampledSlab slab = (*upsampler)(columns, rows);
+    watch.lap(state, "upsample");
+    return slab;
+  };
+  ParallelGeometry geometry = scan.geometry;
+  if (options.field.center) geometry.center = *options.field.center;
+  return reconstruct_slabs(state, geometry, make_slab, grid, options.upsampling, options.u_filter, progress,
+                           watch);
 }
 
 }  // namespace vdvr

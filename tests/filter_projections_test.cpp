@@ -2,6 +2,7 @@
 #include "host/filter_projections.hpp"
 
 #include <boost/test/unit_test.hpp>
+#include <limits>
 
 #include "host/fft/fft.hpp"
 #include "tests/reference/cosine_series.hpp"
@@ -228,5 +229,63 @@ BOOST_AUTO_TEST_CASE(views_of_a_chunk_are_those_of_the_whole_slab) {
         for (std::int64_t n = 0; n < columns.count; ++n)
           same = same && part.at(k, z, n) == whole.at(first + k, z, n);
     BOOST_TEST(same);
+  }
+}
+
+// A window leaves no tap at zero, so that the product takes all of them: another kernel than the plain
+// ramp's.
+BOOST_AUTO_TEST_CASE(windowed_product_errs_no_more_than_its_bound) {
+  Device device;
+  FieldOptions hann;
+  hann.filter = "hann";
+  for (const auto& [columns, rows] : {std::pair<int, int>{1, 1}, {2, 3}, {33, 17}, {150, 5}}) {
+    const ProjectionSet scan = noise_scan(3, rows, columns);
+    FilteredScan filtered = filter_projections(device.state(), scan, hann, {}, FilterMethod::product);
+    const double a_priori = filtered.ramp_error;
+    measure_filter_error(filtered, scan, hann);
+    BOOST_TEST(filtered.ramp_error <= a_priori);
+  }
+}
+
+// On devices that filter by products; others have no direct way.
+BOOST_AUTO_TEST_CASE(slab_straight_from_the_scan_is_that_of_the_filtered_scan) {
+  Device device;
+  for (const auto& filter : {"ram-lak", "hann"})
+    for (const auto& [columns, rows] : {std::pair<int, int>{1, 1}, {5, 3}, {40, 33}, {150, 18}}) {
+      FieldOptions field;
+      field.filter = filter;
+      const ProjectionSet scan = noise_scan(7, rows, columns);
+      const UpsampledColumns wanted = upsampled_columns(columns, 1, std::min(4, columns / 2));
+      // Mirrored, reversed and repeated rows, and more of them than one vector takes.
+      std::vector<double> positions;
+      for (int z = -1; z <= rows; ++z) positions.push_back(z);
+      for (int z = 0; z < 20; ++z) positions.push_back((7 * z) % rows);
+      DirectFilter direct(device.state(), scan, field);
+      const auto slab = direct(wanted, positions, {});
+      // Columns are mirrored once at most.
+      BOOST_REQUIRE(slab.has_value() == (device.info().is_cpu && wanted.pad <= columns));
+      if (!slab) continue;
+      const FilteredScan filtered = filter_projections(device.state(), scan, field);
+      Upsampler upsampler(device.state(), filtered);
+      const HostSlab expected(upsampler(wanted, positions)), computed(*slab);
+      BOOST_TEST((computed.values == expected.values));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(direct_filter_leaves_upsampling_to_others_and_refuses_overflow) {
+  Device device;
+  ProjectionSet scan = noise_scan(4, 6, 24);
+  const std::vector<double> whole{0, 1, 2}, between{0, 0.5, 1};
+  DirectFilter direct(device.state(), scan, {});
+  BOOST_TEST(!direct(upsampled_columns(24, 2, 1), whole, {}).has_value());
+  BOOST_TEST(!direct(upsampled_columns(24, 1, 1), between, {}).has_value());
+  if (!device.info().is_cpu) return;
+  scan.geometry.pitch_u = 0.01;  // taps of 25
+  for (const float bad : {std::numeric_limits<float>::max(), std::numeric_limits<float>::quiet_NaN()}) {
+    scan.data[2 * 6 * 24 + 24 + 7] = bad;  // view 2, row 1
+    scan.data[2 * 6 * 24 + 24 + 8] = -bad;
+    BOOST_CHECK_EXCEPTION(
+        DirectFilter(device.state(), scan, {})(upsampled_columns(24, 1, 1), whole, {}), InputError,
+        [](const InputError& e) { return std::string(e.what()).find("view 2") != std::string::npos; });
   }
 }
