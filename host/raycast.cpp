@@ -20,7 +20,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 300 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 408 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
@@ -74,6 +74,15 @@ void check_surfaces(const std::vector<IsoSurface>& surfaces) {
           fmt::format("--iso {} must be finite, and its opacity {} within [0, 1]", s.value, s.opacity));
 }
 
+void check_lights(const std::vector<Vec3>& lights) {
+  if (lights.size() > VDVR_LIGHTS)
+    throw InputError(
+        fmt::format("--light names {} lights that stand still; at most {} do", lights.size(), VDVR_LIGHTS));
+  for (const Vec3& l : lights)
+    if (!is_finite(l) || !(glm::length(to_glm(l)) > 0))
+      throw InputError(fmt::format("--light {},{},{} has no direction", l[0], l[1], l[2]));
+}
+
 void check_options(const RenderOptions& o) {
   // Pixels are counted in int on the device; 16384 x 16384 already needs 4 GiB there.
   if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
@@ -98,6 +107,7 @@ void check_options(const RenderOptions& o) {
   if (!(o.termination > 0 && o.termination <= 1))
     throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
   if (o.mode == RenderMode::iso) check_surfaces(o.surfaces);
+  check_lights(o.lights);
   if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
     throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
@@ -141,47 +151,51 @@ Table bake(const TransferFunction& transfer, double step) {
 // --- which bricks can matter
 // ------------------------------------------------------------------------------------------
 
-std::vector<std::uint8_t> opaque_bricks(const Impl& v, const Table& table, float slack) {
+/// By brick 1, or 0 where the transfer function may show something.
+std::vector<std::uint8_t> empty_bricks(const Impl& v, const Table& table, float slack) {
   std::vector<int> opaque_before(kTableSize + 1, 0);  // entries below i with any opacity
   for (std::size_t i = 0; i < kTableSize; ++i)
     opaque_before[i + 1] = opaque_before[i] + (table.entries[i].s[3] > 0 ? 1 : 0);
-  std::vector<std::uint8_t> occupied(v.host_ranges.size());
-  for (std::size_t i = 0; i < occupied.size(); ++i) {
+  std::vector<std::uint8_t> empty(v.host_ranges.size());
+  for (std::size_t i = 0; i < empty.size(); ++i) {
     const auto first = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[0] - slack));
     const auto last = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[1] + slack)) + 1;
-    occupied[i] = opaque_before[last + 1] > opaque_before[first] ? 1 : 0;
+    empty[i] = opaque_before[last + 1] > opaque_before[first] ? 0 : 1;
   }
-  return occupied;
+  return empty;
 }
 
-std::vector<std::uint8_t> bricks_reaching(const Impl& v, float iso, float slack) {
-  std::vector<std::uint8_t> occupied(v.host_ranges.size());
-  std::transform(v.host_ranges.begin(), v.host_ranges.end(), occupied.begin(),
-                 [&](const cl_float2& r) { return static_cast<std::uint8_t>(r.s[1] + slack < iso ? 0 : 1); });
-  return occupied;
-}
-
-float lowest_surface(const RenderOptions& o) {
-  const auto lowest = std::min_element(o.surfaces.begin(), o.surfaces.end(),
-                                       [](const auto& a, const auto& b) { return a.value < b.value; });
-  return static_cast<float>(lowest->value);
+/// By brick 1 and on how many surfaces it lies, 0 where a surface may pass.
+std::vector<std::uint8_t> sides_of_surfaces(const Impl& v, const std::vector<float>& surfaces, float slack) {
+  const auto side = [&](float value) {
+    return std::count_if(surfaces.begin(), surfaces.end(), [&](float s) { return value >= s; });
+  };
+  std::vector<std::uint8_t> classes(v.host_ranges.size());
+  std::transform(v.host_ranges.begin(), v.host_ranges.end(), classes.begin(), [&](const cl_float2& r) {
+    // Twice the allowance: kernels add one more before they pass a cell.
+    const auto lowest = side(r.s[0] - 2 * slack), highest = side(r.s[1] + 2 * slack);
+    return static_cast<std::uint8_t>(lowest == highest ? 1 + lowest : 0);
+  });
+  return classes;
 }
 
 // Brings frame.distance up to date; a turntable computes it once.
 void update_distance(Impl& v, const RenderOptions& o, const Table& table, float slack) {
-  std::vector<float> key{slack};
+  std::vector<float> key{slack}, surfaces;
+  for (const IsoSurface& s : o.surfaces) surfaces.push_back(static_cast<float>(s.value));
   if (o.mode == RenderMode::dvr) {
     key.insert(key.end(), {0, table.lo, table.scale});
     for (const auto& e : table.entries) key.push_back(e.s[3] > 0 ? 1.0f : 0.0f);
   } else {
-    key.insert(key.end(), {1, lowest_surface(o)});
+    key.push_back(1);
+    key.insert(key.end(), surfaces.begin(), surfaces.end());
   }
   if (key == v.frame.distance_key) return;
-  const auto occupied = o.mode == RenderMode::dvr ? opaque_bricks(v, table, slack)
-                                                  : bricks_reaching(v, lowest_surface(o), slack);
+  const auto classes =
+      o.mode == RenderMode::dvr ? empty_bricks(v, table, slack) : sides_of_surfaces(v, surfaces, slack);
   const VdvrGrid& g = v.field->grid;
   const Index3 n{g.bricks_x, g.bricks_y, g.bricks_z};
-  const auto distance = distance_to_occupied(occupied, n);
+  const auto distance = distance_to_other(classes, n);
   if (v.frame.distance.size() != distance.size())
     v.frame.distance = DeviceArray<cl_uchar>(*v.state, distance.size(), "distances to occupied bricks");
   v.frame.distance.write(distance);
@@ -208,6 +222,17 @@ void set_surfaces(VdvrRaycast& p, std::vector<IsoSurface> surfaces) {
     to.opacity = static_cast<float>(s.opacity);
     for (std::size_t c = 0; c < 3; ++c) to.rgb[c] = static_cast<float>(s.rgb[c]);
   }
+}
+
+void set_lights(VdvrRaycast& p, const RenderOptions& o) {
+  p.head_light = o.head_light ? 1 : 0;
+  for (const Vec3& light : o.lights) {
+    const glm::dvec3 l = glm::normalize(to_glm(light));
+    float* to = p.light[p.lights++];
+    set3(to[0], to[1], to[2], l);
+  }
+  // Together they are as bright as one alone.
+  p.light_share = 0.75f / static_cast<float>(std::max(1, p.head_light + p.lights));
 }
 
 VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& table, float slack) {
@@ -244,6 +269,7 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.shading = o.shading ? 1 : 0;
   p.skip = o.skip_empty ? 1 : 0;
   set_surfaces(p, o.surfaces);
+  set_lights(p, o);
   return p;
 }
 
@@ -327,6 +353,8 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
+          {"VDVR_GRADIENT_ANALYTIC", o.gradient == GradientKind::analytic ? "1" : "0"},
+          {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
           {"VDVR_LANES", std::to_string(lanes)},
           {"VDVR_UNIFORM", v.is_uniform && lanes > 1 ? "1" : "0"},
           v.field->defines.front()};

@@ -55,10 +55,9 @@ struct AtlasLayout {
 /// The smallest atlas found within the limits. Host only; microseconds to milliseconds.
 AtlasLayout pack_atlas(const MixedVolume& volume, const ImageLimits& limits);
 
-/// Distance of each brick, in bricks (largest axis), to the nearest one with occupied != 0; 0 there, at most
-/// 255. [bz][by][bx].
-std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& occupied,
-                                               const Index3& bricks);
+/// Distance of each brick, in bricks (largest axis), to the nearest one of another class, at most 255; 0 for
+/// bricks of class 0. [bz][by][bx].
+std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& classes, const Index3& bricks);
 
 struct ResidentVolume::Impl {
   Impl(Device& device, const MixedVolume& volume, const ImageLimits& limits);

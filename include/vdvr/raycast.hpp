@@ -76,6 +76,9 @@ struct IsoSurface {
 };
 
 enum class SamplerKind { automatic, image3d, buffer };
+/// How the direction of a surface is found: central differences over one base cell at every level, without a
+/// seam where levels or cells meet, or the derivative of the trilinear cell itself, which jumps at its faces.
+enum class GradientKind { central, analytic };
 
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
@@ -83,14 +86,17 @@ struct RenderOptions {
   std::int64_t width = 512, height = 512;
   Camera camera;
   TransferFunction transfer;
-  double step = 1;                   ///< base cells (of the smallest spacing); opacities are corrected for it
-  std::vector<IsoSurface> surfaces;  ///< of mode iso, in any order
-  int slice_axis = 2;                ///< 0 x, 1 y, 2 z
+  double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it; iso needs none
+  std::vector<IsoSurface> surfaces;                      ///< of mode iso, in any order
+  int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;                  ///< world; default the middle
   std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
   bool shading = true;
-  double termination = 0.99;  ///< early ray termination: opacity at which a ray stops
-  bool skip_empty = true;     ///< brick min/max skipping; the picture is the same to the bit without it
+  GradientKind gradient = GradientKind::central;
+  bool head_light = true;      ///< at the eye
+  std::vector<Vec3> lights{};  ///< directions towards lights that stand still, world axes; at most 8
+  double termination = 0.99;   ///< early ray termination: opacity at which a ray stops
+  bool skip_empty = true;      ///< brick min/max skipping; the picture is the same to the bit without it
   SamplerKind sampler = SamplerKind::automatic;
   /// Behind the volume, display values, top and bottom row.
   std::array<double, 3> background_top{0.13, 0.14, 0.16}, background_bottom{0.03, 0.03, 0.04};
