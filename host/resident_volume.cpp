@@ -264,6 +264,8 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     set_texels(v, records);
     texel_records_ = records.words();
   }
+  for (const auto& [triple, block] : v.tiles)
+    highest_level = std::max<int>(highest_level, *std::max_element(triple.begin(), triple.end()));
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const BrickSamples stored(v, position_of(v, i));
     host_ranges.push_back(range_of(stored));

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/bake.hpp"
 #include "host/device_field.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -79,6 +80,7 @@ struct ResidentVolume::Impl {
   std::vector<cl_float2> host_ranges;  ///< what ranges() holds
   std::pair<float, float> value_range{0, 0};
   float largest = 0;        ///< that a texel can decode to, in magnitude
+  int highest_level = 0;    ///< of any brick and axis
   bool is_uniform = false;  ///< every brick reads a float32 base
   AtlasLayout layout;
 
@@ -88,7 +90,8 @@ struct ResidentVolume::Impl {
     opencl::DeviceArray<cl_uint> row_samples;
     opencl::DeviceArray<cl_uchar> distance;
     std::vector<float> distance_key;  ///< what `distance` was computed for
-    std::vector<cl_float4> table_values;
+    BakedTransfer baked;              ///< what `table` holds
+    std::vector<double> table_key;    ///< what `baked` was made from
   } frame;
 
   std::optional<DeviceField> field;

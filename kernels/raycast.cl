@@ -235,17 +235,63 @@ RAY_INLINE I ends_of(const VdvrRaycast* p, const Ray* ray, I px, I py, V samples
   const I py = (int)get_global_id(1) * PACKET_Y + ROWS;    \
   if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height) return
 
+// What has been seen along the rays.
+typedef struct {
+  V3 colour, normal;
+  V alpha, depth;
+} Seen;
+
+RAY_INLINE Seen nothing_seen(V depth) {
+  const V none = (V)(0.0f), nothing = (V)(NAN);
+  const Seen seen = {v3(none, none, none), v3(nothing, nothing, nothing), none, depth};
+  return seen;
+}
+
+// Composites lanes of positive weight: `sampled` was taken at c, parameter t. Geometry: where the opacity
+// passes a half.
+RAY_INLINE void absorb(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
+                       const OpenBrick* brick, const Sampled* sampled, V3 c, V t, V3 rgb, V weight,
+                       V shaded_weight, Seen* seen) {
+  const float3 cells_per_length =
+      (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
+#if VDVR_GEOMETRY
+  const I half_way = (seen->alpha < 0.5f) & (seen->alpha + weight >= 0.5f);
+  if (ANY(half_way)) {
+    const V3 g = gradient_at(THE_FIELD, bricks, grid, brick, sampled, c, cells_per_length, half_way);
+    seen->normal = pick3(half_way, normal_of(g), seen->normal);
+    seen->depth = PICK(half_way, (ray->first + t) * p->length_unit, seen->depth);
+  }
+#else
+  const I lit = weight > shaded_weight;
+  if (p->shading && ANY(lit))
+    rgb = pick3(lit,
+                shade(p, rgb, gradient_at(THE_FIELD, bricks, grid, brick, sampled, c, cells_per_length, lit),
+                      ray->world, p->gradient_full),
+                rgb);
+  seen->colour = plus(seen->colour, scaled(rgb, weight));
+#endif
+  seen->alpha += weight;
+}
+
+// Normal and depth, or the colour before the background and `fourth`.
+RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture,
+                         __global uint* restrict row_samples, I px, I py, const Seen* seen, V fourth,
+                         I samples) {
+#if VDVR_GEOMETRY
+  put(p->width, p->height, picture, row_samples, px, py, seen->normal, seen->depth, samples);
+#else
+  put(p->width, p->height, picture, row_samples, px, py,
+      plus(seen->colour, scaled(background(p, py), 1.0f - seen->alpha)), fourth, samples);
+#endif
+}
+
 // Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
 // that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
   THE_PIXELS;
-  const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-  const V none = (V)(0.0f), nothing = (V)(NAN);
-  V3 colour = v3(none, none, none);
-  V alpha = none, depth = nothing;
-  V3 normal = v3(nothing, nothing, nothing);
+  Seen seen = nothing_seen((V)(NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
@@ -253,7 +299,7 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   OpenBrick brick = no_brick();
   int k = 0;
   while (k < end) {
-    const I active = (k < ends) & (alpha < p.termination);
+    const I active = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(active)) break;
     const float t = ((float)k + 0.5f) * p.step;
     const V3 c = position_at(&ray, grid, (V)(t));
@@ -271,38 +317,17 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
     const Row row = row_of(&p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
-    const V weight = PICK(active, (1.0f - alpha) * opacity_of(table, &p, row), none);
-    if (ANY(weight > 0.0f)) {
-#if VDVR_GEOMETRY
-      const I half_way = (alpha < 0.5f) & (alpha + weight >= 0.5f);
-      if (ANY(half_way)) {
-        const V3 g = gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, half_way);
-        normal = pick3(half_way, normal_of(g), normal);
-        depth = PICK(half_way, (ray.first + t) * p.length_unit, depth);
-      }
-#else
-      V3 rgb = colour_of(table, row);
-      const I seen = weight > SHADED_WEIGHT * p.step;
-      if (p.shading && ANY(seen))
-        rgb = pick3(
-            seen,
-            shade(&p, rgb, gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, seen),
-                  ray.world, p.gradient_full),
-            rgb);
-      colour = plus(colour, scaled(rgb, weight));
-#endif
-      alpha += weight;
-    }
+    const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
+    if (ANY(weight > 0.0f))
+      absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
+             (V)(SHADED_WEIGHT * p.step), &seen);
     ++k;
   }
-#if VDVR_GEOMETRY
-  put(p.width, p.height, picture, row_samples, px, py, normal, depth, samples);
-#else
-  put(p.width, p.height, picture, row_samples, px, py, plus(colour, scaled(background(&p, py), 1.0f - alpha)),
-      alpha, samples);
-#endif
+  put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);
 }
 
+#include "shared/raycast_preintegrated.h"
+#include "shared/raycast_level.h"
 #include "shared/raycast_iso.h"
 
 // The largest sample along the ray; a brick that cannot raise it is leapt over. Geometry: where it lies; no

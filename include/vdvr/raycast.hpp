@@ -80,6 +80,12 @@ enum class SamplerKind { automatic, image3d, buffer };
 /// seam where levels or cells meet, or the derivative of the trilinear cell itself, which jumps at its faces.
 enum class GradientKind { central, analytic };
 
+/// Mode dvr: colour and opacity of each sample, or of the path between two samples, along which the field is
+/// taken as linear: no transfer function is then too sharp for a step.
+enum class Classification { post, preintegrated };
+/// Mode dvr: one step throughout, or step / 2^l in bricks of level l, with opacities corrected for it.
+enum class StepMode { fixed, level };
+
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
   RenderOutput output = RenderOutput::colour;
@@ -87,6 +93,8 @@ struct RenderOptions {
   Camera camera;
   TransferFunction transfer;
   double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it; iso needs none
+  Classification classification = Classification::post;
+  StepMode step_mode = StepMode::fixed;                  ///< level not with preintegrated
   std::vector<IsoSurface> surfaces;                      ///< of mode iso, in any order
   int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;                  ///< world; default the middle

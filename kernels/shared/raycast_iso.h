@@ -153,12 +153,6 @@ RAY_INLINE V fraction_of(V c, V low, V scale) {
   return MOST(f, (V)(0.0f));
 }
 
-// What has been seen along the rays.
-typedef struct {
-  V3 colour, normal;
-  V alpha, depth;
-} Seen;
-
 // Adds the crossing of surface `number` at parameter `at` in the lanes `crossing`.
 RAY_INLINE void add_surface(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray, Surfaces s,
                             V at, I crossing, Seen* seen) {
@@ -186,8 +180,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
   THE_PIXELS;
-  const V none = (V)(0.0f), one = (V)(1.0f), nothing = (V)(NAN);
-  Seen seen = {v3(none, none, none), v3(nothing, nothing, nothing), none, (V)(-1.0f)};
+  const V none = (V)(0.0f), one = (V)(1.0f);
+  Seen seen = nothing_seen((V)(-1.0f));
   const Ray ray = cast_rays(&p, grid, px, py);
   const I3 up = {ray.inverse.x > 0.0f, ray.inverse.y > 0.0f, ray.inverse.z > 0.0f};
   I active = ends_of(&p, &ray, px, py, one) > 0, samples = 0, was = 0, away = 0;
@@ -288,12 +282,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
            beyond(by.z, up.z, low.z, high.z, c.z, reached.z));
     active &= (step < ray.length) & NOT(outside) & (seen.alpha < p.termination);
   }
-#if VDVR_GEOMETRY
-  put(p.width, p.height, picture, row_samples, px, py, seen.normal, seen.depth, samples);
-#else
-  put(p.width, p.height, picture, row_samples, px, py,
-      plus(seen.colour, scaled(background(&p, py), 1.0f - seen.alpha)), seen.depth, samples);
-#endif
+  put_seen(&p, picture, row_samples, px, py, &seen, seen.depth, samples);
 }
 
 #endif
