@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "host/raycast.hpp"
+#include "host/resident_volume.hpp"
 #include "tests/reference/first_root.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
@@ -43,8 +44,9 @@ struct Judgement {
   int hits = 0, misses = 0, wrong = 0;
 };
 
-/// Every ray must have a depth that is the first root of a value within what fp32 knows of the field.
-void judge(const MixedVolume& v, const RenderOptions& o, Judgement& result) {
+/// Every ray must have a depth that is the first root of a value within what fp32 knows of the field, and the
+/// sampler adds.
+void judge(const MixedVolume& v, const RenderOptions& o, Judgement& result, double sampler = 0) {
   const ResidentVolume resident(device(), v);
   const auto pixels = raycast_float(device(), resident, o).pixels;
   double size = 0;
@@ -53,7 +55,7 @@ void judge(const MixedVolume& v, const RenderOptions& o, Judgement& result) {
   // Positions: a handful of operations on coordinates of `size`. Values: 14 u of interpolation, twice, and
   // positions through gradients of at most 2 per sample on three axes.
   const double position = 8 * u * size, chord = std::sqrt(3.0) * 0x1p-20;
-  const double value = 2 * 14 * u + 3 * 2 * v.rate * position;
+  const double value = sampler + 2 * 14 * u + 3 * 2 * v.rate * position;
   for (std::int64_t y = 0; y < o.height; ++y)
     for (std::int64_t x = 0; x < o.width; ++x) {
       const auto ray = reference::pixel_ray(o.camera, o.width, o.height, x, y);
@@ -171,4 +173,24 @@ BOOST_AUTO_TEST_CASE(skipping_and_packets_change_no_bit_of_several_surfaces) {
   BOOST_TEST(std::memcmp(with.pixels.data(), without.pixels.data(), with.pixels.size() * sizeof(cl_float4)) ==
              0);
   BOOST_TEST(with.samples < without.samples);
+}
+
+BOOST_AUTO_TEST_CASE(the_texture_unit_finds_the_same_roots_within_the_probe) {
+  const MixedVolume v =
+      support::random_mixed(centred_grid({10, 9, 8}), 4, 4, {{0, 0, 0}, {1, 1, 1}, {2, 0, 1}, {0, 2, 0}}, 4);
+  const ResidentVolume resident(device(), v);
+  if (!resident.has_image3d()) return;
+  const SamplerProbe probe = probe_sampler(device());
+  // Weights err by delta and by coordinates of the atlas, neighbours differ by 2 at most; the cubic's
+  // coefficients take its corners up to seven times.
+  const auto n = static_cast<double>(resident.impl().layout.longest());
+  const double field = 3 * (probe.delta + 2 * n * u) * 2 + probe.constant_error;
+  Judgement j;
+  for (const double value : {0.2, 0.85}) {
+    RenderOptions o = surface_at(orbit_camera(v.grid, 37, 21, 1), value);
+    o.sampler = SamplerKind::image3d;
+    judge(v, o, j, 7 * field);
+  }
+  BOOST_TEST(j.hits > 500);
+  BOOST_TEST(j.wrong == 0);
 }
