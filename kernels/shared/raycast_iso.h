@@ -173,6 +173,107 @@ RAY_INLINE void add_surface(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, 
   seen->alpha += weight;
 }
 
+// The surfaces that a cubic over [in, out] meets, front to back, in the lanes `possible`; `was` is on how
+// many the field lies before it, and after.
+RAY_INLINE void meet_surfaces(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
+                              const Cubic* cubic, V in, V out, I possible, I* was, Seen* seen) {
+  V from = (V)(0.0f);
+  for (int piece = 0; piece < 4; ++piece) {
+    const V to = piece == 0   ? (V)(0.0f)
+                 : piece == 1 ? cubic->turn
+                 : piece == 2 ? cubic->next_turn
+                              : (V)(1.0f);
+    const V value = cubic_at(cubic, to);
+    I side = side_of(p, value);
+    if (piece == 0) {
+      // Cells agree on their faces to rounding: a surface within it was met before, or will be.
+      const I least = side_of(p, value - p->slack), most = side_of(p, value + p->slack);
+      const I raised = MOST(*was, least);
+      side = LEAST(raised, most);
+    }
+    while (1) {
+      const I crossing = possible & (*was != side) & (seen->alpha < p->termination);
+      if (!ANY(crossing)) break;
+      const I rises = side > *was;
+      const Surfaces s = surfaces_at(p, PICK(rises, *was, *was - 1));
+      const V root = cubic_root(cubic, from, to, s.value, rises);
+      add_surface(THE_FIELD, bricks, grid, p, ray, s, in + root * (out - in), crossing, seen);
+      *was = PICK(crossing, PICK(rises, *was + 1, *was - 1), *was);
+    }
+    *was = PICK(possible, side, *was);
+    from = to;
+  }
+}
+
+// A box of cells, and where rays leave it along each axis.
+typedef struct {
+  V3 low, high, far;
+} Box;
+RAY_INLINE Box box_between(const Ray* ray, V3 low, V3 high) {
+  Box b;
+  b.low = low;
+  b.high = high;
+  b.far = v3(leaves(low.x, high.x, ray->entry.x, ray->inverse.x),
+             leaves(low.y, high.y, ray->entry.y, ray->inverse.y),
+             leaves(low.z, high.z, ray->entry.z, ray->inverse.z));
+  return b;
+}
+RAY_INLINE V enters_box(const Ray* ray, const Box* b) {
+  const V x = enters(b->low.x, b->high.x, ray->entry.x, ray->inverse.x);
+  const V y = enters(b->low.y, b->high.y, ray->entry.y, ray->inverse.y);
+  const V z = enters(b->low.z, b->high.z, ray->entry.z, ray->inverse.z);
+  const V xy = MOST(x, y), xyz = MOST(xy, z);
+  return MOST(xyz, (V)(0.0f));
+}
+RAY_INLINE V leaves_box(const Box* b) {
+  const V xy = LEAST(b->far.x, b->far.y);
+  return LEAST(xy, b->far.z);
+}
+// The bricks that lie on the same side as those at `at`.
+RAY_INLINE Box box_around(const Ray* ray, I3 at, I away) {
+  const I less = away - 1;
+  return box_between(ray,
+                     v3(TO_V((at.x - less) * VDVR_GRANULARITY), TO_V((at.y - less) * VDVR_GRANULARITY),
+                        TO_V((at.z - less) * VDVR_GRANULARITY)),
+                     v3(TO_V((at.x + away) * VDVR_GRANULARITY), TO_V((at.y + away) * VDVR_GRANULARITY),
+                        TO_V((at.z + away) * VDVR_GRANULARITY)));
+}
+
+// Meets the surfaces in the cells at c, which `sampled` was taken from. Returns the cells.
+RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
+                          const OpenBrick* brick, const Sampled* sampled, V3 c, I active, I* was,
+                          Seen* seen) {
+  const CellBox cell = cell_box(grid, brick, sampled, c);
+  const V3 low = cell.low;
+  const Box box = box_between(
+      ray, low, v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z));
+#ifdef VDVR_SAMPLER_IMAGE3D
+  const I worth = active;
+#else
+  Octet octet = {sampled->s000, sampled->s001, sampled->s010, sampled->s011,
+                 sampled->s100, sampled->s101, sampled->s110, sampled->s111};
+  V lo, hi;
+  octet_range(&octet, &lo, &hi);
+  const I worth = active & ((side_of(p, lo - p->slack) != *was) | (side_of(p, hi + p->slack) != *was));
+#endif
+  if (!ANY(worth)) return box;
+  const V in = enters_box(ray, &box), far = leaves_box(&box), cut = LEAST(far, ray->length),
+          out = MOST(cut, in);
+  const V3 a = position_at(ray, grid, in), b = position_at(ray, grid, out);
+#ifdef VDVR_SAMPLER_IMAGE3D
+  const Octet octet = octet_between(THE_FIELD, brick, grid, a, b);
+#else
+  octet = octet_within(octet,
+                       v3(fraction_of(a.x, low.x, cell.scale.x), fraction_of(a.y, low.y, cell.scale.y),
+                          fraction_of(a.z, low.z, cell.scale.z)),
+                       v3(fraction_of(b.x, low.x, cell.scale.x), fraction_of(b.y, low.y, cell.scale.y),
+                          fraction_of(b.z, low.z, cell.scale.z)));
+#endif
+  const Cubic cubic = cubic_along(&octet);
+  meet_surfaces(THE_FIELD, bricks, grid, p, ray, &cubic, in, out, worth, was, seen);
+  return box;
+}
+
 // Crossings of surfaces, front to back. A lane knows on which side of the surfaces it is; cells on that side
 // alone are passed. Bricks all on one side are leapt over together with the neighbours that are on the same
 // (`distance`); a jump of the field at a brick's face is a crossing there. Geometry: of the first.
@@ -180,11 +281,10 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
   THE_PIXELS;
-  const V none = (V)(0.0f), one = (V)(1.0f);
   Seen seen = nothing_seen((V)(-1.0f));
   const Ray ray = cast_rays(&p, grid, px, py);
   const I3 up = {ray.inverse.x > 0.0f, ray.inverse.y > 0.0f, ray.inverse.z > 0.0f};
-  I active = ends_of(&p, &ray, px, py, one) > 0, samples = 0, was = 0, away = 0;
+  I active = ends_of(&p, &ray, px, py, (V)(1.0f)) > 0, samples = 0, was = 0, away = 0;
   V3 c = ray.entry;
   OpenBrick brick = no_brick();
   int starts = 1;
@@ -195,91 +295,28 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
     }
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
     samples += PICK(active, (I)(1), (I)(0));
-    if (starts) was = side_of(&p, sampled.value);
+    const I here = side_of(&p, sampled.value);
+    if (starts) was = here;
     starts = 0;
-    // Where the ray passes the cell.
-    const CellBox cell = cell_box(grid, &brick, &sampled, c);
-    V3 low = cell.low;
-    V3 high = v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z);
-    const V near_x = enters(low.x, high.x, ray.entry.x, ray.inverse.x);
-    const V near_y = enters(low.y, high.y, ray.entry.y, ray.inverse.y);
-    const V near_z = enters(low.z, high.z, ray.entry.z, ray.inverse.z);
-    V3 far = v3(leaves(low.x, high.x, ray.entry.x, ray.inverse.x),
-                leaves(low.y, high.y, ray.entry.y, ray.inverse.y),
-                leaves(low.z, high.z, ray.entry.z, ray.inverse.z));
-    const V near_xy = MOST(near_x, near_y), near = MOST(near_xy, near_z), in = MOST(near, none);
-    const V far_xy = LEAST(far.x, far.y), cell_far = LEAST(far_xy, far.z);
-    const V cut = LEAST(cell_far, ray.length), out = MOST(cut, in);
-    const V3 at_in = position_at(&ray, grid, in), at_out = position_at(&ray, grid, out);
-#ifdef VDVR_SAMPLER_IMAGE3D
-    Octet octet = octet_between(THE_FIELD, &brick, grid, at_in, at_out);
-#else
-    Octet octet = {sampled.s000, sampled.s001, sampled.s010, sampled.s011,
-                   sampled.s100, sampled.s101, sampled.s110, sampled.s111};
-#endif
-    V lo, hi;
-    octet_range(&octet, &lo, &hi);
-    const I possible = active & ((side_of(&p, lo - p.slack) != was) | (side_of(&p, hi + p.slack) != was));
-    if (ANY(possible)) {
-#ifndef VDVR_SAMPLER_IMAGE3D
-      octet = octet_within(
-          octet,
-          v3(fraction_of(at_in.x, cell.low.x, cell.scale.x), fraction_of(at_in.y, cell.low.y, cell.scale.y),
-             fraction_of(at_in.z, cell.low.z, cell.scale.z)),
-          v3(fraction_of(at_out.x, cell.low.x, cell.scale.x), fraction_of(at_out.y, cell.low.y, cell.scale.y),
-             fraction_of(at_out.z, cell.low.z, cell.scale.z)));
-#endif
-      const Cubic cubic = cubic_along(&octet);
-      V from = none;
-      for (int piece = 0; piece < 4; ++piece) {
-        const V to = piece == 0 ? none : piece == 1 ? cubic.turn : piece == 2 ? cubic.next_turn : one;
-        const V value = cubic_at(&cubic, to);
-        I side = side_of(&p, value);
-        if (piece == 0) {
-          // Cells agree on their faces to rounding: a surface within it was met before, or will be.
-          const I least = side_of(&p, value - p.slack), most = side_of(&p, value + p.slack);
-          const I raised = MOST(was, least);
-          side = LEAST(raised, most);
-        }
-        while (1) {
-          const I crossing = possible & (was != side) & (seen.alpha < p.termination);
-          if (!ANY(crossing)) break;
-          const I rises = side > was;
-          const Surfaces s = surfaces_at(&p, PICK(rises, was, was - 1));
-          const V root = cubic_root(&cubic, from, to, s.value, rises);
-          add_surface(THE_FIELD, bricks, grid, &p, &ray, s, in + root * (out - in), crossing, &seen);
-          was = PICK(crossing, PICK(rises, was + 1, was - 1), was);
-        }
-        was = PICK(possible, side, was);
-        from = to;
-      }
-    }
-    // The cell behind, or what lies behind all bricks on one side.
+    Box box = {c, c, c};
+    if (ANY(active & ((away == 0) | (here != was))))
+      box = pass_cells(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, active, &was, &seen);
     const I leap = active & (away > 0);
     if (ANY(leap)) {
-      const I3 b = brick.at;
-      const I less = away - 1, more = away;
-      low = pick3(leap,
-                  v3(TO_V((b.x - less) * VDVR_GRANULARITY), TO_V((b.y - less) * VDVR_GRANULARITY),
-                     TO_V((b.z - less) * VDVR_GRANULARITY)),
-                  low);
-      high = pick3(leap,
-                   v3(TO_V((b.x + more) * VDVR_GRANULARITY), TO_V((b.y + more) * VDVR_GRANULARITY),
-                      TO_V((b.z + more) * VDVR_GRANULARITY)),
-                   high);
-      far = v3(leaves(low.x, high.x, ray.entry.x, ray.inverse.x),
-               leaves(low.y, high.y, ray.entry.y, ray.inverse.y),
-               leaves(low.z, high.z, ray.entry.z, ray.inverse.z));
+      const Box around = box_around(&ray, brick.at, away);
+      box.low = pick3(leap, around.low, box.low);
+      box.high = pick3(leap, around.high, box.high);
+      box.far = pick3(leap, around.far, box.far);
     }
-    const V step_xy = LEAST(far.x, far.y), step = LEAST(step_xy, far.z);
-    const V3 reached = position_at(&ray, grid, LEAST(MOST(step, in), ray.length));
-    const I3 by = {far.x <= step, far.y <= step, far.z <= step};
-    const I outside = (by.x & PICK(up.x, high.x >= (float)grid.cells_x, low.x <= 0.0f)) |
-                      (by.y & PICK(up.y, high.y >= (float)grid.cells_y, low.y <= 0.0f)) |
-                      (by.z & PICK(up.z, high.z >= (float)grid.cells_z, low.z <= 0.0f));
-    c = v3(beyond(by.x, up.x, low.x, high.x, c.x, reached.x),
-           beyond(by.y, up.y, low.y, high.y, c.y, reached.y),
-           beyond(by.z, up.z, low.z, high.z, c.z, reached.z));
+    const V step = leaves_box(&box), within = LEAST(step, ray.length);
+    const V3 reached = position_at(&ray, grid, MOST(within, (V)(0.0f)));
+    const I3 by = {box.far.x <= step, box.far.y <= step, box.far.z <= step};
+    const I outside = (by.x & PICK(up.x, (I)(box.high.x >= (float)grid.cells_x), (I)(box.low.x <= 0.0f))) |
+                      (by.y & PICK(up.y, (I)(box.high.y >= (float)grid.cells_y), (I)(box.low.y <= 0.0f))) |
+                      (by.z & PICK(up.z, (I)(box.high.z >= (float)grid.cells_z), (I)(box.low.z <= 0.0f)));
+    c = v3(beyond(by.x, up.x, box.low.x, box.high.x, c.x, reached.x),
+           beyond(by.y, up.y, box.low.y, box.high.y, c.y, reached.y),
+           beyond(by.z, up.z, box.low.z, box.high.z, c.z, reached.z));
     active &= (step < ray.length) & NOT(outside) & (seen.alpha < p.termination);
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.depth, samples);
