@@ -85,8 +85,7 @@ void check_options(const RenderOptions& o) {
   if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
     throw InputError(fmt::format("--size {}x{}: each side must be 1 to 16384 pixels", o.width, o.height));
   if (o.mode == RenderMode::error)
-    throw InputError(
-        "an error slice needs the projections: use `run`, or `render --mode error --projections`");
+    throw InputError("an error slice is not ray-cast: use `run` or `render --mode error`");
   if (o.mode == RenderMode::slice) {
     if (o.output != RenderOutput::colour)
       throw InputError("--show depth and normal do not apply to a slice, which has no camera");

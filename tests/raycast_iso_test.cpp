@@ -139,6 +139,17 @@ BOOST_AUTO_TEST_CASE(roots_are_found_in_cells_of_every_level_and_at_jumps_betwee
   BOOST_TEST(j.wrong == 0);
 }
 
+BOOST_AUTO_TEST_CASE(rays_along_the_longest_axis_end) {
+  // 8192 cells, where positions are coarsest: cells must follow one another to the end.
+  Judgement j;
+  const MixedVolume v = random_volume({8192, 2, 2}, 12);
+  for (const Vec3& eye : {Vec3{5000, 0.3, 0.2}, Vec3{-5000, 0, 0}, Vec3{4500, 1, 0}, Vec3{-4099, 0.5, -1}})
+    for (const double value : {0.9, 0.99, 1.5})
+      judge(v, surface_at(looking(eye, {0, 0, 0}, 0.01), value, 9), j);
+  BOOST_TEST(j.hits > 100);
+  BOOST_TEST(j.wrong == 0);
+}
+
 BOOST_AUTO_TEST_CASE(a_feature_thinner_than_any_step_is_seen) {
   // 0.03 cells across, seen with a step that would leap over the volume.
   MixedVolume v = as_mixed(fields::uniform(centred_grid({16, 16, 16}), [](double x, double y, double z) {

@@ -154,7 +154,7 @@ class ResidentVolume {
 /// where near; a normal's components as colours, 0 as middle grey. Cost: 16 bytes per pixel on the device and
 /// on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws
 /// InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had. Mode
-/// `error` throws InputError: error slices need the projections (`run`, `render --projections`).
+/// `error` throws InputError: error slices are not ray-cast (`run`, `render --mode error`).
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
 
 /// What the device's filter of one image format does to weights and constants (docs/error-bounds.md, section
