@@ -34,11 +34,14 @@ const ResidentVolume& volume(std::int64_t n) {
   return known.emplace(n, ResidentVolume(device(), mixed)).first->second;
 }
 
-void frames(benchmark::State& state, RenderMode mode, const char* preset, bool skip) {
+void frames(benchmark::State& state, RenderMode mode, const char* preset, bool skip,
+            Classification classification = Classification::post, StepMode step_mode = StepMode::fixed) {
   const ResidentVolume& v = volume(state.range(0));
   RenderOptions o;
   o.mode = mode;
-  o.iso = 0.6;
+  o.surfaces = {{0.6}};
+  o.classification = classification;
+  o.step_mode = step_mode;
   o.transfer = transfer_preset(preset, 0, 1);
   o.skip_empty = skip;
   double azimuth = 0, samples = 0;
@@ -65,6 +68,17 @@ BENCHMARK_CAPTURE(frames, dvr_bone, RenderMode::dvr, "bone", true)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(frames, dvr_without_skipping, RenderMode::dvr, "default", false)
+    ->Arg(64)
+    ->Arg(256)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(frames, dvr_preintegrated, RenderMode::dvr, "default", true, Classification::preintegrated)
+    ->Arg(64)
+    ->Arg(256)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(frames, dvr_level_steps, RenderMode::dvr, "default", true, Classification::post,
+                  StepMode::level)
     ->Arg(64)
     ->Arg(256)
     ->UseRealTime()

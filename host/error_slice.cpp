@@ -91,8 +91,8 @@ PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o) {
 /// A number in the characters that the caption's font has.
 std::string number(double value) { return fmt::format("{:.4g}", value); }
 
-void draw_caption(Image& image, const ErrorSlice& slice, const Certificate& c, const ErrorSliceOptions& o) {
-  const std::string low = "0", high = fmt::format("epsilon {}", number(c.epsilon_abs));
+void draw_caption(Image& image, double epsilon, const std::string& text) {
+  const std::string low = "0", high = fmt::format("epsilon {}", number(epsilon));
   const std::int64_t top = image.height - kCaption + kMargin;
   const std::int64_t left = kMargin + 2 * kFontAdvance;
   const std::int64_t right =
@@ -102,12 +102,20 @@ void draw_caption(Image& image, const ErrorSlice& slice, const Certificate& c, c
   for (std::int64_t x = left; x < right; ++x)
     for (std::int64_t y = top; y < top + kBar; ++y)
       put(image, x, y, error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
-  const std::string text =
-      fmt::format("largest |V - F| = {} = {:.1f} % of epsilon, at {} = {}", number(slice.max_error),
-                  100 * slice.max_error / c.epsilon_abs, "xyz"[o.axis], number(o.position));
   const int scale =
       static_cast<std::int64_t>(text.size()) * kFontAdvance * 2 + 2 * kMargin <= image.width ? 2 : 1;
   draw_text(image, kMargin, top + kBar + 6, text, scale, kInk);
+}
+
+ErrorSlice empty_slice(const ErrorSliceOptions& o) {
+  ErrorSlice s;
+  s.image = {o.width, o.height, {}};
+  s.image.rgb.resize(static_cast<std::size_t>(o.width * o.height * 3));
+  for (std::int64_t i = 0; i < o.width * o.height; ++i) put(s.image, i, 0, kPaper);
+  s.errors = {o.width, o.height - kCaption, {}};
+  s.errors.values.assign(static_cast<std::size_t>(s.errors.width * s.errors.height),
+                         std::numeric_limits<float>::quiet_NaN());
+  return s;
 }
 
 /// Compares every pixel and colours it.
@@ -139,7 +147,6 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
           static_cast<float>(error);
       if (std::isnan(error) || error > result.max_error) {  // a NaN stays the largest
         result.max_error = error;
-        result.worst_at = point;
       }
       const bool within = error <= c.epsilon_abs;
       put(result.image, left + x, top + y, within ? error_colour(error / c.epsilon_abs) : kAbove);
@@ -165,15 +172,44 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
   const PixelGrid pixels = pixel_grid(volume.grid, options);
   const ReconstructOptions exact{certificate.field, 16, "cubic"};
   const Volume f = reconstruct(device, scan, pixels.grid, exact, progress);
-  ErrorSlice result;
-  result.image = {options.width, options.height, {}};
-  result.image.rgb.resize(static_cast<std::size_t>(options.width * options.height * 3));
-  for (std::int64_t i = 0; i < options.width * options.height; ++i) put(result.image, i, 0, kPaper);
-  result.errors = {options.width, options.height - kCaption, {}};
-  result.errors.values.assign(static_cast<std::size_t>(result.errors.width * result.errors.height),
-                              std::numeric_limits<float>::quiet_NaN());
+  ErrorSlice result = empty_slice(options);
   compare(result, pixels, axes_of(options.axis), f, scan.geometry, volume, certificate);
-  draw_caption(result.image, result, certificate, options);
+  draw_caption(result.image, certificate.epsilon_abs,
+               fmt::format("largest |V - F| = {} = {:.1f} % of epsilon, at {} = {}", number(result.max_error),
+                           100 * result.max_error / certificate.epsilon_abs, "xyz"[options.axis],
+                           number(options.position)));
+  return result;
+}
+
+ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool image3d,
+                       const ErrorSliceOptions& options) {
+  if (image3d && !c.total_image3d)
+    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+  const PixelGrid pixels = pixel_grid(volume.grid, options);
+  const Axes axes = axes_of(options.axis);
+  ErrorSlice result = empty_slice(options);
+  const double total = image3d ? *c.total_image3d : c.total_buffer;
+  result.max_error = total;
+  const Colour colour = total <= c.epsilon_abs ? error_colour(total / c.epsilon_abs) : kAbove;
+  const std::int64_t left = (result.image.width - pixels.width) / 2;
+  const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
+  for (std::int64_t y = 0; y < pixels.height; ++y)
+    for (std::int64_t x = 0; x < pixels.width; ++x) {
+      Index3 at{};
+      at[axes.across] = x;
+      at[axes.down] = y;
+      at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
+      const Vec3 point = pixels.grid.position(at);
+      const bool inside = !c.roi || brick_inside(volume, *c.roi, brick_at(volume, point));
+      put(result.image, left + x, top + y, inside ? colour : kNotCompared);
+      if (!inside) continue;
+      ++result.pixels;
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] =
+          static_cast<float>(total);
+    }
+  draw_caption(result.image, c.epsilon_abs,
+               fmt::format("|V - F| <= {} = {:.1f} % of epsilon where covered, {}", number(total),
+                           100 * total / c.epsilon_abs, image3d ? "image3d" : "buffer"));
   return result;
 }
 

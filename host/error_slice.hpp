@@ -1,5 +1,5 @@
-// A picture of |V - F| on one slice, measured pixel by pixel: the certified field against F reconstructed on
-// the pixels themselves. Called by the commands run and render --mode error.
+// A picture of |V - F| on one slice, bounded by the certificate or measured pixel by pixel: the certified
+// field against F reconstructed on the pixels themselves. Called by the commands run and render --mode error.
 #pragma once
 
 #include <array>
@@ -41,5 +41,13 @@ bool brick_inside(const MixedVolume& volume, const std::array<double, 6>& box, c
 ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress = {});
+
+/// The same picture from the certificate alone: every pixel shows the certificate's total for the sampler,
+/// which bounds |V - F| at every covered point (`max_error`, `errors`); grey and NaN in bricks outside the
+/// region of interest. Points that are not covered cannot be told apart without the projections: the caption
+/// says where it holds. Host only. Throws InputError when the certificate has no total for the sampler, and
+/// as above.
+ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& certificate, bool image3d,
+                       const ErrorSliceOptions& options);
 
 }  // namespace vdvr

@@ -1,6 +1,6 @@
-// Launches the ray-caster: checks options, bakes the transfer function, finds which bricks can be leapt over,
-// converts the picture. Called by the render, run and bench commands. Launches: raycast_dvr, raycast_iso,
-// raycast_mip, slice of kernels/raycast.cl.
+// Launches the ray-caster: checks options, finds which bricks can be leapt over,
+// converts the picture. Called by the render, run and bench commands. Launches: raycast_dvr,
+// raycast_preintegrated, raycast_level, raycast_iso, raycast_mip, slice of kernels/raycast.cl.
 #include "host/raycast.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 
+#include "host/bake.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/resident_volume.hpp"
 #include "shared/raycast_params.h"
@@ -20,16 +21,12 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 300 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 408 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
-
-// Entries of the baked transfer function: 16 KiB stay in a CPU's first cache; 1024 steps are finer than 8-bit
-// pictures show.
-constexpr int kTableSize = 1024;
 
 glm::dvec3 to_glm(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
@@ -74,13 +71,21 @@ void check_surfaces(const std::vector<IsoSurface>& surfaces) {
           fmt::format("--iso {} must be finite, and its opacity {} within [0, 1]", s.value, s.opacity));
 }
 
+void check_lights(const std::vector<Vec3>& lights) {
+  if (lights.size() > VDVR_LIGHTS)
+    throw InputError(
+        fmt::format("--light names {} lights that stand still; at most {} do", lights.size(), VDVR_LIGHTS));
+  for (const Vec3& l : lights)
+    if (!is_finite(l) || !(glm::length(to_glm(l)) > 0))
+      throw InputError(fmt::format("--light {},{},{} has no direction", l[0], l[1], l[2]));
+}
+
 void check_options(const RenderOptions& o) {
   // Pixels are counted in int on the device; 16384 x 16384 already needs 4 GiB there.
   if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
     throw InputError(fmt::format("--size {}x{}: each side must be 1 to 16384 pixels", o.width, o.height));
   if (o.mode == RenderMode::error)
-    throw InputError(
-        "an error slice needs the projections: use `run`, or `render --mode error --projections`");
+    throw InputError("an error slice is not ray-cast: use `run` or `render --mode error`");
   if (o.mode == RenderMode::slice) {
     if (o.output != RenderOutput::colour)
       throw InputError("--show depth and normal do not apply to a slice, which has no camera");
@@ -98,90 +103,60 @@ void check_options(const RenderOptions& o) {
   if (!(o.termination > 0 && o.termination <= 1))
     throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
   if (o.mode == RenderMode::iso) check_surfaces(o.surfaces);
+  check_lights(o.lights);
+  if (o.mode != RenderMode::dvr &&
+      (o.classification != Classification::post || o.step_mode != StepMode::fixed))
+    throw InputError("--classification and --step-mode apply to --mode dvr");
+  if (o.classification == Classification::preintegrated && o.step_mode == StepMode::level)
+    throw InputError(
+        "--step-mode level does not apply to --classification preintegrated, whose table is of one step");
   if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
     throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
 }
 
-// --- the transfer function as a table
-// ---------------------------------------------------------------------------------
-
-struct Table {
-  std::vector<cl_float4> entries;  ///< rgb, opacity of one step
-  float lo = 0, scale = 0;         ///< entry = (value - lo) * scale
-
-  // The entry that the kernel's look_up starts from, by the same fp32 operations.
-  [[nodiscard]] int first_entry(float value) const {
-    const float x = std::clamp((value - lo) * scale, 0.0f, static_cast<float>(kTableSize - 1));
-    return std::min(static_cast<int>(x), kTableSize - 2);
-  }
-};
-
-Table bake(const TransferFunction& transfer, double step) {
-  Table t;
-  // Iso-surfaces have colours of their own.
-  const std::vector<TransferPoint> none{{0, {0, 0, 0}, 0}};
-  const auto& points = transfer.points.empty() ? none : transfer.points;
-  const double lo = points.front().value, hi = points.back().value;
-  t.lo = static_cast<float>(lo);
-  t.scale = hi > lo ? static_cast<float>((kTableSize - 1) / (hi - lo)) : 0.0f;
-  // A range that fp32 cannot tell from a point has one colour.
-  if (!std::isfinite(t.scale)) t.scale = 0;
-  for (int i = 0; i < kTableSize; ++i) {
-    const TransferPoint p = transfer_at(points, lo + (hi - lo) * i / (kTableSize - 1));
-    cl_float4 e{};
-    for (std::size_t c = 0; c < 3; ++c) e.s[c] = static_cast<float>(p.rgb[c]);
-    // `opacity` is over one base cell: what passes n steps of length s passes as much as n s base cells.
-    e.s[3] = static_cast<float>(1 - std::pow(1 - p.opacity, step));
-    t.entries.push_back(e);
-  }
-  return t;
-}
-
 // --- which bricks can matter
 // ------------------------------------------------------------------------------------------
 
-std::vector<std::uint8_t> opaque_bricks(const Impl& v, const Table& table, float slack) {
-  std::vector<int> opaque_before(kTableSize + 1, 0);  // entries below i with any opacity
-  for (std::size_t i = 0; i < kTableSize; ++i)
-    opaque_before[i + 1] = opaque_before[i] + (table.entries[i].s[3] > 0 ? 1 : 0);
-  std::vector<std::uint8_t> occupied(v.host_ranges.size());
-  for (std::size_t i = 0; i < occupied.size(); ++i) {
-    const auto first = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[0] - slack));
-    const auto last = static_cast<std::size_t>(table.first_entry(v.host_ranges[i].s[1] + slack)) + 1;
-    occupied[i] = opaque_before[last + 1] > opaque_before[first] ? 1 : 0;
-  }
-  return occupied;
+/// By brick 0 where the transfer function may show something, else the stretch of it that its values lie in.
+std::vector<std::uint8_t> empty_bricks(const Impl& v, const BakedTransfer& table, float slack) {
+  std::vector<std::uint8_t> classes(v.host_ranges.size());
+  std::transform(v.host_ranges.begin(), v.host_ranges.end(), classes.begin(),
+                 [&](const cl_float2& r) { return table.stretch_of(r.s[0] - slack, r.s[1] + slack); });
+  return classes;
 }
 
-std::vector<std::uint8_t> bricks_reaching(const Impl& v, float iso, float slack) {
-  std::vector<std::uint8_t> occupied(v.host_ranges.size());
-  std::transform(v.host_ranges.begin(), v.host_ranges.end(), occupied.begin(),
-                 [&](const cl_float2& r) { return static_cast<std::uint8_t>(r.s[1] + slack < iso ? 0 : 1); });
-  return occupied;
-}
-
-float lowest_surface(const RenderOptions& o) {
-  const auto lowest = std::min_element(o.surfaces.begin(), o.surfaces.end(),
-                                       [](const auto& a, const auto& b) { return a.value < b.value; });
-  return static_cast<float>(lowest->value);
+/// By brick 1 and on how many surfaces it lies, 0 where a surface may pass.
+std::vector<std::uint8_t> sides_of_surfaces(const Impl& v, const std::vector<float>& surfaces, float slack) {
+  const auto side = [&](float value) {
+    return std::count_if(surfaces.begin(), surfaces.end(), [&](float s) { return value >= s; });
+  };
+  std::vector<std::uint8_t> classes(v.host_ranges.size());
+  std::transform(v.host_ranges.begin(), v.host_ranges.end(), classes.begin(), [&](const cl_float2& r) {
+    // Twice the allowance: kernels add one more before they pass a cell.
+    const auto lowest = side(r.s[0] - 2 * slack), highest = side(r.s[1] + 2 * slack);
+    return static_cast<std::uint8_t>(lowest == highest ? 1 + lowest : 0);
+  });
+  return classes;
 }
 
 // Brings frame.distance up to date; a turntable computes it once.
-void update_distance(Impl& v, const RenderOptions& o, const Table& table, float slack) {
-  std::vector<float> key{slack};
+void update_distance(Impl& v, const RenderOptions& o, const BakedTransfer& table, float slack) {
+  std::vector<float> key{slack}, surfaces;
+  for (const IsoSurface& s : o.surfaces) surfaces.push_back(static_cast<float>(s.value));
   if (o.mode == RenderMode::dvr) {
     key.insert(key.end(), {0, table.lo, table.scale});
-    for (const auto& e : table.entries) key.push_back(e.s[3] > 0 ? 1.0f : 0.0f);
+    key.insert(key.end(), table.stretch.begin(), table.stretch.end());
   } else {
-    key.insert(key.end(), {1, lowest_surface(o)});
+    key.push_back(1);
+    key.insert(key.end(), surfaces.begin(), surfaces.end());
   }
   if (key == v.frame.distance_key) return;
-  const auto occupied = o.mode == RenderMode::dvr ? opaque_bricks(v, table, slack)
-                                                  : bricks_reaching(v, lowest_surface(o), slack);
+  const auto classes =
+      o.mode == RenderMode::dvr ? empty_bricks(v, table, slack) : sides_of_surfaces(v, surfaces, slack);
   const VdvrGrid& g = v.field->grid;
   const Index3 n{g.bricks_x, g.bricks_y, g.bricks_z};
-  const auto distance = distance_to_occupied(occupied, n);
+  const auto distance = distance_to_other(classes, n);
   if (v.frame.distance.size() != distance.size())
     v.frame.distance = DeviceArray<cl_uchar>(*v.state, distance.size(), "distances to occupied bricks");
   v.frame.distance.write(distance);
@@ -210,7 +185,18 @@ void set_surfaces(VdvrRaycast& p, std::vector<IsoSurface> surfaces) {
   }
 }
 
-VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& table, float slack) {
+void set_lights(VdvrRaycast& p, const RenderOptions& o) {
+  p.head_light = o.head_light ? 1 : 0;
+  for (const Vec3& light : o.lights) {
+    const glm::dvec3 l = glm::normalize(to_glm(light));
+    float* to = p.light[p.lights++];
+    set3(to[0], to[1], to[2], l);
+  }
+  // Together they are as bright as one alone.
+  p.light_share = 0.75f / static_cast<float>(std::max(1, p.head_light + p.lights));
+}
+
+VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const BakedTransfer& table, float slack) {
   const glm::dvec3 origin = to_glm(v.grid.origin), spacing = to_glm(v.grid.spacing),
                    eye = to_glm(o.camera.position);
   const glm::dvec3 forward = glm::normalize(to_glm(o.camera.focal_point) - eye);
@@ -230,7 +216,7 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.length_unit = static_cast<float>(unit);
   p.table_lo = table.lo;
   p.table_scale = table.scale;
-  p.table_size = kTableSize;
+  p.table_size = table.size;
   p.termination = static_cast<float>(o.termination);
   // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
   p.gradient_full = (v.value_range.second - v.value_range.first) / 32;
@@ -244,6 +230,7 @@ VdvrRaycast make_params(const Impl& v, const RenderOptions& o, const Table& tabl
   p.shading = o.shading ? 1 : 0;
   p.skip = o.skip_empty ? 1 : 0;
   set_surfaces(p, o.surfaces);
+  set_lights(p, o);
   return p;
 }
 
@@ -327,12 +314,14 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
+          {"VDVR_GRADIENT_ANALYTIC", o.gradient == GradientKind::analytic ? "1" : "0"},
+          {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
           {"VDVR_LANES", std::to_string(lanes)},
           {"VDVR_UNIFORM", v.is_uniform && lanes > 1 ? "1" : "0"},
           v.field->defines.front()};
 }
 
-void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
+void prepare_frame(Impl& v, const RenderOptions& o, const BakedTransfer& table) {
   auto& f = v.frame;
   const auto pixels = static_cast<std::uint64_t>(o.width * o.height),
              rows = static_cast<std::uint64_t>(o.height);
@@ -342,19 +331,42 @@ void prepare_frame(Impl& v, const RenderOptions& o, const Table& table) {
   }
   if (f.row_samples.size() != rows) f.row_samples = DeviceArray<cl_uint>(*v.state, rows, "samples per row");
   f.row_samples.fill(0);
-  if (table.entries.empty()) return;
-  // Once more the opacities alone, four a row.
-  std::vector<cl_float4> entries = table.entries;
-  entries.resize(kTableSize + kTableSize / 4);
-  for (std::size_t i = 0; i < kTableSize; ++i) entries[kTableSize + i / 4].s[i % 4] = table.entries[i].s[3];
-  if (f.table.size() == 0) f.table = DeviceArray<cl_float4>(*v.state, entries.size(), "transfer function");
-  f.table.write(entries);
+  if (table.rows.empty()) return;
+  if (f.table.size() != table.rows.size()) {
+    f.table = {};
+    f.table = DeviceArray<cl_float4>(*v.state, table.rows.size(), "transfer function");
+  }
+  f.table.write(table.rows);
+}
+
+// Tables are kept: a turntable bakes once.
+const BakedTransfer& baked(Impl& v, const RenderOptions& o) {
+  const bool dvr = o.mode == RenderMode::dvr;
+  const bool square = dvr && o.classification == Classification::preintegrated;
+  const int levels = dvr && o.step_mode == StepMode::level ? v.highest_level + 1 : 1;
+  std::vector<double> key{square ? 1.0 : 0.0, static_cast<double>(levels), o.step};
+  for (const TransferPoint& p : o.transfer.points)
+    key.insert(key.end(), {p.value, p.rgb[0], p.rgb[1], p.rgb[2], p.opacity});
+  if (key != v.frame.table_key) {
+    v.frame.baked =
+        square ? bake_preintegrated(o.transfer, o.step, v.value_range) : bake(o.transfer, o.step, levels);
+    v.frame.table_key = std::move(key);
+  }
+  return v.frame.baked;
+}
+
+std::string kernel_name(const RenderOptions& o) {
+  if (o.mode == RenderMode::iso) return "raycast_iso";
+  if (o.mode == RenderMode::mip) return "raycast_mip";
+  if (o.classification == Classification::preintegrated) return "raycast_preintegrated";
+  return o.step_mode == StepMode::level ? "raycast_level" : "raycast_dvr";
 }
 
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
-            int lanes, const Table& table, float slack, const cl::Buffer& bricks, const Field&... field) {
+            int lanes, const BakedTransfer& table, float slack, const cl::Buffer& bricks,
+            const Field&... field) {
   // Pixels of one packet (shared/packet.h).
   const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
   const auto packets = [](std::int64_t pixels, int packet) {
@@ -369,13 +381,10 @@ void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, con
     kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
     return;
   }
-  const char* name = o.mode == RenderMode::dvr   ? "raycast_dvr"
-                     : o.mode == RenderMode::iso ? "raycast_iso"
-                                                 : "raycast_mip";
   // dvr and iso leap by distances, mip by the bricks' maxima.
   const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : v.frame.distance.buffer();
   opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer, cl::Buffer>
-      kernel(*v.state, "raycast", name, defines);
+      kernel(*v.state, "raycast", kernel_name(o), defines);
   kernel(range, field..., bricks, v.field->grid, guide, v.frame.table.buffer(),
          make_params(v, o, table, slack), picture, v.frame.row_samples.buffer());
 }
@@ -438,7 +447,8 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
   const float slack = range_slack(device, v, result.sampler);
   const bool sliced = o.mode == RenderMode::slice;
-  const Table table = sliced ? Table{} : bake(o.transfer, o.step);
+  const BakedTransfer none;
+  const BakedTransfer& table = sliced ? none : baked(v, o);
   prepare_frame(v, o, table);
   if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
 

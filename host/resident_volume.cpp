@@ -193,10 +193,32 @@ AtlasLayout pack_atlas(const MixedVolume& v, const ImageLimits& limits) {
   return layout;
 }
 
-std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& occupied, const Index3& n) {
-  std::vector<std::uint8_t> d(occupied.size());
-  std::transform(occupied.begin(), occupied.end(), d.begin(),
-                 [](std::uint8_t o) { return o ? std::uint8_t{0} : std::uint8_t{255}; });
+namespace {
+
+// Distances that need no search: 0 in bricks of class 0, 1 beside a brick of another class, else 255.
+std::vector<std::uint8_t> nearest_distances(const std::vector<std::uint8_t>& classes, const Index3& n) {
+  std::vector<std::uint8_t> d(classes.size());
+  const auto beside_another = [&](const Index3& p, std::uint8_t own) {
+    for (std::int64_t z = std::max<std::int64_t>(p[2] - 1, 0); z <= std::min(p[2] + 1, n[2] - 1); ++z)
+      for (std::int64_t y = std::max<std::int64_t>(p[1] - 1, 0); y <= std::min(p[1] + 1, n[1] - 1); ++y)
+        for (std::int64_t x = std::max<std::int64_t>(p[0] - 1, 0); x <= std::min(p[0] + 1, n[0] - 1); ++x)
+          if (classes[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)] != own) return true;
+    return false;
+  };
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    const auto k = static_cast<std::int64_t>(i);
+    const Index3 p{k % n[0], k / n[0] % n[1], k / (n[0] * n[1])};
+    d[i] = classes[i] == 0                 ? std::uint8_t{0}
+           : beside_another(p, classes[i]) ? std::uint8_t{1}
+                                           : std::uint8_t{255};
+  }
+  return d;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& classes, const Index3& n) {
+  std::vector<std::uint8_t> d = nearest_distances(classes, n);
   // The two passes of a chamfer transform with all 26 neighbours at distance 1 are exact for the largest-axis
   // distance (Borgefors 1986).
   const auto pass = [&](std::int64_t sign) {
@@ -242,6 +264,8 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     set_texels(v, records);
     texel_records_ = records.words();
   }
+  for (const auto& [triple, block] : v.tiles)
+    highest_level = std::max<int>(highest_level, *std::max_element(triple.begin(), triple.end()));
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const BrickSamples stored(v, position_of(v, i));
     host_ranges.push_back(range_of(stored));

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/bake.hpp"
 #include "host/device_field.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -55,10 +56,9 @@ struct AtlasLayout {
 /// The smallest atlas found within the limits. Host only; microseconds to milliseconds.
 AtlasLayout pack_atlas(const MixedVolume& volume, const ImageLimits& limits);
 
-/// Distance of each brick, in bricks (largest axis), to the nearest one with occupied != 0; 0 there, at most
-/// 255. [bz][by][bx].
-std::vector<std::uint8_t> distance_to_occupied(const std::vector<std::uint8_t>& occupied,
-                                               const Index3& bricks);
+/// Distance of each brick, in bricks (largest axis), to the nearest one of another class, at most 255; 0 for
+/// bricks of class 0. [bz][by][bx].
+std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& classes, const Index3& bricks);
 
 struct ResidentVolume::Impl {
   Impl(Device& device, const MixedVolume& volume, const ImageLimits& limits);
@@ -80,6 +80,7 @@ struct ResidentVolume::Impl {
   std::vector<cl_float2> host_ranges;  ///< what ranges() holds
   std::pair<float, float> value_range{0, 0};
   float largest = 0;        ///< that a texel can decode to, in magnitude
+  int highest_level = 0;    ///< of any brick and axis
   bool is_uniform = false;  ///< every brick reads a float32 base
   AtlasLayout layout;
 
@@ -89,7 +90,8 @@ struct ResidentVolume::Impl {
     opencl::DeviceArray<cl_uint> row_samples;
     opencl::DeviceArray<cl_uchar> distance;
     std::vector<float> distance_key;  ///< what `distance` was computed for
-    std::vector<cl_float4> table_values;
+    BakedTransfer baked;              ///< what `table` holds
+    std::vector<double> table_key;    ///< what `baked` was made from
   } frame;
 
   std::optional<DeviceField> field;

@@ -5,10 +5,10 @@
 // vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
 // rays of a packet share k; each counts from its own entry. So neither skipping nor packets change a bit.
 //
-// Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one worth sampling, at most 255),
-// ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities alone), picture[y][x]
-// (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth). Called by: raycast() in
-// host/raycast.cpp.
+// Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where
+// worth sampling), ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities
+// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth). Called by:
+// raycast() in host/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
@@ -22,6 +22,10 @@
 // 1: where and how what is seen stands, instead of its colour.
 #ifndef VDVR_GEOMETRY
 #define VDVR_GEOMETRY 0
+#endif
+// 1: gradients are the derivative of the cell, 0: central differences over one base cell.
+#ifndef VDVR_GRADIENT_ANALYTIC
+#define VDVR_GRADIENT_ANALYTIC 0
 #endif
 // Tuning: pixels of one work-group. 8 x 8 keeps the rays of a group in the same bricks.
 #ifndef VDVR_GROUP_X
@@ -50,9 +54,6 @@
 // grid of 8192 cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration
 // often.
 #define LEAP_MARGIN 0.00390625f
-// Bisections of an iso interval: the hit is known to 2^-13 of a step.
-#define BISECTIONS 12
-
 // A sample that adds less than this per length to the picture, half a step of 8 bits, is not worth six more
 // for shading.
 #define SHADED_WEIGHT 0.001953125f
@@ -69,19 +70,7 @@ RAY_INLINE V3 scaled(V3 a, V s) { return v3(a.x * s, a.y * s, a.z * s); }
 RAY_INLINE V3 plus(V3 a, V3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }
 RAY_INLINE V3 pick3(I m, V3 a, V3 b) { return v3(PICK(m, a.x, b.x), PICK(m, a.y, b.y), PICK(m, a.z, b.z)); }
 
-// Phong with a light at the eye, two-sided. Where the gradient is weak its direction is noise: shading fades
-// out there.
-RAY_INLINE V3 shade(V3 rgb, V3 gradient, V3 view, float gradient_full) {
-  const V magnitude = sqrt(dot3(gradient, gradient));
-  const I known = magnitude > 0.0f;
-  const V none = (V)(0.0f), one = (V)(1.0f);
-  const V strength = gradient_full > 0.0f ? LEAST(magnitude / gradient_full, one) : PICK(known, one, none);
-  const V facing = PICK(known, LEAST(fabs(dot3(gradient, view)) / PICK(known, magnitude, one), one), one);
-  const V f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
-  const V lit = 1.0f + strength * ((0.25f + 0.75f * facing) - 1.0f);
-  const V highlight = 0.2f * strength * f8 * f8 * f8;
-  return v3(rgb.x * lit + highlight, rgb.y * lit + highlight, rgb.z * lit + highlight);
-}
+#include "shared/shade.h"
 
 // One axis of a ray and the two faces of the grid across it.
 RAY_INLINE V clip(V direction, float eye, int cells, V* inverse, V* far) {
@@ -246,17 +235,63 @@ RAY_INLINE I ends_of(const VdvrRaycast* p, const Ray* ray, I px, I py, V samples
   const I py = (int)get_global_id(1) * PACKET_Y + ROWS;    \
   if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height) return
 
+// What has been seen along the rays.
+typedef struct {
+  V3 colour, normal;
+  V alpha, depth;
+} Seen;
+
+RAY_INLINE Seen nothing_seen(V depth) {
+  const V none = (V)(0.0f), nothing = (V)(NAN);
+  const Seen seen = {v3(none, none, none), v3(nothing, nothing, nothing), none, depth};
+  return seen;
+}
+
+// Composites lanes of positive weight: `sampled` was taken at c, parameter t. Geometry: where the opacity
+// passes a half.
+RAY_INLINE void absorb(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
+                       const OpenBrick* brick, const Sampled* sampled, V3 c, V t, V3 rgb, V weight,
+                       V shaded_weight, Seen* seen) {
+  const float3 cells_per_length =
+      (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
+#if VDVR_GEOMETRY
+  const I half_way = (seen->alpha < 0.5f) & (seen->alpha + weight >= 0.5f);
+  if (ANY(half_way)) {
+    const V3 g = gradient_at(THE_FIELD, bricks, grid, brick, sampled, c, cells_per_length, half_way);
+    seen->normal = pick3(half_way, normal_of(g), seen->normal);
+    seen->depth = PICK(half_way, (ray->first + t) * p->length_unit, seen->depth);
+  }
+#else
+  const I lit = weight > shaded_weight;
+  if (p->shading && ANY(lit))
+    rgb = pick3(lit,
+                shade(p, rgb, gradient_at(THE_FIELD, bricks, grid, brick, sampled, c, cells_per_length, lit),
+                      ray->world, p->gradient_full),
+                rgb);
+  seen->colour = plus(seen->colour, scaled(rgb, weight));
+#endif
+  seen->alpha += weight;
+}
+
+// Normal and depth, or the colour before the background and `fourth`.
+RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture,
+                         __global uint* restrict row_samples, I px, I py, const Seen* seen, V fourth,
+                         I samples) {
+#if VDVR_GEOMETRY
+  put(p->width, p->height, picture, row_samples, px, py, seen->normal, seen->depth, samples);
+#else
+  put(p->width, p->height, picture, row_samples, px, py,
+      plus(seen->colour, scaled(background(p, py), 1.0f - seen->alpha)), fourth, samples);
+#endif
+}
+
 // Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
 // that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
                                     __global float4* restrict picture, __global uint* restrict row_samples) {
   THE_PIXELS;
-  const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-  const V none = (V)(0.0f), nothing = (V)(NAN);
-  V3 colour = v3(none, none, none);
-  V alpha = none, depth = nothing;
-  V3 normal = v3(nothing, nothing, nothing);
+  Seen seen = nothing_seen((V)(NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
@@ -264,7 +299,7 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   OpenBrick brick = no_brick();
   int k = 0;
   while (k < end) {
-    const I active = (k < ends) & (alpha < p.termination);
+    const I active = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(active)) break;
     const float t = ((float)k + 0.5f) * p.step;
     const V3 c = position_at(&ray, grid, (V)(t));
@@ -282,142 +317,18 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
     const Row row = row_of(&p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
-    const V weight = PICK(active, (1.0f - alpha) * opacity_of(table, &p, row), none);
-    if (ANY(weight > 0.0f)) {
-#if VDVR_GEOMETRY
-      const I half_way = (alpha < 0.5f) & (alpha + weight >= 0.5f);
-      if (ANY(half_way)) {
-        const V3 g = gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, half_way);
-        normal = pick3(half_way, normal_of(g), normal);
-        depth = PICK(half_way, (ray.first + t) * p.length_unit, depth);
-      }
-#else
-      V3 rgb = colour_of(table, row);
-      const I seen = weight > SHADED_WEIGHT * p.step;
-      if (p.shading && ANY(seen))
-        rgb = pick3(
-            seen,
-            shade(rgb, gradient_at(THE_FIELD, bricks, grid, &brick, &sampled, c, cells_per_length, seen),
-                  ray.world, p.gradient_full),
-            rgb);
-      colour = plus(colour, scaled(rgb, weight));
-#endif
-      alpha += weight;
-    }
+    const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
+    if (ANY(weight > 0.0f))
+      absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
+             (V)(SHADED_WEIGHT * p.step), &seen);
     ++k;
   }
-#if VDVR_GEOMETRY
-  put(p.width, p.height, picture, row_samples, px, py, normal, depth, samples);
-#else
-  put(p.width, p.height, picture, row_samples, px, py, plus(colour, scaled(background(&p, py), 1.0f - alpha)),
-      alpha, samples);
-#endif
+  put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);
 }
 
-// How many surfaces a value lies on or above.
-RAY_INLINE I side_of(const VdvrRaycast* p, V value) {
-  I side = 0;
-  for (int i = 0; i < p->surfaces; ++i) side += PICK(value >= p->surface[i].value, (I)(1), (I)(0));
-  return side;
-}
-
-// The surface of each lane.
-typedef struct {
-  V3 rgb;
-  V value, opacity;
-} Surfaces;
-RAY_INLINE Surfaces surfaces_at(const VdvrRaycast* p, I number) {
-  Surfaces s;
-#define CHOOSE(n)                                             \
-  {                                                           \
-    const int i = clamp(LANE(number, n), 0, p->surfaces - 1); \
-    LANE(s.rgb.x, n) = p->surface[i].rgb[0];                  \
-    LANE(s.rgb.y, n) = p->surface[i].rgb[1];                  \
-    LANE(s.rgb.z, n) = p->surface[i].rgb[2];                  \
-    LANE(s.value, n) = p->surface[i].value;                   \
-    LANE(s.opacity, n) = p->surface[i].opacity;               \
-  }
-  EACH(CHOOSE)
-#undef CHOOSE
-  return s;
-}
-
-// Crossings of surfaces, front to back: between successive samples t_k = k step (the last at the box's exit)
-// that lie on different sides each surface between them is found by bisection. Only bricks wholly below the
-// lowest surface are leapt over, so the side of a sample that was not taken is known. Geometry: of the first.
-__kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
-                                    __global const float4* restrict table, VdvrRaycast p,
-                                    __global float4* restrict picture, __global uint* restrict row_samples) {
-  THE_PIXELS;
-  const float3 cells_per_length = (float3)(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
-  const V none = (V)(0.0f), nothing = (V)(NAN);
-  V3 colour = v3(none, none, none), normal = v3(nothing, nothing, nothing);
-  V alpha = none, depth = (V)(-1.0f);
-  I samples = 0, was = 0;
-  const Ray ray = cast_rays(&p, grid, px, py);
-  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step + 1.0f);
-  const int end = most_lane(ends);
-  OpenBrick brick = no_brick();
-  int k = 0;
-  while (k < end) {
-    const I active = (k < ends) & (alpha < p.termination);
-    if (!ANY(active)) break;
-    const V t = LEAST((V)((float)k * p.step), ray.length);
-    const V3 c = position_at(&ray, grid, t);
-    if (ANY(active & NOT(is_inside(&brick, c)))) {
-      const I3 at = brick_at(grid, c);
-      if (p.skip && !ANY(active & (was != 0))) {
-        const I away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
-        if (!ANY(active & (away == 0))) {
-          k = leap_to(leave_bricks(&ray, at, away - 1), active, p.inverse_step, 0.0f, k, end);
-          continue;
-        }
-      }
-      brick = open_brick(bricks, grid, at);
-    }
-    const I side = side_of(&p, sample_open(THE_FIELD, &brick, grid, c).value);
-    samples += PICK(active, (I)(1), (I)(0));
-    was = k == 0 ? side : PICK(active, was, side);
-    while (1) {
-      const I crossing = (was != side) & (alpha < p.termination);
-      if (!ANY(crossing)) break;
-      const I up = side > was;
-      const I number = PICK(up, was, was - 1);
-      Surfaces s = surfaces_at(&p, number);
-      V before = (V)((float)(k - 1) * p.step), behind = t;
-      for (int i = 0; i < BISECTIONS; ++i) {
-        const V middle = 0.5f * (before + behind);
-        const I inside =
-            sample_anywhere(THE_FIELD, bricks, grid, position_at(&ray, grid, middle)).value >= s.value;
-        const I is_before = inside != up;
-        before = PICK(is_before, middle, before);
-        behind = PICK(is_before, behind, middle);
-      }
-      const V at = 0.5f * (before + behind);
-      const I first = crossing & (depth < 0.0f);
-      depth = PICK(first, (ray.first + at) * p.length_unit, depth);
-      if (p.shading || VDVR_GEOMETRY) {
-        const V3 hit = position_at(&ray, grid, at);
-        const OpenBrick around = open_brick(bricks, grid, brick_at(grid, hit));
-        const Sampled sampled = sample_open(THE_FIELD, &around, grid, hit);
-        const V3 g = gradient_at(THE_FIELD, bricks, grid, &around, &sampled, hit, cells_per_length, crossing);
-        normal = pick3(first, normal_of(g), normal);
-        s.rgb = shade(s.rgb, g, ray.world, 0.0f);
-      }
-      const V weight = PICK(crossing, (1.0f - alpha) * s.opacity, none);
-      colour = plus(colour, scaled(s.rgb, weight));
-      alpha += weight;
-      was = PICK(crossing, PICK(up, was + 1, was - 1), PICK(was != side, side, was));
-    }
-    ++k;
-  }
-#if VDVR_GEOMETRY
-  put(p.width, p.height, picture, row_samples, px, py, normal, depth, samples);
-#else
-  put(p.width, p.height, picture, row_samples, px, py, plus(colour, scaled(background(&p, py), 1.0f - alpha)),
-      depth, samples);
-#endif
-}
+#include "shared/raycast_preintegrated.h"
+#include "shared/raycast_level.h"
+#include "shared/raycast_iso.h"
 
 // The largest sample along the ray; a brick that cannot raise it is leapt over. Geometry: where it lies; no
 // normal.

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <cstring>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -233,6 +235,13 @@ BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
   render("x.png", {"--mode", "iso", "--show", "depth", "--box"}, "--box");
   render("x.png", {"--iso-opacity", "0.5"}, "--iso-opacity");
   render("x.png", {"--background", "1,2,3"}, "--background");
+  render("x.png", {"--light", "left"}, "--light");
+  render("x.png", {"--light", "1,2"}, "--light");
+  render("x.png", {"--light", "head", "--no-shading"}, "--light");
+  render("x.png", {"--mode", "mip", "--gradient", "central"}, "--gradient");
+  render("x.png", {"--mode", "iso", "--step-mode", "level"}, "--step-mode");
+  render("x.png", {"--mode", "slice", "--classification", "post"}, "--classification");
+  render("x.png", {"--classification", "preintegrated", "--step-mode", "level"}, "--step-mode");
   render("x.png", {"--background", "0.5,0.5"}, "--background");
 }
 
@@ -267,6 +276,9 @@ BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
     BOOST_TEST(bytes.find("(16, 24)") != std::string::npos);
     BOOST_TEST(bytes.size() % 64 == (16 * 24 * 4) % 64);
   }
+  draw("ramp.png",
+       {"--light", "head", "--light", "1,0,-1", "--gradient", "analytic", "--step-mode", "level"});
+  draw("ramp.png", {"--classification", "preintegrated"});
   draw("ramp.apng", {"--turntable", "3", "--tf", "grey", "--tf-range", "0,63"});
   draw("ramp.gif", {"--turntable", "3"});
   BOOST_TEST(contents(at("ramp.gif")).rfind("GIF89a", 0) == 0);
@@ -364,6 +376,34 @@ BOOST_AUTO_TEST_CASE(json_stands_alone_on_standard_output) {
       BOOST_TEST(nlohmann::json::parse(r.out, nullptr, false).is_object());
     }
   }
+}
+
+BOOST_AUTO_TEST_CASE(an_error_picture_without_projections_is_the_certificates_total) {
+  const std::string volume = at("json.vdvr"), picture = at("bound.npy");
+  const auto certificate =
+      nlohmann::json::parse(run({"info", volume, "--json"}).out, nullptr, false)["certificate"];
+  const Result r =
+      run({"render", volume, "-o", picture, "--mode", "error", "--size", "160x64", "--json", "--force"});
+  BOOST_REQUIRE_EQUAL(r.code, 0);
+  const auto json = nlohmann::json::parse(r.out, nullptr, false);
+  const double total = certificate["total"]["buffer"].get<double>();
+  BOOST_TEST(json["bound"].get<double>() == total);
+  BOOST_TEST(total <= certificate["epsilon_abs"].get<double>());
+  // Beside the slice, whose pixels are square, there is nothing.
+  const std::string bytes = contents(picture);
+  BOOST_TEST(bytes.size() % 64 == (160 * 64 * 4) % 64);
+  std::int64_t bounded = 0;
+  for (std::size_t i = bytes.size() - 160 * 64 * 4; i < bytes.size(); i += 4) {
+    float value = 0;
+    std::memcpy(&value, bytes.data() + i, 4);
+    if (std::isnan(value)) continue;
+    ++bounded;
+    BOOST_REQUIRE(value == static_cast<float>(total));
+  }
+  BOOST_TEST(bounded == json["pixels"].get<std::int64_t>());
+  BOOST_TEST(bounded > 0);
+  BOOST_TEST(run({"render", volume, "-o", at("bound.png"), "--mode", "error"}).code == 0);
+  BOOST_TEST(fs::exists(at("bound.png")));
 }
 
 BOOST_AUTO_TEST_CASE(info_shows_storage_beside_the_certificate) {

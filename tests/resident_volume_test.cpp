@@ -154,20 +154,23 @@ BOOST_AUTO_TEST_CASE(range_of_a_brick_bounds_what_it_can_interpolate) {
 BOOST_AUTO_TEST_CASE(distances_match_a_search_over_all_bricks) {
   const Index3 n{7, 5, 9};
   std::mt19937 random(11);
-  std::vector<std::uint8_t> occupied(7 * 5 * 9);
-  for (auto& o : occupied) o = random() % 40 == 0;
-  const auto d = distance_to_occupied(occupied, n);
+  // Few of class 0, one corner of another class than the rest.
+  std::vector<std::uint8_t> classes(7 * 5 * 9);
+  for (std::size_t i = 0; i < classes.size(); ++i)
+    classes[i] = static_cast<std::uint8_t>(random() % 40 == 0 ? 0 : i > 250 && i % 7 > 2 ? 3 : 1);
+  const auto d = distance_to_other(classes, n);
   const auto at = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
     return static_cast<std::size_t>((z * n[1] + y) * n[0] + x);
   };
   for (std::int64_t z = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x) {
-        std::int64_t nearest = 255;
+        const std::uint8_t own = classes[at(x, y, z)];
+        std::int64_t nearest = own == 0 ? 0 : 255;
         for (std::int64_t w = 0; w < n[2]; ++w)
           for (std::int64_t v = 0; v < n[1]; ++v)
             for (std::int64_t u = 0; u < n[0]; ++u)
-              if (occupied[at(u, v, w)])
+              if (classes[at(u, v, w)] != own)
                 nearest = std::min(nearest, std::max({std::abs(u - x), std::abs(v - y), std::abs(w - z)}));
         BOOST_TEST(d[at(x, y, z)] == nearest);
       }

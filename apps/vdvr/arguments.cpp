@@ -49,6 +49,13 @@ double parse_number(const std::string& what, const std::string& text) {
   return result;
 }
 
+Vec3 parse_vec3(const std::string& what, const std::string& text) {
+  const auto parts = split(text, ',');
+  if (parts.size() != 3)
+    throw InputError(fmt::format("{}: '{}' is not three numbers separated by commas", what, text));
+  return {parse_number(what, parts[0]), parse_number(what, parts[1]), parse_number(what, parts[2])};
+}
+
 std::uint64_t parse_bytes(const std::string& option_name, const std::string& text) {
   const std::string units = "KMGT";
   std::string digits = text;
@@ -84,6 +91,12 @@ Arguments& Arguments::flag(const std::string& name, const std::string& help) {
 
 Arguments& Arguments::value(const std::string& name, const std::string& shape, const std::string& help) {
   groups_.back().add_options()(name.c_str(), po::value<std::string>()->value_name(shape), help.c_str());
+  return *this;
+}
+
+Arguments& Arguments::values(const std::string& name, const std::string& shape, const std::string& help) {
+  groups_.back().add_options()(
+      name.c_str(), po::value<std::vector<std::string>>()->composing()->value_name(shape), help.c_str());
   return *this;
 }
 
@@ -154,6 +167,10 @@ std::string Arguments::text(const std::string& name) const {
   auto result = values_[name].as<std::string>();
   if (result.empty()) throw InputError(fmt::format("{} is empty", option(name)));
   return result;
+}
+
+std::vector<std::string> Arguments::texts(const std::string& name) const {
+  return has(name) ? values_[name].as<std::vector<std::string>>() : std::vector<std::string>{};
 }
 
 std::string Arguments::text_or(const std::string& name, const std::string& fallback) const {

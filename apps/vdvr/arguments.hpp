@@ -24,6 +24,8 @@ class Arguments {
   Arguments& flag(const std::string& name, const std::string& help);
   /// `name` may be "output,o"; `shape` is the placeholder of the help text.
   Arguments& value(const std::string& name, const std::string& shape, const std::string& help);
+  /// The same, which may be given several times; read by texts().
+  Arguments& values(const std::string& name, const std::string& shape, const std::string& help);
   /// The next stray word; all positionals are required.
   Arguments& positional(const std::string& name, const std::string& help);
 
@@ -40,6 +42,8 @@ class Arguments {
   [[nodiscard]] bool asks(const std::string& name, const std::string& value) const;
   /// The text given; InputError when it is absent.
   [[nodiscard]] std::string text(const std::string& name) const;
+  /// Every text given for an option that `values` declared; empty when there is none.
+  [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] std::string text_or(const std::string& name, const std::string& fallback) const;
   [[nodiscard]] std::filesystem::path path(const std::string& name) const { return text(name); }
   [[nodiscard]] std::optional<double> number(const std::string& name) const;
@@ -75,5 +79,7 @@ class Arguments {
 std::uint64_t parse_bytes(const std::string& option, const std::string& text);
 /// A whole text as a finite number; throws InputError naming `what`.
 double parse_number(const std::string& what, const std::string& text);
+/// Three numbers separated by commas; throws InputError naming `what`.
+Vec3 parse_vec3(const std::string& what, const std::string& text);
 
 }  // namespace vdvr::cli

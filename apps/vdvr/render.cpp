@@ -30,7 +30,9 @@ void add_options(Arguments& args) {
              "with "
              "--turntable a folder, or T.apng or T.gif");
   add_limited(args, "method", kMethods, kSupportedMethods, "the mixed volume, or its base samples alone");
-  args.value("mode", "dvr|iso|mip|slice|error", "default dvr; error: |V - F| on a slice, needs --projections")
+  args.value("mode", "dvr|iso|mip|slice|error",
+             "default dvr; error: on a slice |V - F|, or without --projections what the certificate bounds "
+             "it by")
       .value("size", "512x512", "pixels");
   add_transfer(args);
   args.value("iso", "V[,V...]",
@@ -41,11 +43,20 @@ void add_options(Arguments& args) {
       .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
-      .value("step", "S", "in base cells (default 1)")
+      .value("step", "S", "of dvr and mip, in base cells (default 1); iso goes from cell to cell")
+      .value("step-mode", "fixed|level", "of dvr; level: step / 2^l in bricks of level l (default fixed)")
+      .value("classification", "post|preintegrated",
+             "of dvr; post: colour of each sample; preintegrated: of the path between two (default post)")
+      .value(
+          "gradient", "central|analytic",
+          "which way a surface faces: differences over one base cell, or the derivative of the cell itself "
+          "(default central)")
+      .values("light", "head|X,Y,Z",
+              "at the eye, or from a direction in world axes; may be given several times (default head)")
       .flag("no-shading", "colours of the transfer function alone, without light")
       .value("turntable", "N", "N pictures over a full turn, frame-0000.png and so on")
       .value("sampler", "auto|image3d|buffer", "default auto")
-      .value("projections", "IN", "with --mode error: the projections")
+      .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("unverified", "render although content and certificate do not match");
   add_scan(args);
   args.group("Camera");
@@ -88,6 +99,21 @@ void set_background(const Arguments& args, RenderOptions& o) {
     if (!(x >= 0 && x <= 1)) throw InputError(fmt::format("--background: {} is not within 0 and 1", x));
 }
 
+void set_light(const Arguments& args, RenderOptions& o) {
+  o.shading = !args.has("no-shading");
+  if (!o.shading) refuse(args, {"light"}, "excludes --no-shading");
+  if (!o.shading && o.output != RenderOutput::normal) refuse(args, {"gradient"}, "excludes --no-shading");
+  o.gradient = args.choice("gradient", {"central", "analytic"}, "central") == "analytic"
+                   ? GradientKind::analytic
+                   : GradientKind::central;
+  if (!args.has("light")) return;
+  o.head_light = false;
+  for (const std::string& light : args.texts("light")) {
+    if (light == "head") o.head_light = true;
+    else o.lights.push_back(parse_vec3("--light", light));
+  }
+}
+
 /// Flesh to bone, from the lightest surface to the densest; the last for one alone.
 std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
   const std::vector<double> values = args.numbers("iso", 0).value_or(std::vector<double>{threshold});
@@ -122,11 +148,16 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
-  o.shading = !args.has("no-shading");
+  o.step_mode =
+      args.choice("step-mode", {"fixed", "level"}, "fixed") == "level" ? StepMode::level : StepMode::fixed;
+  o.classification = args.choice("classification", {"post", "preintegrated"}, "post") == "preintegrated"
+                         ? Classification::preintegrated
+                         : Classification::post;
   const std::string output = args.choice("show", kOutputs, "colour");
   o.output = output == "depth"    ? RenderOutput::depth
              : output == "normal" ? RenderOutput::normal
                                   : RenderOutput::colour;
+  set_light(args, o);
   set_background(args, o);
   const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
   o.slice_axis = axis[0] - 'x';
@@ -147,47 +178,82 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (flat)
     refuse(args,
            {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading",
-            "show", "background"},
+            "show", "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
   if (o.mode == RenderMode::mip)
-    refuse(args, {"no-shading"}, "does not apply to --mode mip, which has no light");
+    refuse(args, {"no-shading", "gradient", "light"}, "does not apply to --mode mip, which has no light");
+  if (o.mode != RenderMode::dvr) refuse(args, {"step-mode", "classification"}, "applies to --mode dvr");
+  if (o.step_mode == StepMode::level && o.classification == Classification::preintegrated)
+    throw InputError(
+        "--step-mode level does not apply to --classification preintegrated, whose table is of one step");
   if (o.mode != RenderMode::iso) refuse(args, {"iso", "iso-opacity"}, "applies to --mode iso");
   if (o.output != RenderOutput::colour)
-    refuse(args, {"axes", "box", "colorbar", "background", "no-shading"}, "applies to --show colour");
+    refuse(args, {"axes", "box", "colorbar", "background", "no-shading", "light"},
+           "applies to --show colour");
+  if (o.output == RenderOutput::depth) refuse(args, {"gradient"}, "does not apply to --show depth");
   if (o.output == RenderOutput::normal && o.mode == RenderMode::mip)
     throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode == RenderMode::iso) refuse(args, {"tf", "tf-range"}, "does not apply to --mode iso");
   if (o.mode != RenderMode::error) refuse(args, {"projections"}, "applies to --mode error");
   if (o.mode == RenderMode::error) {
-    refuse(args, {"method", "unverified", "sampler"},
-           "does not apply to --mode error, which measures the certified field");
-    if (!args.has("projections"))
-      throw InputError("--mode error needs --projections IN, which it measures against");
+    refuse(args, {"method", "unverified"}, "does not apply to --mode error, which is of the certified field");
+    if (args.has("projections"))
+      refuse(args, {"sampler"}, "does not apply to what is measured against --projections");
   }
+}
+
+void write_error_slice(const std::filesystem::path& output, OutputKind kind, const ErrorSlice& slice) {
+  if (kind == OutputKind::values) write_npy(output, slice.errors);
+  else write_png(output, slice.image);
+}
+
+/// What the certificate alone says of a slice.
+int render_bound(const CommonOptions& common, const RenderOptions& o, const std::filesystem::path& output,
+                 OutputKind kind, const Scene& scene, const ErrorSliceOptions& options) {
+  const bool image3d = o.sampler == SamplerKind::image3d;
+  const ErrorSlice slice = bound_slice(scene.volume, *scene.certificate, image3d, options);
+  write_error_slice(output, kind, slice);
+  const double epsilon = scene.certificate->epsilon_abs;
+  const Json json = {{"output", output.string()},
+                     {"mode", "error"},
+                     {"bound", slice.max_error},
+                     {"epsilon_abs", epsilon},
+                     {"sampler", image3d ? "image3d" : "buffer"},
+                     {"pixels", slice.pixels},
+                     {"not_covered_fraction", scene.certificate->not_covered_fraction}};
+  print_result(common, json, [&] {
+    fmt::print(
+        "{}: |V - F| is at most {:.6g} on {} pixels, {:.1f} % of epsilon {:.6g}, by the certificate\n"
+        "  not covered  {:.3g} % of the samples, which the file does not tell apart; --projections does\n",
+        output.string(), slice.max_error, slice.pixels, 100 * slice.max_error / epsilon, epsilon,
+        100 * scene.certificate->not_covered_fraction);
+  });
+  return 0;
 }
 
 int render_error(const Arguments& args, const CommonOptions& common, const RenderOptions& o,
                  const std::filesystem::path& output, OutputKind kind) {
-  const auto path = args.path("FILE"), projections = args.path("projections");
+  const auto path = args.path("FILE");
   ProgressLine progress(args.command(), common.quiet);
   const Scene scene = open_scene(path, args, "vdvr", false);
   if (!scene.certificate)
     throw InputError(fmt::format("{}: has no certificate to measure against", path.string()));
-  const ProjectionSet scan = load_scan(projections, args, scene.certificate->field, progress.callback());
-  check_input(projections, scan, *scene.certificate);
   const Grid& g = scene.volume.grid;
   const auto axis = static_cast<std::size_t>(o.slice_axis);
   const double middle = g.origin[axis] + 0.5 * static_cast<double>(g.cells[axis]) * g.spacing[axis];
-  Device device = open_device(common);
   // Values have no caption: the slice alone has the size asked for.
   const std::int64_t height = o.height + (kind == OutputKind::values ? kErrorCaption : 0);
+  const ErrorSliceOptions options{o.slice_axis, o.slice_position.value_or(middle), o.width, height};
+  if (!args.has("projections")) return render_bound(common, o, output, kind, scene, options);
+  const auto projections = args.path("projections");
+  const ProjectionSet scan = load_scan(projections, args, scene.certificate->field, progress.callback());
+  check_input(projections, scan, *scene.certificate);
+  Device device = open_device(common);
   const ErrorSlice slice =
-      error_slice(device, scan, scene.volume, *scene.certificate,
-                  {o.slice_axis, o.slice_position.value_or(middle), o.width, height}, progress.callback());
+      error_slice(device, scan, scene.volume, *scene.certificate, options, progress.callback());
   throw_if_interrupted();
-  if (kind == OutputKind::values) write_npy(output, slice.errors);
-  else write_png(output, slice.image);
+  write_error_slice(output, kind, slice);
   progress.clear();
   const double epsilon = scene.certificate->epsilon_abs;
   const Json json = {{"output", output.string()},    {"mode", "error"},

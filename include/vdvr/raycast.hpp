@@ -76,6 +76,15 @@ struct IsoSurface {
 };
 
 enum class SamplerKind { automatic, image3d, buffer };
+/// How the direction of a surface is found: central differences over one base cell at every level, without a
+/// seam where levels or cells meet, or the derivative of the trilinear cell itself, which jumps at its faces.
+enum class GradientKind { central, analytic };
+
+/// Mode dvr: colour and opacity of each sample, or of the path between two samples, along which the field is
+/// taken as linear: no transfer function is then too sharp for a step.
+enum class Classification { post, preintegrated };
+/// Mode dvr: one step throughout, or step / 2^l in bricks of level l, with opacities corrected for it.
+enum class StepMode { fixed, level };
 
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
@@ -83,14 +92,19 @@ struct RenderOptions {
   std::int64_t width = 512, height = 512;
   Camera camera;
   TransferFunction transfer;
-  double step = 1;                   ///< base cells (of the smallest spacing); opacities are corrected for it
-  std::vector<IsoSurface> surfaces;  ///< of mode iso, in any order
-  int slice_axis = 2;                ///< 0 x, 1 y, 2 z
+  double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it; iso needs none
+  Classification classification = Classification::post;
+  StepMode step_mode = StepMode::fixed;                  ///< level not with preintegrated
+  std::vector<IsoSurface> surfaces;                      ///< of mode iso, in any order
+  int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;                  ///< world; default the middle
   std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
   bool shading = true;
-  double termination = 0.99;  ///< early ray termination: opacity at which a ray stops
-  bool skip_empty = true;     ///< brick min/max skipping; the picture is the same to the bit without it
+  GradientKind gradient = GradientKind::central;
+  bool head_light = true;      ///< at the eye
+  std::vector<Vec3> lights{};  ///< directions towards lights that stand still, world axes; at most 8
+  double termination = 0.99;   ///< early ray termination: opacity at which a ray stops
+  bool skip_empty = true;      ///< brick min/max skipping; the picture is the same to the bit without it
   SamplerKind sampler = SamplerKind::automatic;
   /// Behind the volume, display values, top and bottom row.
   std::array<double, 3> background_top{0.13, 0.14, 0.16}, background_bottom{0.03, 0.03, 0.04};
@@ -140,7 +154,7 @@ class ResidentVolume {
 /// where near; a normal's components as colours, 0 as middle grey. Cost: 16 bytes per pixel on the device and
 /// on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws
 /// InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had. Mode
-/// `error` throws InputError: error slices need the projections (`run`, `render --projections`).
+/// `error` throws InputError: error slices are not ray-cast (`run`, `render --mode error`).
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
 
 /// What the device's filter of one image format does to weights and constants (docs/error-bounds.md, section

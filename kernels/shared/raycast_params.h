@@ -11,7 +11,9 @@ typedef struct {
   float value, opacity, rgb[3];
 } VdvrSurface;
 
-// Scalars only: no alignment that two compilers could read differently. 300 bytes.
+#define VDVR_LIGHTS 8
+
+// Scalars only: no alignment that two compilers could read differently. 408 bytes.
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
@@ -32,6 +34,10 @@ typedef struct {
   int skip;
   int surfaces;  // in order of their values
   VdvrSurface surface[VDVR_SURFACES];
+  int head_light;  // a light at the eye; asked only where there are others
+  int lights;
+  float light[VDVR_LIGHTS][3];  // unit vectors towards them, world axes
+  float light_share;            // of each in the light that is not ambient
 } VdvrRaycast;
 
 // A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis
