@@ -52,9 +52,9 @@ GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& 
 
 Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   // Inside a coarse cell the error may rise by the slack; there the fine test adds its own, a quarter.
-  if (passes(m, tolerance) &&
-      !(static_cast<double>(m.total) + 0.25 * static_cast<double>(m.slack) > tolerance))
-    return Verdict::within;
+  const bool within = passes(m, tolerance) &&
+                      !(static_cast<double>(m.total) + 0.25 * static_cast<double>(m.slack) > tolerance);
+  if (within) return Verdict::within;
   return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
 }
 

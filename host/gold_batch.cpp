@@ -129,13 +129,12 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
     BrickMeasure m;
     m.brick = brick;
     m.rate = settings_.rate;
-    if (totals[i] >= 0)
-      m = {brick,
-           std::bit_cast<float>(totals[i]),
-           std::bit_cast<float>(errors[i]),
-           std::bit_cast<float>(slacks[i]),
-           static_cast<std::uint32_t>(bits[i]),
-           settings_.rate};
+    if (totals[i] >= 0) {
+      m.total = std::bit_cast<float>(totals[i]);
+      m.error = std::bit_cast<float>(errors[i]);
+      m.slack = std::bit_cast<float>(slacks[i]);
+      m.violated = static_cast<std::uint32_t>(bits[i]);
+    }
     out.push_back(m);
   }
   return out;

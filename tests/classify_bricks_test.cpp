@@ -6,6 +6,7 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
+#include "host/close_boundaries.hpp"
 #include "host/reconstruct_field.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
@@ -134,6 +135,59 @@ BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_phantoms_is_within_the_toleranc
   const ProjectionSet head = simulated(shepp_logan(10), 21, 17, 30);
   for (const double share : {0.08, 0.2})
     BOOST_TEST(check(head, grid_around_axis({16, 16, 12}, 0.9), 8, share) > 0u);
+}
+
+BOOST_AUTO_TEST_CASE(bounds_of_cells_for_two_rates_are_no_smaller_than_for_one) {
+  const ProjectionSet scan = noise_scan(12, 9, 11, 7);
+  attacks::Chain chain(scan);
+  opencl::State& state = attacks::device().state();
+  const Grid grid = grid_around_axis({6, 6, 6}, 0.7);
+  for (const int rate : {4, 8}) {
+    const GoldSettings one = Case::settings_of(grid, rate);
+    GoldSettings two = one;
+    two.coarse_rate = rate / 2;
+    CellBounds own(state, chain.filtered, chain.upsampler, chain.sups, one),
+        shared(state, chain.filtered, chain.upsampler, chain.sups, two);
+    const SlabShape slab{2, 4, 4, 2, grid.origin[2] + 2 * grid.spacing[2], 0, {0, 4}};
+    std::vector<float> p, r, shared_p, shared_r, coarse_p, coarse_r;
+    own.look_up(slab, {{0, 0, 1}}, rate, p, r);
+    shared.look_up(slab, {{0, 0, 1}}, rate, shared_p, shared_r);
+    shared.look_up(slab, {{0, 0, 1}}, rate / 2, coarse_p, coarse_r);
+    GoldSettings coarse = one;
+    coarse.rate = rate / 2;
+    CellBounds own_coarse(state, chain.filtered, chain.upsampler, chain.sups, coarse);
+    std::vector<float> q, s;
+    own_coarse.look_up(slab, {{0, 0, 1}}, rate / 2, q, s);
+    BOOST_REQUIRE(p.size() == 32u);
+    // fp32 rounds the weights and sums of the tables: the views and a few more roundings either way.
+    const float same = 1 - static_cast<float>(2 * (chain.filtered.geometry.views() + 8)) * 0x1p-23f;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      BOOST_TEST(p[i] > 0);
+      BOOST_TEST(r[i] > 0);
+      BOOST_TEST(shared_p[i] >= same * p[i]);
+      BOOST_TEST(shared_r[i] >= same * r[i]);
+      BOOST_TEST(coarse_p[i] >= same * q[i]);
+      BOOST_TEST(coarse_r[i] >= same * s[i]);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(tile_finer_than_coarse_gold_is_measured_on_fine_gold) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
+  std::size_t brick = 0;
+  while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
+  BOOST_REQUIRE(brick < c.decided.size());
+  // A tile at the fine rate, altered at a node that coarse gold does not have.
+  c.bricks.level[brick] = {3, 3, 3};
+  std::vector<std::uint8_t> raised(c.bricks.level.size(), 0);
+  raised[brick] = 1;
+  c.classify.extract(raised);
+  BOOST_REQUIRE(c.bricks.samples[brick].size() == 17u * 17u * 17u);
+  c.bricks.samples[brick][(5 * 17 + 5) * 17 + 5] += static_cast<float>(3 * c.tolerance);
+  const MixedVolume volume = close_boundaries(c.bricks, Closing::none);
+  c.classify.measure(DeviceField(c.state, volume), c.tolerance, raised, "verify");
+  BOOST_TEST(static_cast<double>(c.classify.measures()[brick].error) > 2 * c.tolerance);
 }
 
 BOOST_AUTO_TEST_CASE(comparison_without_slack_and_windows_take_the_fine_gold_alone) {
