@@ -27,7 +27,7 @@ struct LevelSamples {
 
 /// Every step looks one sample spacing further, so that a block needs steps * spacing nodes of halo. Base
 /// samples gain from many steps (most bricks read them), those of finer levels hardly after two.
-constexpr int base_fit_steps = 8, level_fit_steps = 2;
+constexpr int base_fit_steps = 12, level_fit_steps = 2;
 
 /// `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many second differences below gold's
 /// interpolant, on average over a gold cell of the grid that is certified. Right inside the blocks where halo
