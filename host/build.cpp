@@ -275,10 +275,12 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
   c.comparison = is_comparison(plan.settings, options);
-  c.holds_buffer = !c.comparison && c.total_buffer <= c.epsilon_abs;
+  // Of a volume without a tested node nothing is certified.
+  const bool certified = !c.comparison && worst;
+  c.holds_buffer = certified && c.total_buffer <= c.epsilon_abs;
   if (sampler.image3d) {
     c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
-    c.holds_image3d = !c.comparison && *c.total_image3d <= c.epsilon_abs;
+    c.holds_image3d = certified && *c.total_image3d <= c.epsilon_abs;
   }
   c.upsampling_u = plan.upsampling_u;
   c.u_filter = plan.u_filter;

@@ -133,6 +133,8 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
   std::future<std::vector<float>> samples = std::async(
       std::launch::async, [&] { return large_zeros(static_cast<std::size_t>(grid.sample_count())); });
   const auto kept = kept_columns(g, grid);
+  if (std::none_of(kept.begin(), kept.end(), [](const auto& k) { return k[0] <= k[1]; }))
+    throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
   Volume volume{grid, {}};
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
     const std::int64_t nz = std::min(rows, n[2] - z0), stride = column_stride(nz);

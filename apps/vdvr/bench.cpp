@@ -183,6 +183,7 @@ int bench_render(Arguments& args) {
   add_transfer(args);
   add_orbit(args, first);
   args.value("sampler", "auto|image3d|buffer", "default auto");
+  args.value("step", "S", "in base cells (default 1)");
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
@@ -196,6 +197,7 @@ int bench_render(Arguments& args) {
     o.width = (*size)[0];
     o.height = (*size)[1];
   }
+  o.step = args.positive_or("step", o.step);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.sampler = safe_sampler(sampler == "auto"     ? SamplerKind::automatic
                            : sampler == "buffer" ? SamplerKind::buffer
@@ -228,6 +230,7 @@ int bench_render(Arguments& args) {
   line["size"] = {o.width, o.height};
   line["cells"] = scene.volume.grid.cells;
   line["transfer"] = o.transfer.name;
+  line["step"] = o.step;
   line["orbit"] = {orbit.azimuth, orbit.elevation, orbit.zoom};
   line["sampler"] = sampler_name(last.sampler);
   line["resident_bytes"] = resident.bytes();

@@ -12,7 +12,11 @@ the time with the window is given beside it.
 
     python3 -m venv build/peers/vtk && build/peers/vtk/bin/pip install -r bench/peers/vtk_requirements.txt
     bench/peers/vtk_render.py                 # runs itself in that environment
-    bench/peers/vtk_render.py --sizes 64,128 --volume FILE.mha --tf FILE.json --vdvr build/vdvr
+    bench/peers/vtk_render.py --sizes 64,128 --vdvr build/vdvr
+    bench/peers/vtk_render.py --volume FILE.mha --tf FILE.json [--certified FILE.vdvr --step S]
+
+With --certified ours is that volume instead, on the same box, and --step is the distance of samples for both: what a
+certified volume renders at beside the uniform grid that errs as little.
 
 Prints one JSON line per volume, then a table. Exit code 1: the pictures differ; 3: VTK is missing.
 """
@@ -48,6 +52,8 @@ def options():
     p.add_argument("--sizes", default="64,128,256", help="samples per axis of the volumes made here")
     p.add_argument("--volume", help="an MHA file instead; needs --tf")
     p.add_argument("--tf", help="a transfer function in our own JSON")
+    p.add_argument("--certified", metavar="FILE", help="a certified volume for our side; needs --volume and --step")
+    p.add_argument("--step", type=float, help="world distance of samples, and of opacities (default: the smallest spacing)")
     p.add_argument("--frames", type=int, default=12, help="over a full turn, each round (default 12)")
     p.add_argument("--rounds", type=int, default=3, help="default 3")
     p.add_argument("--pixels", type=int, default=512, help="each side (default 512)")
@@ -106,12 +112,12 @@ def write_transfer(path):
 class Peer:
     """VTK's side: one volume, one camera that goes round it."""
 
-    def __init__(self, volume, transfer, pixels, elevation):
+    def __init__(self, volume, transfer, pixels, elevation, step):
         reader = vtk.vtkMetaImageReader()
         reader.SetFileName(volume)
         reader.Update()
         self.image = reader.GetOutput()
-        self.cell = min(self.image.GetSpacing())
+        self.cell = step or min(self.image.GetSpacing())
         self.elevation = elevation
         self.mapper = vtk.vtkFixedPointVolumeRayCastMapper()
         self.mapper.SetInputData(self.image)
@@ -202,9 +208,25 @@ def run_vdvr(arguments):
     return done.stdout
 
 
+def our_side(o, volume):
+    """What we render, and how: our --step counts base cells."""
+    ours = o.certified or volume
+    how = [] if o.certified else ["--method", "dvr"]
+    if o.step:
+        if o.certified:
+            cell = min(json.loads(run_vdvr([o.vdvr, "info", ours, "--json"]))["grid"]["spacing"])
+        else:
+            reader = vtk.vtkMetaImageReader()
+            reader.SetFileName(volume)
+            reader.UpdateInformation()
+            cell = min(reader.GetDataSpacing())
+        how += ["--step", f"{o.step / cell!r}"]
+    return [ours] + how
+
+
 def our_picture(o, volume, transfer, azimuth, shaded, folder):
     path = os.path.join(folder, f"vdvr-{azimuth:g}{'' if shaded else '-unshaded'}.png")
-    run_vdvr([o.vdvr, "render", volume, "-o", path, "--force", "--method", "dvr", "--tf", transfer, "--azimuth",
+    run_vdvr([o.vdvr, "render", *our_side(o, volume), "-o", path, "--force", "--tf", transfer, "--azimuth",
               f"{azimuth}", "--elevation", f"{o.elevation}", "--size", f"{o.pixels}x{o.pixels}", "--device", o.device,
               "--quiet"] + ([] if shaded else ["--no-shading"]))
     reader = vtk.vtkPNGReader()
@@ -248,7 +270,7 @@ def spread(values):
 
 
 def compare(o, name, volume, transfer, folder):
-    peer = Peer(volume, transfer, o.pixels, o.elevation)
+    peer = Peer(volume, transfer, o.pixels, o.elevation, o.step)
     plain = difference(o, peer, volume, transfer, False, folder)
     shaded = difference(o, peer, volume, transfer, True, folder)
     for what, found, limit in (("without", plain, o.limit), ("with", shaded, o.shaded_limit)):
@@ -260,7 +282,7 @@ def compare(o, name, volume, transfer, folder):
         # Each round starts elsewhere on the turn; both take the same azimuths.
         start = 360.0 * r / (o.rounds * o.frames)
         line = json.loads(run_vdvr(
-            [o.vdvr, "bench", "render", volume, "--method", "dvr", "--tf", transfer, "--frames", str(o.frames),
+            [o.vdvr, "bench", "render", *our_side(o, volume), "--tf", transfer, "--frames", str(o.frames),
              "--azimuth", f"{start}", "--elevation", f"{o.elevation}", "--size", f"{o.pixels}x{o.pixels}", "--device",
              o.device, "--quiet"]).splitlines()[-1])
         ours.append(line["fps"])
@@ -292,6 +314,8 @@ def main():
     vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_OFF)
     if o.volume and not o.tf:
         sys.exit("--volume needs --tf: both programs must show the same")
+    if o.certified and not (o.volume and o.step):
+        sys.exit("--certified needs --volume, a uniform grid on the same box, and --step: one distance for both")
     results = []
     with tempfile.TemporaryDirectory() as scratch:
         folder = o.keep or scratch
