@@ -35,6 +35,7 @@ struct SampleBlock {
   std::vector<std::uint8_t> shift;   ///< per tile, at most 24; integers only
 
   SampleBlock() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): float samples are a block as they are
   SampleBlock(std::vector<float> samples) : f32(std::move(samples)) {}
   [[nodiscard]] std::uint64_t size() const {
     return type == SampleType::f32 ? f32.size() : type == SampleType::u16 ? u16.size() : u8.size();
