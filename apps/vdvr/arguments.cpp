@@ -212,6 +212,7 @@ std::optional<std::vector<double>> Arguments::numbers(const std::string& name, s
     throw InputError(
         fmt::format("{}: '{}' is not {} numbers separated by commas", option(name), text(name), count));
   std::vector<double> result;
+  result.reserve(parts.size());
   for (const auto& part : parts) result.push_back(parse_number(option(name), part));
   return result;
 }
@@ -241,7 +242,7 @@ std::optional<std::vector<std::int64_t>> Arguments::sizes(const std::string& nam
 
 std::string Arguments::choice(const std::string& name, const std::vector<std::string>& allowed,
                               const std::string& fallback) const {
-  const std::string result = text_or(name, fallback);
+  std::string result = text_or(name, fallback);
   if (std::find(allowed.begin(), allowed.end(), result) == allowed.end())
     throw InputError(
         fmt::format("{}: '{}' is not one of: {}", option(name), result, fmt::join(allowed, ", ")));
