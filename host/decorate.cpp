@@ -144,6 +144,24 @@ std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, std
   return lines;
 }
 
+// At scale 1, in pixels.
+constexpr std::int64_t kCaptionMargin = 4, kCaptionLine = kFontHeight + 3;
+
+struct CaptionText {
+  std::vector<std::string> lines;
+  std::int64_t height = 0;  // pixels, with its margins
+};
+
+CaptionText caption_text(const Image& image, const std::vector<std::string>& paragraphs, int scale) {
+  const std::int64_t room = image.width - 2 * kCaptionMargin * scale;
+  const std::int64_t columns = std::max<std::int64_t>(1, room / (kFontAdvance * scale));
+  CaptionText text{wrapped(paragraphs, static_cast<std::size_t>(columns))};
+  // The gap under the last line is the margin's.
+  text.height =
+      (static_cast<std::int64_t>(text.lines.size()) * kCaptionLine + 2 * kCaptionMargin - 3) * scale;
+  return text;
+}
+
 }  // namespace
 
 void draw_box(Image& image, const Camera& camera, const Grid& grid, const std::vector<float>& hidden) {
@@ -270,17 +288,16 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
 }
 
 std::int64_t draw_caption(Image& image, const std::vector<std::string>& paragraphs) {
-  const int scale = text_scale(image);
-  const std::int64_t margin = 4 * scale, line_height = (kFontHeight + 3) * scale;
-  const std::int64_t columns = std::max<std::int64_t>(1, (image.width - 2 * margin) / (kFontAdvance * scale));
-  const auto lines = wrapped(paragraphs, static_cast<std::size_t>(columns));
-  const std::int64_t height = static_cast<std::int64_t>(lines.size()) * line_height + 2 * margin - 3 * scale;
-  const std::int64_t top = image.height - height;
-  fill(image, 0, top, image.width, height, kShadow, 0.65);
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    draw_text(image, margin, top + margin + static_cast<std::int64_t>(i) * line_height, lines[i], scale,
-              kInk);
-  return height;
+  // A caption that would hide more than an eighth of the picture takes the small letters.
+  int scale = text_scale(image);
+  CaptionText text = caption_text(image, paragraphs, scale);
+  if (scale > 1 && text.height * 8 > image.height) text = caption_text(image, paragraphs, scale = 1);
+  const std::int64_t margin = kCaptionMargin * scale, top = image.height - text.height;
+  fill(image, 0, top, image.width, text.height, kShadow, 0.65);
+  for (std::size_t i = 0; i < text.lines.size(); ++i)
+    draw_text(image, margin, top + margin + static_cast<std::int64_t>(i) * kCaptionLine * scale,
+              text.lines[i], scale, kInk);
+  return text.height;
 }
 
 }  // namespace vdvr

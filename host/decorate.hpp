@@ -27,7 +27,8 @@ struct ColourBar {
 };
 void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above);
 
-/// Lines wrapped to the width on a darkened band at the bottom; returns its height.
+/// Lines wrapped to the width on a darkened band at the bottom, in small letters where large ones would hide
+/// more than an eighth of the picture; returns the band's height.
 std::int64_t draw_caption(Image& image, const std::vector<std::string>& paragraphs);
 
 }  // namespace vdvr

@@ -287,6 +287,17 @@ BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
   // A shorter turn leaves nothing of the longer one behind.
   draw("turn", {"--turntable", "2"});
   BOOST_TEST(!fs::exists(at("turn/frame-0002.png")));
+  // The window of a slice: all of the ramp lies below the first two and above the third.
+  const auto slice = [&](const char* window) {
+    draw("window.png", {"--mode", "slice", "--tf-range", window});
+    return contents(at("window.png"));
+  };
+  const std::string black = slice("1000,2000");
+  BOOST_TEST((black == slice("3000,4000")));
+  BOOST_TEST((black != slice("-2000,-1000")));
+  BOOST_TEST((black != slice("auto")));
+  check_refused({"render", volume, "-o", at("z.png"), "--mode", "slice", "--tf-range", "3,1"}, "--tf-range");
+  check_refused({"render", volume, "-o", at("z.png"), "--mode", "error", "--tf-range", "1,3"}, "--tf-range");
   check_refused({"render", volume, "-o", at("z.png"), "--tf", "purple"}, "purple");
   check_refused({"render", volume, "-o", at("z.png"), "--tf-range", "3,1"}, "--tf-range");
   check_refused({"render", volume, "-o", at("z.png"), "--camera-position", "0,0,50", "--camera-focal-point",

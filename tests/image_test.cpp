@@ -202,6 +202,14 @@ BOOST_AUTO_TEST_CASE(axes_point_where_the_camera_sees_them) {
   BOOST_TEST(at(56, 356)[2] > at(56, 356)[0]);
 }
 
+BOOST_AUTO_TEST_CASE(a_long_caption_leaves_the_picture_to_be_seen) {
+  Image brief = plain(512, 512, 60), wordy = brief;
+  // One line of the large letters: twice 7 pixels between margins of twice 4.
+  BOOST_TEST(draw_caption(brief, {"a caption"}) == 2 * (7 + 2 * 4));
+  BOOST_TEST(draw_caption(wordy, {std::string(70, 'x'), std::string(84, 'y') + " " + std::string(40, 'z')}) <=
+             512 / 8);
+}
+
 BOOST_AUTO_TEST_CASE(colour_bar_and_caption_stay_within_the_picture_at_any_size) {
   const ColourBar bar{{{-1, {0, 0, 0}, 0}, {3, {1, 0, 0}, 0.5}}, true, "1/mm"};
   for (const std::int64_t side : {1, 20, 100, 640}) {

@@ -177,9 +177,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
     refuse(args,
-           {"azimuth", "elevation", "zoom", "turntable", "tf", "tf-range", "iso", "step", "no-shading",
-            "show", "background", "gradient", "light", "step-mode", "classification"},
+           {"azimuth", "elevation", "zoom", "turntable", "tf", "iso", "step", "no-shading", "show",
+            "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
+  // What a slice takes of it is the window; an error picture's colours always run to epsilon.
+  if (o.mode == RenderMode::error) refuse(args, {"tf-range"}, "does not apply to --mode error");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
   if (o.mode == RenderMode::mip)
     refuse(args, {"no-shading", "gradient", "light"}, "does not apply to --mode mip, which has no light");
@@ -387,7 +389,7 @@ int render_command(Arguments& args) {
   const Brightness bright = brightness_of(scene.volume);
   o.surfaces = surfaces_for(args, bright.threshold);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
-  o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
+  o.slice_range = given_range(args).value_or(std::pair{bright.grey_lo, bright.grey_hi});
   o.sampler = safe_sampler(o.sampler, scene.certificate);
   o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
   // The base samples alone are another field than the one certified.

@@ -39,8 +39,7 @@ void add_transfer(Arguments& args) {
               "it one that suits the volume")
       .value("tf-range", "LO,HI|auto",
              "stretch it over these values; auto: the bulk of the volume's (default: presets auto, files as "
-             "they "
-             "stand)");
+             "they stand); of a slice LO,HI is the window, black to white");
 }
 
 std::string preset_table() {
@@ -49,17 +48,17 @@ std::string preset_table() {
   return text;
 }
 
+std::optional<Range> given_range(const Arguments& args) {
+  if (!args.has("tf-range") || args.text("tf-range") == "auto") return std::nullopt;
+  const auto given = args.numbers("tf-range", 2);
+  if (!((*given)[0] < (*given)[1]))
+    throw InputError(fmt::format("--tf-range: {} is not below {}", (*given)[0], (*given)[1]));
+  return Range{(*given)[0], (*given)[1]};
+}
+
 TransferFunction transfer_for(const Arguments& args, const Brightness& b, const Grid& grid) {
-  std::optional<Range> range;
-  if (args.has("tf-range")) {
-    range = Range{b.lo, b.hi};
-    if (args.text("tf-range") != "auto") {
-      const auto given = args.numbers("tf-range", 2);
-      range = Range{(*given)[0], (*given)[1]};
-      if (!(range->first < range->second))
-        throw InputError(fmt::format("--tf-range: {} is not below {}", range->first, range->second));
-    }
-  }
+  std::optional<Range> range = given_range(args);
+  if (!range && args.has("tf-range")) range = Range{b.lo, b.hi};
   if (!args.has("tf")) {
     const TransferFunction f = two_material_transfer(b);
     return range ? stretched(f, range->first, range->second) : f;

@@ -2,6 +2,9 @@
 // share.
 #pragma once
 
+#include <optional>
+#include <utility>
+
 #include "apps/vdvr/pictures.hpp"
 
 namespace vdvr::cli {
@@ -10,6 +13,8 @@ namespace vdvr::cli {
 void add_transfer(Arguments& args);
 /// The names of the presets with what each is for, one a line.
 std::string preset_table();
+/// The two values of --tf-range; nothing where it is `auto` or not given. Throws InputError unless they rise.
+std::optional<std::pair<double, double>> given_range(const Arguments& args);
 /// From --tf: a preset stretched over the volume's bulk (those with a surface in the middle around the
 /// threshold), a file as it stands, or without --tf one that suits the volume; --tf-range overrides.
 /// Opacities are those of one base cell of the grid. What a reader filled in stands in `note`.
