@@ -14,7 +14,7 @@ PACKAGES = {
     "astra": ["numpy", "astra-toolbox"],
     "silx": ["numpy", "pyopencl", "silx"],
     "rtk": ["numpy", "itk-rtk"],
-    "zfp": ["numpy", "h5py", "zfpy"],
+    "zfp": ["numpy", "numba", "h5py", "zfpy"],
 }
 
 
@@ -66,8 +66,8 @@ def run_vdvr_json(args, *options):
     return json.loads(done.stdout)
 
 
-def read_mha(path):
-    """A volume vdvr wrote: samples [z][y][x], spacing and origin as x, y, z."""
+def read_mha(path, mapped=False):
+    """A volume vdvr wrote: samples [z][y][x] in memory or where they lie on disk, spacing and origin as x, y, z."""
     import numpy
     with open(path, "rb") as file:
         header = {}
@@ -76,8 +76,9 @@ def read_mha(path):
             header[key.strip()] = value.strip()
         if header["ElementDataFile"] != "LOCAL" or header["ElementType"] != "MET_FLOAT":
             raise ValueError(f"{path}: not a volume of floats in one file")
-        data = numpy.fromfile(file, "<f4")
-    size = [int(n) for n in header["DimSize"].split()]
+        size = [int(n) for n in header["DimSize"].split()]
+        count = size[0] * size[1] * size[2]
+        data = numpy.memmap(path, "<f4", "r", file.tell(), count) if mapped else numpy.fromfile(file, "<f4", count)
     vector = lambda *keys: [float(v) for v in next(header[k] for k in keys if k in header).split()]
     return data.reshape(size[::-1]), vector("ElementSpacing"), vector("Offset", "Origin", "Position")
 
