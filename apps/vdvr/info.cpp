@@ -45,11 +45,13 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
 
 int volume_info(const std::filesystem::path& path, const CommonOptions& common) {
   const Volume volume = read_volume(path, common.max_memory);
-  const auto [lo, hi] = std::minmax_element(volume.samples.begin(), volume.samples.end());
-  const Json json = {
-      {"file", path.string()}, {"kind", "volume"}, {"grid", grid_json(volume.grid)}, {"range", {*lo, *hi}}};
+  const auto range = std::minmax_element(volume.samples.begin(), volume.samples.end());
+  const Json json = {{"file", path.string()},
+                     {"kind", "volume"},
+                     {"grid", grid_json(volume.grid)},
+                     {"range", {*range.first, *range.second}}};
   print_result(common, json, [&] {
-    fmt::print("{}: volume, samples {:.6g} to {:.6g}\n", path.string(), *lo, *hi);
+    fmt::print("{}: volume, samples {:.6g} to {:.6g}\n", path.string(), *range.first, *range.second);
     print_grid(volume.grid);
   });
   return 0;
@@ -59,17 +61,17 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   ProgressLine progress(args.command(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
   const Grid grid = make_grid(scan.geometry, {});
-  const auto [lo, hi] = std::minmax_element(scan.data.begin(), scan.data.end());
+  const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
   const Json json = {{"file", path.string()},
                      {"kind", "projections"},
                      {"geometry", geometry_json(scan.geometry)},
                      {"report", report_json(scan.report)},
-                     {"range", {*lo, *hi}},
+                     {"range", {*range.first, *range.second}},
                      {"default_grid", grid_json(grid)}};
   print_result(common, json, [&] {
     print_scan(scan);
-    fmt::print("  integrals    {:.6g} to {:.6g}\n", *lo, *hi);
+    fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
     print_grid(grid);
   });
   return 0;
