@@ -90,6 +90,14 @@ RAY_INLINE int any_lane16(int16 m) { return any_lane8(m.lo | m.hi); }
 #endif
 #endif
 
+#if VDVR_LANES == 1
+typedef ulong Offset;
+#define TO_OFFSET(i) ((ulong)(i))
+#else
+typedef I Offset;
+#define TO_OFFSET(i) (i)
+#endif
+
 // m ? a : b, lane by lane.
 #define PICK(m, a, b) select((b), (a), (m))
 // Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
