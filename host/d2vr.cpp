@@ -43,9 +43,9 @@ void check_options(const ParallelGeometry& g, const D2vrOptions& options) {
   // Kernels address one view by 32 bits.
   const double most = std::numeric_limits<std::int32_t>::max();
   if (!(static_cast<double>(n * g.columns + 16) * static_cast<double>(n * g.rows + 1) < most))
-    throw InputError(fmt::format(
-        "{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower --upsampling", g.columns,
-        g.rows, n));
+    throw InputError(
+        fmt::format("{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower --upsampling",
+                    g.columns, g.rows, n));
 }
 
 // A detector of one row has no second one to blend with: it stands twice.
@@ -60,8 +60,8 @@ void store_as_filtered(Projections& p, const FilteredScan& filtered) {
   p.columns = filtered.geometry.columns;
   p.rows = std::max<std::int64_t>(2, filtered.geometry.rows);
   const bool single = filtered.geometry.rows == 1;
-  p.samples = DeviceArray<float>(*p.state, static_cast<std::uint64_t>(p.geometry.views() * p.columns * p.rows),
-                                 "filtered projections");
+  p.samples = DeviceArray<float>(
+      *p.state, static_cast<std::uint64_t>(p.geometry.views() * p.columns * p.rows), "filtered projections");
   p.samples.write(single ? two_rows(filtered.samples) : filtered.samples);
 }
 
@@ -72,8 +72,7 @@ void store_slab(Projections& p, const UpsampledSlab& slab) {
     for (std::int64_t i = 0; i < slab.views * p.columns; ++i)
       for (std::int64_t row = 0; row < p.rows; ++row) {
         const std::int64_t from = std::min(row, slab.rows - 1);
-        out[at(i * p.rows + row)] =
-            values[at((from / 16 * slab.views * p.columns + i) * 16 + from % 16)];
+        out[at(i * p.rows + row)] = values[at((from / 16 * slab.views * p.columns + i) * 16 + from % 16)];
       }
   });
   p.samples.write(out, static_cast<std::uint64_t>(slab.first_view * p.columns * p.rows));
@@ -91,7 +90,8 @@ void store_upsampled(Projections& p, const FilteredScan& filtered, const Progres
                                  fmt::format("filtered projections, upsampled {} times", p.rate));
   Upsampler upsampler(*p.state, filtered);
   // Groups of views of about 32 MiB: the rearranged copy stays small.
-  const std::int64_t group = std::clamp<std::int64_t>((std::int64_t{8} << 20) / (p.columns * p.rows), 1, g.views());
+  const std::int64_t group =
+      std::clamp<std::int64_t>((std::int64_t{8} << 20) / (p.columns * p.rows), 1, g.views());
   for (std::int64_t first = 0; first < g.views(); first += group) {
     report(progress, "upsample", static_cast<double>(first) / static_cast<double>(g.views()));
     store_slab(p, upsampler(columns, rows, 0, 0, p.rate, first, std::min(group, g.views() - first)));
@@ -126,8 +126,8 @@ std::vector<cl_float4> Projections::views(const Grid& grid) const {
     // In double precision up to here: what is left to round is the position in cells.
     const double c = std::cos(theta) / g.pitch_u, s = std::sin(theta) / g.pitch_u;
     const double first = grid.origin[0] * c + grid.origin[1] * s + g.center - first_column;
-    steps.push_back({{static_cast<float>(grid.spacing[0] * c * n), static_cast<float>(grid.spacing[1] * s * n),
-                      static_cast<float>(first * n), 0.0f}});
+    steps.push_back({{static_cast<float>(grid.spacing[0] * c * n),
+                      static_cast<float>(grid.spacing[1] * s * n), static_cast<float>(first * n), 0.0f}});
   }
   return steps;
 }
@@ -192,7 +192,8 @@ class Evaluator {
       const std::int64_t n = std::min(group, count - first);
       for (std::int64_t i = 0; i < n; ++i) {
         const Vec3 c = cell(first + i);
-        points[at(i)] = {{static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.0f}};
+        points[at(i)] = {
+            {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.0f}};
       }
       on_device.write(std::span<const cl_float4>(points).first(at(n)));
       const std::uint64_t items = (static_cast<std::uint64_t>(n) + lanes - 1) / lanes;
@@ -256,7 +257,8 @@ std::vector<cl_float2> occupied_ranges(const Volume& v, int granularity) {
 struct D2vrScene::Impl {
   const D2vrField* field;
   Volume samples;
-  std::optional<ResidentVolume> bricks;  ///< the grid, ranges and frames of a volume; its samples are given back
+  std::optional<ResidentVolume>
+      bricks;  ///< the grid, ranges and frames of a volume; its samples are given back
   DeviceArray<cl_float4> views;
 };
 
@@ -289,10 +291,11 @@ namespace {
 
 void check_dvr(const RenderOptions& o) {
   const auto refuse = [](const char* what) {
-    throw InputError(fmt::format("{}; D2VR, which has projections instead of a volume, draws --mode dvr with "
-                                 "--classification post, --step-mode fixed and --gradient central: build the "
-                                 "volume first, or render with --method vdvr or dvr",
-                                 what));
+    throw InputError(
+        fmt::format("{}; D2VR, which has projections instead of a volume, draws --mode dvr with "
+                    "--classification post, --step-mode fixed and --gradient central: build the "
+                    "volume first, or render with --method vdvr or dvr",
+                    what));
   };
   if (o.mode != RenderMode::dvr) refuse("--method d2vr does not draw this --mode");
   if (o.classification != Classification::post)
@@ -315,8 +318,8 @@ FloatPicture raycast_float(Device& device, const D2vrScene& scene, const RenderO
   result.sampler = SamplerKind::buffer;
   result.sampler_reason = "D2VR: projections, bilinear";
   const DvrFrame frame = prepare_dvr(v, o, tuning, lanes);
-  opencl::Kernel<cl::Buffer, VdvrDetector, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
-                 cl::Buffer>
+  opencl::Kernel<cl::Buffer, VdvrDetector, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast,
+                 cl::Buffer, cl::Buffer>
       kernel(*p.state, "d2vr", "raycast_dvr", defines_for(o, tuning, lanes));
   opencl::finish(device.state(), "preparing a frame");
   const auto start = std::chrono::steady_clock::now();

@@ -1,6 +1,6 @@
-// D2VR: ray-casting straight from the filtered projections (Rautek et al. 2006), and the same field at points.
-// The rays, leaps, colours and light of raycast.cl over the field of shared/d2vr_field.h, so that a picture
-// differs from that of a stored volume by the field alone.
+// D2VR: ray-casting straight from the filtered projections (Rautek et al. 2006), and the same field at
+// points. The rays, leaps, colours and light of raycast.cl over the field of shared/d2vr_field.h, so that a
+// picture differs from that of a stored volume by the field alone.
 //
 // Layouts: field and views as in d2vr_field.h; points[i] in cells, values[i]. Called by: D2vrField::at and
 // raycast_float() of a D2vrScene in host/d2vr.cpp.
@@ -19,17 +19,18 @@
 
 #include "shared/raycast_dvr.h"
 
-__kernel void d2vr_points(FIELD, __global const float4* restrict views, __global const float4* restrict points,
-                          __global float* restrict values, int count) {
+__kernel void d2vr_points(FIELD, __global const float4* restrict views,
+                          __global const float4* restrict points, __global float* restrict values,
+                          int count) {
   const I i = (int)get_global_id(0) * VDVR_LANES + COLUMNS + ROWS * PACKET_X;
   if (LANE(i, 0) >= count) return;
   V3 c;
-#define POINT(n)                                            \
-  {                                                         \
+#define POINT(n)                                             \
+  {                                                          \
     const float4 point = points[min(LANE(i, n), count - 1)]; \
-    LANE(c.x, n) = point.x;                                 \
-    LANE(c.y, n) = point.y;                                 \
-    LANE(c.z, n) = point.z;                                 \
+    LANE(c.x, n) = point.x;                                  \
+    LANE(c.y, n) = point.y;                                  \
+    LANE(c.z, n) = point.z;                                  \
   }
   EACH(POINT)
 #undef POINT

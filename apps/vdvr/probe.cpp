@@ -209,8 +209,9 @@ int probe_command(Arguments& args) {
       .flag("exact", "of projections: the field F in double precision on the host")
       .value("like", "OUT.vdvr", "with --exact: take the field options from this file")
       .value("projections", "IN", "of a certified volume from elsewhere: where the covered points are");
-  args.value("method", "vdvr|d2vr",
-             "d2vr: of projections what a ray of D2VR takes, bilinear between detector samples (default vdvr)")
+  args.value(
+          "method", "vdvr|d2vr",
+          "d2vr: of projections what a ray of D2VR takes, bilinear between detector samples (default vdvr)")
       .value("upsampling", "N",
              "with --method d2vr: columns and rows per detector pixel, a power of two (default 1)");
   add_scan(args);
@@ -235,11 +236,11 @@ int probe_command(Arguments& args) {
   const std::vector<Vec3> points = read_points(points_path);
 
   ProgressLine progress(args.command(), common.quiet);
-  const std::vector<Probe> probes =
-      kind == InputKind::certified ? probe_certified(path, args, points, progress.callback())
-      : kind == InputKind::volume  ? probe_volume(path, args, points)
-      : d2vr                       ? probe_d2vr(path, args, points, progress.callback())
-                                   : probe_exact(path, args, points, progress.callback());
+  const std::vector<Probe> probes = kind == InputKind::certified
+                                        ? probe_certified(path, args, points, progress.callback())
+                                    : kind == InputKind::volume ? probe_volume(path, args, points)
+                                    : d2vr ? probe_d2vr(path, args, points, progress.callback())
+                                           : probe_exact(path, args, points, progress.callback());
   throw_if_interrupted();
   io::write_file(output, to_csv(points, probes));
   progress.clear();

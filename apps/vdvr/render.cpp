@@ -24,9 +24,10 @@ constexpr Orbit kOrbit{30, 20, 1};
 constexpr int kFrameMs = 50;
 
 void add_options(Arguments& args) {
-  args.positional("FILE",
-                  "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices; or with --method "
-                  "d2vr projections")
+  args.positional(
+          "FILE",
+          "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices; or with --method "
+          "d2vr projections")
       .value("output,o", "IMG.png|X.npy",
              "the picture; or as float32 what lies behind its pixels: opacity, depth, maximum, field, error; "
              "with "
@@ -175,9 +176,10 @@ RenderOptions render_options(const Arguments& args) {
 /// Before anything is read; the library refuses the same.
 void check_d2vr(const Arguments& args, const RenderOptions& o) {
   if (o.mode != RenderMode::dvr)
-    throw InputError(fmt::format("--mode {}: --method d2vr has projections instead of a volume and draws only "
-                                 "--mode dvr; build the volume for the others",
-                                 args.text("mode")));
+    throw InputError(
+        fmt::format("--mode {}: --method d2vr has projections instead of a volume and draws only "
+                    "--mode dvr; build the volume for the others",
+                    args.text("mode")));
   if (o.classification != Classification::post || o.step_mode != StepMode::fixed ||
       o.gradient != GradientKind::central || o.sampler == SamplerKind::image3d)
     refuse(args, {"classification", "step-mode", "gradient", "sampler"},
@@ -327,7 +329,8 @@ std::vector<std::string> turntable_names(const std::filesystem::path& folder, st
 RenderResult turn_into_folder(const Arguments& args, const CommonOptions& common, const Stage& stage,
                               const RenderOptions& o, std::int64_t frames, const Progress& progress) {
   const auto path = args.path("output");
-  OutputFolder folder(path, turntable_names(path, frames, stage.source.scene().certificate.has_value()), common.force);
+  OutputFolder folder(path, turntable_names(path, frames, stage.source.scene().certificate.has_value()),
+                      common.force);
   folder.begin();
   RenderResult last = turn(args, stage, o, frames, progress, [&](std::int64_t f, const Image& image) {
     write_png(folder.file(frame_name(f)), image);
@@ -445,7 +448,8 @@ int render_command(Arguments& args) {
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
     if (method == "d2vr")
-      fmt::print("  projections  {:.1f} MiB on the device\n", static_cast<double>(source.bytes()) / (1 << 20));
+      fmt::print("  projections  {:.1f} MiB on the device\n",
+                 static_cast<double>(source.bytes()) / (1 << 20));
     if (certified)
       fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
                  scene.certificate->epsilon_abs);

@@ -19,9 +19,10 @@ const std::vector<std::string>& render_methods() {
 }
 
 void add_method(Arguments& args) {
-  args.value("method", "vdvr|dvr|d2vr",
-             "the mixed volume, its base samples alone, or no volume at all: projections, back-projected at every "
-             "sample of a ray (default vdvr)");
+  args.value(
+      "method", "vdvr|dvr|d2vr",
+      "the mixed volume, its base samples alone, or no volume at all: projections, back-projected at every "
+      "sample of a ray (default vdvr)");
 }
 
 void add_projection_options(Arguments& args) {
@@ -32,7 +33,8 @@ void add_projection_options(Arguments& args) {
       .value("center", "C", "column onto which the rotation axis projects")
       .value("filter", "NAME", "as `build` takes it (default ram-lak)")
       .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)")
-      .value("upsampling", "N", "columns and rows per detector pixel, a power of two (default 1: as published)")
+      .value("upsampling", "N",
+             "columns and rows per detector pixel, a power of two (default 1: as published)")
       .flag("no-skip", "also sample where the field is taken for empty");
 }
 

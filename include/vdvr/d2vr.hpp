@@ -28,9 +28,9 @@ struct D2vrOptions {
 /// projections, at the detector's samples or upsampled.
 class D2vrField {
  public:
-  /// Cost: the ramp filter, once; upsampled by N views * (N rows * columns * (rows + N columns)) more. Memory:
-  /// bytes() on the device. Throws InputError (options, a detector of less than 2 columns, sizes beyond 32
-  /// bits), ResourceError. Must not outlive the device.
+  /// Cost: the ramp filter, once; upsampled by N views * (N rows * columns * (rows + N columns)) more.
+  /// Memory: bytes() on the device. Throws InputError (options, a detector of less than 2 columns, sizes
+  /// beyond 32 bits), ResourceError. Must not outlive the device.
   D2vrField(Device& device, const ProjectionSet& scan, const D2vrOptions& options,
             const Progress& progress = {});
   ~D2vrField();
@@ -55,9 +55,9 @@ class D2vrField {
 /// The field in the box of a grid, whose cells are the unit of steps and gradients, with what is known of
 /// where it is empty: its values at the grid's samples.
 ///
-/// Empty space: bricks of 4 cells whose values can be seen nowhere are leapt over. The range of a brick is that
-/// of its samples and of those one cell around, widened at both ends by half its extent. That is no bound:
-/// between samples the field may leave it (docs/rendering.md); `skip_empty` off is certain.
+/// Empty space: bricks of 4 cells whose values can be seen nowhere are leapt over. The range of a brick is
+/// that of its samples and of those one cell around, widened at both ends by half its extent. That is no
+/// bound: between samples the field may leave it (docs/rendering.md); `skip_empty` off is certain.
 class D2vrScene {
  public:
   /// Cost: one evaluation of the field per sample of the grid. Throws as ResidentVolume. The field must
@@ -67,7 +67,7 @@ class D2vrScene {
   D2vrScene(D2vrScene&&) noexcept;
   D2vrScene& operator=(D2vrScene&&) noexcept;
 
-  [[nodiscard]] const Volume& samples() const;   ///< the field on the grid
+  [[nodiscard]] const Volume& samples() const;  ///< the field on the grid
   [[nodiscard]] const D2vrField& field() const;
 
   struct Impl;
@@ -77,9 +77,10 @@ class D2vrScene {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One picture, as `raycast` draws it of a volume on the scene's grid: mode dvr, every sample and six more where
-/// it is lit taken from the projections. Throws InputError for another mode, pre-integration, steps by level,
-/// analytic gradients and the image3d sampler, which need a stored volume. RenderResult::sampler is `buffer`.
+/// One picture, as `raycast` draws it of a volume on the scene's grid: mode dvr, every sample and six more
+/// where it is lit taken from the projections. Throws InputError for another mode, pre-integration, steps by
+/// level, analytic gradients and the image3d sampler, which need a stored volume. RenderResult::sampler is
+/// `buffer`.
 RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options);
 
 }  // namespace vdvr

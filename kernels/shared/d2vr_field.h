@@ -10,7 +10,7 @@
 #ifndef VDVR_D2VR_FIELD_H
 #define VDVR_D2VR_FIELD_H
 
-#define FIELD __global const float *restrict field, VdvrDetector detector
+#define FIELD __global const float* restrict field, VdvrDetector detector
 #define THE_FIELD field, detector
 #define BRICKS __global const float4* restrict bricks
 
@@ -66,14 +66,14 @@ RAY_INLINE V back_projected(FIELD, __global const float4* views, V3 c) {
     const I at = u.index * detector.rows + v.index;
     __global const float* view = field + (ulong)k * (ulong)detector.columns * (ulong)detector.rows;
     V s00, s01, s10, s11;
-#define FOUR(n)                                                         \
-  {                                                                     \
-    const float2 near = vload2(0, view + LANE(at, n));                  \
-    const float2 far = vload2(0, view + LANE(at, n) + detector.rows);   \
-    LANE(s00, n) = near.x;                                              \
-    LANE(s01, n) = near.y;                                              \
-    LANE(s10, n) = far.x;                                               \
-    LANE(s11, n) = far.y;                                               \
+#define FOUR(n)                                                       \
+  {                                                                   \
+    const float2 near = vload2(0, view + LANE(at, n));                \
+    const float2 far = vload2(0, view + LANE(at, n) + detector.rows); \
+    LANE(s00, n) = near.x;                                            \
+    LANE(s01, n) = near.y;                                            \
+    LANE(s10, n) = far.x;                                             \
+    LANE(s11, n) = far.y;                                             \
   }
     EACH(FOUR)
 #undef FOUR

@@ -1,5 +1,5 @@
-// Points of a packet and the bricks that they lie in. The includer has defined OpenBrick, which begins with I3 at;
-// V3 low, high. Included by packet_sampler.h and d2vr_field.h.
+// Points of a packet and the bricks that they lie in. The includer has defined OpenBrick, which begins with
+// I3 at; V3 low, high. Included by packet_sampler.h and d2vr_field.h.
 #ifndef VDVR_PACKET_BRICKS_H
 #define VDVR_PACKET_BRICKS_H
 

@@ -1,7 +1,7 @@
-// What every ray-caster shares, whatever the field: rays of the camera, leaps over bricks, the table of colours,
-// light, and raycast_dvr itself. The includer has defined RAY_INLINE and the field before: FIELD, THE_FIELD and
-// BRICKS (kernel arguments), OpenBrick, open_brick, Sampled, sample_open, gradient_at. Included by raycast.cl
-// (stored volumes) and d2vr.cl (projections).
+// What every ray-caster shares, whatever the field: rays of the camera, leaps over bricks, the table of
+// colours, light, and raycast_dvr itself. The includer has defined RAY_INLINE and the field before: FIELD,
+// THE_FIELD and BRICKS (kernel arguments), OpenBrick, open_brick, Sampled, sample_open, gradient_at. Included
+// by raycast.cl (stored volumes) and d2vr.cl (projections).
 #ifndef VDVR_RAYCAST_DVR_H
 #define VDVR_RAYCAST_DVR_H
 
