@@ -196,8 +196,22 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
     check_refused(words, more[0]);
   };
   build({"--levels", "anisotropic"});
-  check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
+}
+
+BOOST_AUTO_TEST_CASE(projections_are_drawn_only_as_d2vr_can) {
+  const auto d2vr = [&](const std::vector<std::string>& more, const std::string& named) {
+    std::vector<std::string> words{"render", "x.h5", "-o", at("d2vr.png"), "--method", "d2vr"};
+    words.insert(words.end(), more.begin(), more.end());
+    check_refused(words, named);
+  };
+  for (const char* mode : {"iso", "mip", "slice"}) d2vr({"--mode", mode}, "--mode dvr");
+  d2vr({"--classification", "preintegrated"}, "--classification");
+  d2vr({"--step-mode", "level"}, "--step-mode");
+  d2vr({"--gradient", "analytic"}, "--gradient");
+  d2vr({"--sampler", "image3d"}, "--sampler");
+  check_refused({"render", "x.vdvr", "-o", at("d2vr.png"), "--cells", "4x4x4"}, "--method d2vr");
+  check_refused({"bench", "render", "x.vdvr", "--no-skip"}, "--method d2vr");
 }
 
 BOOST_AUTO_TEST_CASE(settings_that_exclude_each_other_are_refused) {

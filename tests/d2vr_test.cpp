@@ -287,6 +287,7 @@ BOOST_AUTO_TEST_CASE(normals_are_central_differences_of_the_field) {
   }
   BOOST_TEST_MESSAGE(seen << " normals, largest error over bound " << worst << ", bound at most " << widest);
   BOOST_TEST(seen > 100);
+  // A wrong sign, axis or reach errs by more than the bound leaves free.
   BOOST_TEST(widest < 0.05);
   BOOST_TEST(worst <= 1.0);
 }
@@ -300,7 +301,6 @@ BOOST_AUTO_TEST_CASE(lanes_and_groups_change_no_bit) {
   for (const int lanes : {4, 8, 16}) {
     const FloatPicture many = raycast_float(device(), scene, o, {4, 4, lanes});
     BOOST_TEST(same_bits(one, many));
-    BOOST_TEST(one.samples == many.samples);
   }
 }
 
