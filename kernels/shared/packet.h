@@ -1,7 +1,7 @@
 // A packet: VDVR_LANES rays that one work-item follows side by side. 1 suits devices whose work-items are
 // lanes themselves (GPUs), 8 or 16 those whose work-items are threads (CPUs). Every lane does the same
 // operations in the same order, whatever the others do, so that the number of lanes never changes a bit.
-// Included by raycast.cl.
+// Included by raycast.cl and d2vr.cl.
 //
 // A mask is what comparisons give: 0 or 1 in scalars, 0 or -1 in vectors. Combine masks by & and |, ask them
 // by ANY, ALL, NOT and PICK.
