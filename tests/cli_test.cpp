@@ -442,6 +442,33 @@ BOOST_AUTO_TEST_CASE(verify_rejects_other_projections_with_code_1) {
   BOOST_TEST(last_line(r.err).find("sha256") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(projections_are_drawn_and_probed_without_a_volume) {
+  const std::string scan = small_scan(), picture = at("d2vr.npy"), without = at("d2vr-no-skip.npy");
+  const Result r = run({"render", scan, "--method", "d2vr", "--size", "24x24", "-o", picture, "--json"});
+  BOOST_REQUIRE(r.code == 0);
+  const auto json = nlohmann::json::parse(r.out);
+  BOOST_TEST(json.at("method") == "d2vr");
+  BOOST_TEST(json.at("verified") == false);
+  BOOST_TEST(json.at("resident_bytes").get<double>() > 0);
+  BOOST_REQUIRE(
+      run({"render", scan, "--method", "d2vr", "--size", "24x24", "--no-skip", "-o", without}).code == 0);
+  BOOST_TEST(contents(picture) == contents(without));
+
+  write(at("q.csv"), "x,y,z\n0,0,0\n1000,0,0\n");
+  BOOST_REQUIRE(run({"probe", scan, "--method", "d2vr", "--points", at("q.csv"), "-o", at("d.csv")}).code ==
+                0);
+  std::istringstream lines(contents(at("d.csv")));
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  BOOST_TEST(line.rfind("0,0,0,", 0) == 0);
+  BOOST_TEST(line.substr(line.size() - 4) == ",,,1");
+  std::getline(lines, line);
+  BOOST_TEST(line == "1000,0,0,,,,0");
+  check_refused({"probe", scan, "--method", "d2vr", "--exact", "--points", at("q.csv"), "-o", at("e.csv")},
+                "--exact");
+}
+
 BOOST_AUTO_TEST_CASE(probe_answers_every_point_in_order) {
   write(at("p.csv"), "x,y,z\n0,0,0\n1000,0,0\n-2.5,1.25,0.5\n");
   const std::string volume = at("json.vdvr"), scan = small_scan();

@@ -23,6 +23,8 @@ class Source {
   /// Reads FILE, then opens the device. Throws as open_scene, load_scan, ResidentVolume and D2vrScene.
   Source(const Arguments& args, const CommonOptions& common, const std::string& method, bool unverified,
          const Progress& progress);
+  Source(const Source&) = delete;  // the scene refers to the field
+  Source& operator=(const Source&) = delete;
 
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
