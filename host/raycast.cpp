@@ -362,18 +362,22 @@ std::string kernel_name(const RenderOptions& o) {
   return o.step_mode == StepMode::level ? "raycast_level" : "raycast_dvr";
 }
 
-// `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
-template <class... Field>
-void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
-            int lanes, const BakedTransfer& table, float slack, const cl::Buffer& bricks,
-            const Field&... field) {
+opencl::Range packet_range(const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
   // Pixels of one packet (shared/packet.h).
   const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
   const auto packets = [](std::int64_t pixels, int packet) {
     return static_cast<std::uint64_t>((pixels + packet - 1) / packet);
   };
-  const opencl::Range range{{packets(o.width, packet_x), packets(o.height, packet_y), 1},
-                            {packets(tuning.group_x, packet_x), packets(tuning.group_y, packet_y), 1}};
+  return {{packets(o.width, packet_x), packets(o.height, packet_y), 1},
+          {packets(tuning.group_x, packet_x), packets(tuning.group_y, packet_y), 1}};
+}
+
+// `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
+template <class... Field>
+void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
+            int lanes, const BakedTransfer& table, float slack, const cl::Buffer& bricks,
+            const Field&... field) {
+  const opencl::Range range = packet_range(o, tuning, lanes);
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
@@ -464,14 +468,29 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   } else {
     launch(v, o, defines, tuning, lanes, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
   }
-  result.pixels = v.frame.picture.to_host();
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (const cl_uint n : v.frame.row_samples.to_host()) result.samples += n;
+  read_frame(v, start, result);
   return result;
 }
 
+DvrFrame prepare_dvr(Impl& v, const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
+  check_options(o);
+  const BakedTransfer& table = baked(v, o);
+  prepare_frame(v, o, table);
+  update_distance(v, o, table, 0);
+  return {packet_range(o, tuning, lanes), make_params(v, o, table, 0)};
+}
+
+void read_frame(Impl& v, std::chrono::steady_clock::time_point start, FloatPicture& picture) {
+  picture.pixels = v.frame.picture.to_host();
+  picture.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const cl_uint n : v.frame.row_samples.to_host()) picture.samples += n;
+}
+
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options) {
-  FloatPicture picture = raycast_float(device, volume, options);
+  return to_result(raycast_float(device, volume, options), options);
+}
+
+RenderResult to_result(FloatPicture picture, const RenderOptions& options) {
   RenderResult r;
   r.sampler = picture.sampler;
   r.sampler_reason = std::move(picture.sampler_reason);

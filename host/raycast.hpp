@@ -3,12 +3,15 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "host/opencl/cl.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/resident_volume.hpp"
+#include "shared/raycast_params.h"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {
@@ -32,5 +35,19 @@ struct FloatPicture {
 };
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
+
+// --- for a field that takes the place of the volume's (d2vr.cpp)
+// ------------------------------------------------------
+
+struct DvrFrame {
+  opencl::Range range;
+  VdvrRaycast params;
+};
+/// Checks options of mode dvr; brings table, distances and picture of `v`'s frame up to date.
+DvrFrame prepare_dvr(ResidentVolume::Impl& v, const RenderOptions& options, const RaycastTuning& tuning,
+                     int lanes);
+/// Waits for the picture: fills pixels, samples and seconds since `start`.
+void read_frame(ResidentVolume::Impl& v, std::chrono::steady_clock::time_point start, FloatPicture& picture);
+RenderResult to_result(FloatPicture picture, const RenderOptions& options);
 
 }  // namespace vdvr

@@ -196,8 +196,22 @@ BOOST_AUTO_TEST_CASE(what_a_later_version_brings_is_refused_by_name) {
     check_refused(words, more[0]);
   };
   build({"--levels", "anisotropic"});
-  check_refused({"render", "x.vdvr", "-o", at("x.png"), "--method", "d2vr"}, "--method");
   check_refused({"bench", "paper"}, "paper");
+}
+
+BOOST_AUTO_TEST_CASE(projections_are_drawn_only_as_d2vr_can) {
+  const auto d2vr = [&](const std::vector<std::string>& more, const std::string& named) {
+    std::vector<std::string> words{"render", "x.h5", "-o", at("d2vr.png"), "--method", "d2vr"};
+    words.insert(words.end(), more.begin(), more.end());
+    check_refused(words, named);
+  };
+  for (const char* mode : {"iso", "mip", "slice"}) d2vr({"--mode", mode}, "--mode dvr");
+  d2vr({"--classification", "preintegrated"}, "--classification");
+  d2vr({"--step-mode", "level"}, "--step-mode");
+  d2vr({"--gradient", "analytic"}, "--gradient");
+  d2vr({"--sampler", "image3d"}, "--sampler");
+  check_refused({"render", "x.vdvr", "-o", at("d2vr.png"), "--cells", "4x4x4"}, "--method d2vr");
+  check_refused({"bench", "render", "x.vdvr", "--no-skip"}, "--method d2vr");
 }
 
 BOOST_AUTO_TEST_CASE(settings_that_exclude_each_other_are_refused) {
@@ -437,6 +451,33 @@ BOOST_AUTO_TEST_CASE(verify_rejects_other_projections_with_code_1) {
   const Result r = run({"verify", at("json.vdvr"), "--projections", other});
   BOOST_TEST(r.code == 1);
   BOOST_TEST(last_line(r.err).find("sha256") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(projections_are_drawn_and_probed_without_a_volume) {
+  const std::string scan = small_scan(), picture = at("d2vr.npy"), without = at("d2vr-no-skip.npy");
+  const Result r = run({"render", scan, "--method", "d2vr", "--size", "24x24", "-o", picture, "--json"});
+  BOOST_REQUIRE(r.code == 0);
+  const auto json = nlohmann::json::parse(r.out);
+  BOOST_TEST(json.at("method") == "d2vr");
+  BOOST_TEST(json.at("verified") == false);
+  BOOST_TEST(json.at("resident_bytes").get<double>() > 0);
+  BOOST_REQUIRE(
+      run({"render", scan, "--method", "d2vr", "--size", "24x24", "--no-skip", "-o", without}).code == 0);
+  BOOST_TEST(contents(picture) == contents(without));
+
+  write(at("q.csv"), "x,y,z\n0,0,0\n1000,0,0\n");
+  BOOST_REQUIRE(run({"probe", scan, "--method", "d2vr", "--points", at("q.csv"), "-o", at("d.csv")}).code ==
+                0);
+  std::istringstream lines(contents(at("d.csv")));
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  BOOST_TEST(line.rfind("0,0,0,", 0) == 0);
+  BOOST_TEST(line.substr(line.size() - 4) == ",,,1");
+  std::getline(lines, line);
+  BOOST_TEST(line == "1000,0,0,,,,0");
+  check_refused({"probe", scan, "--method", "d2vr", "--exact", "--points", at("q.csv"), "-o", at("e.csv")},
+                "--exact");
 }
 
 BOOST_AUTO_TEST_CASE(probe_answers_every_point_in_order) {

@@ -12,6 +12,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/measure_tightness.hpp"
@@ -175,22 +176,25 @@ void check_picture(const Image& image) {
 }
 
 int bench_render(Arguments& args) {
-  const std::vector<std::string> methods{"vdvr", "dvr", "d2vr"}, supported{"vdvr", "dvr"};
-  args.positional("FILE", "a certified volume, or a uniform one");
-  add_limited(args, "method", methods, supported, "the mixed volume, or its base samples alone");
+  args.positional("FILE", "a certified volume, or a uniform one; or with --method d2vr projections");
+  add_method(args);
   args.value("frames", "60", "over a full turn (default 60)").value("size", "512x512", "pixels");
   constexpr Orbit first{0, 20, 1};
   add_transfer(args);
   add_orbit(args, first);
   args.value("sampler", "auto|image3d|buffer", "default auto");
   args.value("step", "S", "in base cells (default 1)");
+  add_scan(args);
+  add_projection_options(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const std::string method = limited_choice(args, "method", methods, supported);
+  const std::string method = method_option(args);
   const std::int64_t frames = args.integer_or("frames", 60, 1, 100000);
   const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
-  const Scene scene = open_scene(args.path("FILE"), args, method, false);
+  ProgressLine progress("bench", common.quiet);
+  Source source(args, common, method, false, progress.callback());
+  const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);
   RenderOptions o;
   if (const auto size = args.sizes("size", 2)) {
@@ -204,13 +208,10 @@ int bench_render(Arguments& args) {
                                                  : SamplerKind::image3d,
                            scene.certificate);
 
-  Device device = open_device(common);
-  ProgressLine progress("bench", common.quiet);
-  const ResidentVolume resident(device, scene.volume);
+  o.skip_empty = !args.has("no-skip");
   const Orbit orbit = orbit_options(args, first);
   o.camera = orbit_camera(scene.volume.grid, orbit.azimuth, orbit.elevation, orbit.zoom);
-  RenderResult last =
-      raycast(device, resident, o);  // also builds the kernels and lets `auto` choose, before timing
+  RenderResult last = source.draw(o);  // also builds the kernels and lets `auto` choose, before timing
   check_picture(last.image);
   std::vector<double> fps, rays, samples;
   for (std::int64_t f = 0; f < frames; ++f) {
@@ -218,14 +219,14 @@ int bench_render(Arguments& args) {
     const double turned = 360.0 * static_cast<double>(f) / static_cast<double>(frames);
     o.camera = orbit_camera(scene.volume.grid, orbit.azimuth + turned, orbit.elevation, orbit.zoom);
     const auto start = Clock::now();
-    last = raycast(device, resident, o);
+    last = source.draw(o);
     const double seconds = since(start);
     fps.push_back(1 / seconds);
     rays.push_back(static_cast<double>(o.width * o.height) / seconds);
     samples.push_back(static_cast<double>(last.samples) / seconds);
   }
   progress.clear();
-  Json line = bench_line("render", device, fps.size());
+  Json line = bench_line("render", source.device(), fps.size());
   line["method"] = method;
   line["size"] = {o.width, o.height};
   line["cells"] = scene.volume.grid.cells;
@@ -233,7 +234,7 @@ int bench_render(Arguments& args) {
   line["step"] = o.step;
   line["orbit"] = {orbit.azimuth, orbit.elevation, orbit.zoom};
   line["sampler"] = sampler_name(last.sampler);
-  line["resident_bytes"] = resident.bytes();
+  line["resident_bytes"] = source.bytes();
   std::vector<double> seconds(fps.size());
   std::transform(fps.begin(), fps.end(), seconds.begin(), [](double x) { return 1 / x; });
   line["seconds"] = spread(seconds);

@@ -114,9 +114,9 @@ void add_grid(Arguments& args) {
       .value("roi", "X0,Y0,Z0,X1,Y1,Z1", "certify and count only bricks inside");
 }
 
-GridOptions grid_options(const Arguments& args) {
+GridOptions grid_options(const Arguments& args, const std::string& size_option) {
   GridOptions grid;
-  if (const auto size = args.sizes("size", 3)) grid.size = Index3{(*size)[0], (*size)[1], (*size)[2]};
+  if (const auto size = args.sizes(size_option, 3)) grid.size = Index3{(*size)[0], (*size)[1], (*size)[2]};
   if (args.has("spacing")) {
     const bool both = args.text("spacing").find(',') != std::string::npos;
     const auto spacing = *args.numbers("spacing", both ? 2 : 1);
@@ -134,6 +134,12 @@ void add_rates(Arguments& args) {
       .value("upsampling", "auto|N", "of the filtered projections in u, a power of two")
       .value("u-filter", "auto|linear|cubic", "interpolation of the upsampled projections")
       .value("gold", "auto|N", "oversampling of the gold standard, a power of two");
+}
+
+int upsampling_option(const Arguments& args) {
+  const std::int64_t n = args.integer_or("upsampling", 1, 1, 64);
+  if (!is_power_of_two(n)) throw InputError(fmt::format("--upsampling: {} is not a power of two", n));
+  return static_cast<int>(n);
 }
 
 RateOptions rate_options(const Arguments& args) {

@@ -34,8 +34,11 @@ void add_build(Arguments& args);
 
 FieldOptions field_options(const Arguments& args);
 bool has_field_options(const Arguments& args);
-GridOptions grid_options(const Arguments& args);
+/// `size`: the option that holds the cells, where --size is something else.
+GridOptions grid_options(const Arguments& args, const std::string& size = "size");
 RateOptions rate_options(const Arguments& args);
+/// --upsampling alone: a power of two up to 64, default 1.
+int upsampling_option(const Arguments& args);
 /// Exactly one of --epsilon and --epsilon-abs.
 Tolerance tolerance(const Arguments& args);
 /// Includes --roi of the grid group.

@@ -63,15 +63,16 @@ Overlay overlay_options(const Arguments& args, RenderMode mode) {
   return o;
 }
 
-RenderResult render_with_overlay(Device& device, const ResidentVolume& resident, const Scene& scene,
-                                 const RenderOptions& o, const Overlay& overlay, bool certified) {
-  if (!overlay.any()) return raycast(device, resident, o);
-  RenderResult r = raycast(device, resident, o);
+RenderResult render_with_overlay(Source& source, const RenderOptions& o, const Overlay& overlay,
+                                 bool certified) {
+  RenderResult r = source.draw(o);
+  if (!overlay.any()) return r;
+  const Scene& scene = source.scene();
   const bool translucent =
       std::any_of(o.surfaces.begin(), o.surfaces.end(), [](const IsoSurface& s) { return s.opacity < 1; });
   if (overlay.box && o.mode == RenderMode::iso && translucent)
     throw InputError("--box: how far edges show through translucent surfaces is not known; leave it out");
-  if (overlay.box) draw_box(r.image, o.camera, resident.grid(), hidden_part(o.mode, r.values));
+  if (overlay.box) draw_box(r.image, o.camera, scene.volume.grid, hidden_part(o.mode, r.values));
   std::int64_t above = 0;
   if (overlay.caption) above = draw_caption(r.image, caption_lines(o, scene, certified));
   if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified), above);

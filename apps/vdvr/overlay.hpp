@@ -1,7 +1,7 @@
 // What `render` draws over a picture when asked: --axes, --box, --colorbar, --caption.
 #pragma once
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/source.hpp"
 
 namespace vdvr::cli {
 
@@ -14,7 +14,7 @@ void add_overlay(Arguments& args);
 Overlay overlay_options(const Arguments& args, RenderMode mode);
 
 /// Renders, and draws what was asked for over the picture.
-RenderResult render_with_overlay(Device& device, const ResidentVolume& resident, const Scene& scene,
-                                 const RenderOptions& options, const Overlay& overlay, bool certified);
+RenderResult render_with_overlay(Source& source, const RenderOptions& options, const Overlay& overlay,
+                                 bool certified);
 
 }  // namespace vdvr::cli

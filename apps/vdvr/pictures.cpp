@@ -33,7 +33,7 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
   }
   throw InputError(
       fmt::format("{}: is neither a certified volume nor a uniform one (MHA, NRRD, FILE.h5:/dataset, TIFF "
-                  "slices); build or reconstruct it first",
+                  "slices); build or reconstruct it first, or draw projections with --method d2vr",
                   path.string()));
 }
 

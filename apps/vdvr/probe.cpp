@@ -12,6 +12,7 @@
 #include "apps/vdvr/progress.hpp"
 #include "host/error_slice.hpp"
 #include "host/io/atomic_file.hpp"
+#include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/volume_file.hpp"
@@ -179,6 +180,25 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
   return probes;
 }
 
+std::vector<Probe> probe_d2vr(const std::filesystem::path& path, const Arguments& args,
+                              const std::vector<Vec3>& points, const Progress& progress) {
+  D2vrOptions options;
+  options.field = field_options(args);
+  options.upsampling = upsampling_option(args);
+  const ProjectionSet scan = load_scan(path, args, options.field, progress);
+  Device device = open_device(common_options(args));
+  const D2vrField field(device, scan, options, progress);
+  std::vector<Probe> probes(points.size());
+  std::vector<Vec3> covered;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if ((probes[i].covered = field.covered(points[i]))) covered.push_back(points[i]);
+  const std::vector<float> values = field.at(covered, progress);
+  std::size_t next = 0;
+  for (auto& probe : probes)
+    if (probe.covered) probe.value = static_cast<double>(values[next++]);
+  return probes;
+}
+
 }  // namespace
 
 int probe_command(Arguments& args) {
@@ -189,18 +209,25 @@ int probe_command(Arguments& args) {
       .flag("exact", "of projections: the field F in double precision on the host")
       .value("like", "OUT.vdvr", "with --exact: take the field options from this file")
       .value("projections", "IN", "of a certified volume from elsewhere: where the covered points are");
-  add_limited(args, "method", {"vdvr", "d2vr"}, {"vdvr"}, "how the value is found");
+  args.value(
+          "method", "vdvr|d2vr",
+          "d2vr: of projections what a ray of D2VR takes, bilinear between detector samples (default vdvr)")
+      .value("upsampling", "N",
+             "with --method d2vr: columns and rows per detector pixel, a power of two (default 1)");
   add_scan(args);
   add_field(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  limited_choice(args, "method", {"vdvr", "d2vr"}, {"vdvr"});
+  const bool d2vr = args.choice("method", {"vdvr", "d2vr"}, "vdvr") == "d2vr";
+  if (d2vr) refuse(args, {"exact", "like"}, "excludes --method d2vr, which is another field than F");
+  else refuse(args, {"upsampling"}, "applies to --method d2vr");
   const auto path = args.path("FILE"), points_path = args.path("points"), output = args.path("output");
   check_output(output, common.force, {path, points_path});
   const InputKind kind = kind_of(path, args);
   if (kind != InputKind::scan) {
     refuse(args, {"exact", "like", "angles-file"}, path.string() + " is not a projection set");
+    if (d2vr) refuse(args, {"method"}, path.string() + " is not a projection set");
     refuse(args, {"center", "filter", "filter-cutoff"},
            "defines the field of projections; " + path.string() + " has its own");
   }
@@ -209,10 +236,11 @@ int probe_command(Arguments& args) {
   const std::vector<Vec3> points = read_points(points_path);
 
   ProgressLine progress(args.command(), common.quiet);
-  const std::vector<Probe> probes =
-      kind == InputKind::certified ? probe_certified(path, args, points, progress.callback())
-      : kind == InputKind::volume  ? probe_volume(path, args, points)
-                                   : probe_exact(path, args, points, progress.callback());
+  const std::vector<Probe> probes = kind == InputKind::certified
+                                        ? probe_certified(path, args, points, progress.callback())
+                                    : kind == InputKind::volume ? probe_volume(path, args, points)
+                                    : d2vr ? probe_d2vr(path, args, points, progress.callback())
+                                           : probe_exact(path, args, points, progress.callback());
   throw_if_interrupted();
   io::write_file(output, to_csv(points, probes));
   progress.clear();

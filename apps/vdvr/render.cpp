@@ -8,6 +8,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "host/error_slice.hpp"
 #include "vdvr/error.hpp"
@@ -16,7 +17,6 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kMethods{"vdvr", "dvr", "d2vr"}, kSupportedMethods{"vdvr", "dvr"};
 const std::vector<std::string> kOutputs{"colour", "depth", "normal"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
@@ -24,12 +24,15 @@ constexpr Orbit kOrbit{30, 20, 1};
 constexpr int kFrameMs = 50;
 
 void add_options(Arguments& args) {
-  args.positional("FILE", "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices")
+  args.positional(
+          "FILE",
+          "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices; or with --method "
+          "d2vr projections")
       .value("output,o", "IMG.png|X.npy",
              "the picture; or as float32 what lies behind its pixels: opacity, depth, maximum, field, error; "
              "with "
              "--turntable a folder, or T.apng or T.gif");
-  add_limited(args, "method", kMethods, kSupportedMethods, "the mixed volume, or its base samples alone");
+  add_method(args);
   args.value("mode", "dvr|iso|mip|slice|error",
              "default dvr; error: on a slice |V - F|, or without --projections what the certificate bounds "
              "it by")
@@ -59,6 +62,7 @@ void add_options(Arguments& args) {
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("unverified", "render although content and certificate do not match");
   add_scan(args);
+  add_projection_options(args);
   args.group("Camera");
   add_orbit(args, kOrbit);
   add_free_camera(args);
@@ -169,8 +173,23 @@ RenderOptions render_options(const Arguments& args) {
   return o;
 }
 
+/// Before anything is read; the library refuses the same.
+void check_d2vr(const Arguments& args, const RenderOptions& o) {
+  if (o.mode != RenderMode::dvr)
+    throw InputError(
+        fmt::format("--mode {}: --method d2vr has projections instead of a volume and draws only "
+                    "--mode dvr; build the volume for the others",
+                    args.text("mode")));
+  if (o.classification != Classification::post || o.step_mode != StepMode::fixed ||
+      o.gradient != GradientKind::central || o.sampler == SamplerKind::image3d)
+    refuse(args, {"classification", "step-mode", "gradient", "sampler"},
+           "--method d2vr has no stored samples: it classifies after sampling, steps evenly, takes central "
+           "differences and reads buffers");
+  refuse(args, {"unverified"}, "--method d2vr has no certificate");
+}
+
 void check_combination(const Arguments& args, const RenderOptions& o) {
-  limited_choice(args, "method", kMethods, kSupportedMethods);
+  if (method_option(args) == "d2vr") check_d2vr(args, o);
   const bool flat = o.mode == RenderMode::slice || o.mode == RenderMode::error;
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
@@ -272,14 +291,12 @@ std::string frame_name(std::int64_t frame) { return fmt::format("frame-{:04}.png
 
 /// What a turntable needs beside its frames.
 struct Stage {
-  Device& device;
-  const ResidentVolume& resident;
-  const Scene& scene;
+  Source& source;
   const Overlay& overlay;
   bool certified;
 
   [[nodiscard]] RenderResult draw(const RenderOptions& o) const {
-    return render_with_overlay(device, resident, scene, o, overlay, certified);
+    return render_with_overlay(source, o, overlay, certified);
   }
 };
 
@@ -292,7 +309,7 @@ RenderResult turn(const Arguments& args, const Stage& stage, RenderOptions o, st
     report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
     Orbit orbit = orbit_options(args, kOrbit);
     orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
-    o.camera = camera_for(args, stage.resident.grid(), orbit);
+    o.camera = camera_for(args, stage.source.scene().volume.grid, orbit);
     last = stage.draw(o);
     take(f, last.image);
   }
@@ -314,12 +331,14 @@ std::vector<std::string> turntable_names(const std::filesystem::path& folder, st
 RenderResult turn_into_folder(const Arguments& args, const CommonOptions& common, const Stage& stage,
                               const RenderOptions& o, std::int64_t frames, const Progress& progress) {
   const auto path = args.path("output");
-  OutputFolder folder(path, turntable_names(path, frames, stage.scene.certificate.has_value()), common.force);
+  OutputFolder folder(path, turntable_names(path, frames, stage.source.scene().certificate.has_value()),
+                      common.force);
   folder.begin();
   RenderResult last = turn(args, stage, o, frames, progress, [&](std::int64_t f, const Image& image) {
     write_png(folder.file(frame_name(f)), image);
   });
-  if (stage.scene.certificate) folder.finish(to_json(*stage.scene.certificate));
+  const auto& certificate = stage.source.scene().certificate;
+  if (certificate) folder.finish(to_json(*certificate));
   return last;
 }
 
@@ -356,7 +375,7 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
     write_png(output, result.image);
     return result;
   }
-  RenderResult result = raycast(stage.device, stage.resident, o);
+  RenderResult result = stage.source.draw(o);
   throw_if_interrupted();
   write_npy(output, result.values);
   return result;
@@ -385,7 +404,10 @@ int render_command(Arguments& args) {
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
-  const Scene scene = open_scene(path, args, args.text_or("method", "vdvr"), args.has("unverified"));
+  const std::string method = method_option(args);
+  ProgressLine progress(args.command(), common.quiet);
+  Source source(args, common, method, args.has("unverified"), progress.callback());
+  const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);
   o.surfaces = surfaces_for(args, bright.threshold);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
@@ -393,19 +415,18 @@ int render_command(Arguments& args) {
   o.sampler = safe_sampler(o.sampler, scene.certificate);
   o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
   // The base samples alone are another field than the one certified.
-  const bool certified = scene.verified && args.text_or("method", "vdvr") == "vdvr";
+  const bool certified = scene.verified && method == "vdvr";
+  o.skip_empty = !args.has("no-skip");
 
-  Device device = open_device(common);
-  ProgressLine progress(args.command(), common.quiet);
-  const ResidentVolume resident(device, scene.volume);
-  const Stage stage{device, resident, scene, overlay, certified};
+  const Stage stage{source, overlay, certified};
   const RenderResult result =
       kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
       : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
                                  : draw_one(stage, o, output, kind);
   progress.clear();
 
-  const std::string stamp = certified        ? "certified"
+  const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
+                            : certified      ? "certified"
                             : scene.verified ? "base samples alone: no certificate"
                             : scene.certificate
                                 ? "UNVERIFIED: the content was not compared with the certificate"
@@ -421,11 +442,16 @@ int render_command(Arguments& args) {
                      {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
                      {"outside_certificate", outside_certificate(o)},
                      {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
-                     {"device", device.info().name}};
+                     {"method", method},
+                     {"resident_bytes", source.bytes()},
+                     {"device", source.device().info().name}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
+    if (method == "d2vr")
+      fmt::print("  projections  {:.1f} MiB on the device\n",
+                 static_cast<double>(source.bytes()) / (1 << 20));
     if (certified)
       fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
                  scene.certificate->epsilon_abs);
@@ -437,7 +463,7 @@ int render_command(Arguments& args) {
     // Slices count no samples along rays.
     fmt::print("  {}{:.3f} s on {}\n",
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,
-               device.info().name);
+               source.device().info().name);
   });
   return 0;
 }

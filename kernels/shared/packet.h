@@ -1,7 +1,7 @@
 // A packet: VDVR_LANES rays that one work-item follows side by side. 1 suits devices whose work-items are
 // lanes themselves (GPUs), 8 or 16 those whose work-items are threads (CPUs). Every lane does the same
 // operations in the same order, whatever the others do, so that the number of lanes never changes a bit.
-// Included by raycast.cl.
+// Included by raycast.cl and d2vr.cl.
 //
 // A mask is what comparisons give: 0 or 1 in scalars, 0 or -1 in vectors. Combine masks by & and |, ask them
 // by ANY, ALL, NOT and PICK.
@@ -88,6 +88,14 @@ RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
 RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
 RAY_INLINE int any_lane16(int16 m) { return any_lane8(m.lo | m.hi); }
 #endif
+#endif
+
+#if VDVR_LANES == 1
+typedef ulong Offset;
+#define TO_OFFSET(i) ((ulong)(i))
+#else
+typedef I Offset;
+#define TO_OFFSET(i) (i)
 #endif
 
 // m ? a : b, lane by lane.

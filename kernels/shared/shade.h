@@ -1,4 +1,4 @@
-// Light on a point of a picture. Included by raycast.cl.
+// Light on a point of a picture. Included by raycast_dvr.h.
 #ifndef VDVR_SHADE_H
 #define VDVR_SHADE_H
 

@@ -1,0 +1,46 @@
+// What `render` and `bench render` draw: a volume on the device or, with --method d2vr, projections.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/vdvr/pictures.hpp"
+#include "vdvr/d2vr.hpp"
+#include "vdvr/progress.hpp"
+
+namespace vdvr::cli {
+
+const std::vector<std::string>& render_methods();
+void add_method(Arguments& args);
+/// A group of the options that only d2vr has, without the scan's (add_scan).
+void add_projection_options(Arguments& args);
+/// Throws InputError for options that the method does not take.
+std::string method_option(const Arguments& args);
+
+class Source {
+ public:
+  /// Reads FILE, then opens the device. Throws as open_scene, load_scan, ResidentVolume and D2vrScene.
+  Source(const Arguments& args, const CommonOptions& common, const std::string& method, bool unverified,
+         const Progress& progress);
+  Source(const Source&) = delete;  // the scene refers to the field
+  Source& operator=(const Source&) = delete;
+
+  /// Of projections the field on the grid's samples, without a certificate.
+  [[nodiscard]] const Scene& scene() const { return *scene_; }
+  [[nodiscard]] Device& device() { return *device_; }
+  [[nodiscard]] RenderResult draw(const RenderOptions& options);
+  /// On the device between frames: volume, or projections.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  void open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress);
+
+  std::optional<Scene> scene_;
+  std::optional<Device> device_;
+  std::optional<ResidentVolume> resident_;
+  std::optional<D2vrField> field_;
+  std::optional<D2vrScene> projections_;
+};
+
+}  // namespace vdvr::cli
