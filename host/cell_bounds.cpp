@@ -53,12 +53,11 @@ void CellBounds::make_tables(const CellLayers& slab) {
       settings_.grid.origin[2] + static_cast<double>(slab.first) * settings_.grid.spacing[2];
   state_.queue.finish();
   const auto start = std::chrono::steady_clock::now();
-  projection_ =
-      projection_table(state_, upsampler_, scan_,
-                       columns_for(scan_.geometry, settings_.grid, std::min(8, settings_.upsampling)),
-                       settings_.upsampling, settings_.u_filter,
-                       base_cells(scan_.geometry, settings_.grid, settings_.rate, settings_.coarsest(),
-                                  z_first, slab.count));
+  projection_ = projection_table(
+      state_, upsampler_, scan_,
+      columns_for(scan_.geometry, settings_.grid, std::min(8, settings_.upsampling)), settings_.upsampling,
+      settings_.u_filter,
+      base_cells(scan_.geometry, settings_.grid, settings_.rate, settings_.coarsest(), z_first, slab.count));
   remainders_ = remainder_table(state_, upsampler_, scan_, sups_, settings_.grid, settings_.coarsest(),
                                 z_first, slab.count);
   state_.queue.finish();
