@@ -13,7 +13,7 @@ namespace {
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Of the tolerance: a brick whose coarse slack takes more is not tried on coarse gold once it is refined.
-constexpr double easy_share = 0.6;
+constexpr double easy_share = 0.48;
 // Of the bricks: how many at most the search for the largest error measures again at once.
 constexpr std::size_t sharpened_share = 32;
 
@@ -70,7 +70,7 @@ ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
   return coarse_slack_[brick] >= 0 &&
-         1.25 * static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
+         static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
 }
 
 void ClassifyBricks::classify(const DeviceField& base, double tolerance,

@@ -307,18 +307,32 @@ int lanes_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
   return tuning.lanes.value_or(v.state->info.is_cpu ? 8 : 1);
 }
 
-opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind sampler,
+GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind sampler) {
+  const bool needed = o.shading || o.output != RenderOutput::colour;
+  if (o.gradient == GradientKind::automatic)
+    return o.mode == RenderMode::dvr && needed && sampler == SamplerKind::buffer && v.lit_fits()
+               ? GradientKind::stored
+               : GradientKind::central;
+  if (o.gradient == GradientKind::stored && sampler == SamplerKind::image3d)
+    throw InputError("--gradient stored: the image3d sampler has none; use --sampler buffer");
+  return o.gradient;
+}
+
+opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind sampler, GradientKind gradient,
                             const RaycastTuning& tuning, int lanes) {
+  const bool lit = gradient == GradientKind::stored;
+  const bool uniform = lit ? v.lit_layout.is_uniform() : v.is_uniform;
   return {{"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
           {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
-          {"VDVR_GRADIENT_ANALYTIC", o.gradient == GradientKind::analytic ? "1" : "0"},
+          {"VDVR_GRADIENT_ANALYTIC", gradient == GradientKind::analytic ? "1" : "0"},
+          {"VDVR_LIT", lit ? "1" : "0"},
           {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
           {"VDVR_LANES", std::to_string(lanes)},
-          {"VDVR_UNIFORM", v.is_uniform && lanes > 1 ? "1" : "0"},
-          v.field->defines.front()};
+          {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
+          lit ? std::pair<std::string, std::string>{"VDVR_SAMPLE_TYPES", "1"} : v.field->defines.front()};
 }
 
 void prepare_frame(Impl& v, const RenderOptions& o, const BakedTransfer& table) {
@@ -375,22 +389,22 @@ opencl::Range packet_range(const RenderOptions& o, const RaycastTuning& tuning, 
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, const RaycastTuning& tuning,
-            int lanes, const BakedTransfer& table, float slack, const cl::Buffer& bricks,
-            const Field&... field) {
+            int lanes, const BakedTransfer& table, float slack, const VdvrGrid& grid,
+            const cl::Buffer& bricks, const Field&... field) {
   const opencl::Range range = packet_range(o, tuning, lanes);
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
         *v.state, "raycast", "slice", defines);
-    kernel(range, field..., bricks, v.field->grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
+    kernel(range, field..., bricks, grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
     return;
   }
   // dvr and iso leap by distances, mip by the bricks' maxima.
   const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : v.frame.distance.buffer();
   opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer, cl::Buffer>
       kernel(*v.state, "raycast", kernel_name(o), defines);
-  kernel(range, field..., bricks, v.field->grid, guide, v.frame.table.buffer(),
-         make_params(v, o, table, slack), picture, v.frame.row_samples.buffer());
+  kernel(range, field..., bricks, grid, guide, v.frame.table.buffer(), make_params(v, o, table, slack),
+         picture, v.frame.row_samples.buffer());
 }
 
 std::uint8_t to_byte(float x) {
@@ -457,17 +471,19 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
 
   const int lanes = lanes_for(v, result.sampler, tuning);
-  const auto defines = defines_for(v, o, result.sampler, tuning, lanes);
-  const bool image = result.sampler == SamplerKind::image3d;
+  result.gradient = choose_gradient(v, o, result.sampler);
+  const auto defines = defines_for(v, o, result.sampler, result.gradient, tuning, lanes);
+  const bool image = result.sampler == SamplerKind::image3d, lit = result.gradient == GradientKind::stored;
   if (image) v.atlas();
+  if (lit) v.lit();
   opencl::finish(*v.state, "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
-  if (image) {
-    const auto& atlas = v.atlas();
-    launch(v, o, defines, tuning, lanes, table, slack, v.atlas_bricks(), atlas[0], atlas[1], atlas[2]);
-  } else {
-    launch(v, o, defines, tuning, lanes, table, slack, v.field->bricks.buffer(), v.field->samples.buffer());
-  }
+  const auto draw = [&](const VdvrGrid& grid, const cl::Buffer& bricks, const auto&... field) {
+    launch(v, o, defines, tuning, lanes, table, slack, grid, bricks, field...);
+  };
+  if (image) draw(v.field->grid, v.atlas_bricks(), v.atlas()[0], v.atlas()[1], v.atlas()[2]);
+  else if (lit) draw(v.lit().grid(), v.lit().bricks(), v.lit().samples());
+  else draw(v.field->grid, v.field->bricks.buffer(), v.field->samples.buffer());
   read_frame(v, start, result);
   return result;
 }
@@ -494,6 +510,7 @@ RenderResult to_result(FloatPicture picture, const RenderOptions& options) {
   RenderResult r;
   r.sampler = picture.sampler;
   r.sampler_reason = std::move(picture.sampler_reason);
+  r.gradient = picture.gradient;
   r.samples = picture.samples;
   r.seconds = picture.seconds;
   r.values = values_of(picture.pixels, options);

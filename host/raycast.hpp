@@ -30,6 +30,7 @@ struct FloatPicture {
   std::vector<cl_float4> pixels;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;
+  GradientKind gradient = GradientKind::central;
   std::int64_t samples = 0;
   double seconds = 0;
 };

@@ -248,8 +248,7 @@ std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& cla
 }
 
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
-    : state(&device.state()), grid(v.grid) {
-  check_sizes(v);
+    : state(&device.state()), grid(v.grid), lit_layout((check_sizes(v), v)) {
   is_uniform = v.base.type == SampleType::f32 && v.tiles.empty();
   offsets_ = tile_offsets(v);
   types_[{0, 0, 0}] = v.base.type;
@@ -359,6 +358,17 @@ const std::array<cl::Image3D, 3>& ResidentVolume::Impl::atlas() {
   return *atlas_;
 }
 
+bool ResidentVolume::Impl::lit_fits() const {
+  return lit_ || (lit_layout.samples() <= std::numeric_limits<std::int32_t>::max() &&
+                  lit_layout.samples() * sizeof(cl_uint2) <= state->info.max_allocation &&
+                  lit_layout.bytes() <= state->memory.left());
+}
+
+const LitSamples& ResidentVolume::Impl::lit() {
+  if (!lit_) lit_.emplace(*state, *field, lit_layout, grid, value_range.second - value_range.first);
+  return *lit_;
+}
+
 const cl::Buffer& ResidentVolume::Impl::ranges() {
   if (ranges_.size() == 0)
     ranges_ =
@@ -368,7 +378,8 @@ const cl::Buffer& ResidentVolume::Impl::ranges() {
 
 std::uint64_t ResidentVolume::Impl::bytes() const {
   return field->samples.size() + (field->bricks.size() + atlas_bricks_.size()) * sizeof(std::uint32_t) +
-         ranges_.size() * sizeof(cl_float2) + frame.distance.size() + (atlas_ ? layout.bytes() : 0);
+         ranges_.size() * sizeof(cl_float2) + frame.distance.size() + (atlas_ ? layout.bytes() : 0) +
+         (lit_ ? lit_->bytes() : 0);
 }
 
 ResidentVolume::ResidentVolume(Device& device, const MixedVolume& volume)

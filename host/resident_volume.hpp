@@ -16,6 +16,7 @@
 
 #include "host/bake.hpp"
 #include "host/device_field.hpp"
+#include "host/lit_samples.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {
@@ -71,6 +72,10 @@ struct ResidentVolume::Impl {
   const std::array<cl::Image3D, 3>& atlas();
   /// Brick records whose places are texels; after atlas().
   const cl::Buffer& atlas_bricks() const { return atlas_bricks_.buffer(); }
+  /// Samples with gradients, made on first use. Throws ResourceError when the device has no room for them.
+  const LitSamples& lit();
+  /// Whether they were made or would fit what is left.
+  [[nodiscard]] bool lit_fits() const;
   /// [bz][by][bx] min, max over the samples of the closed brick; on the device from the first call on.
   const cl::Buffer& ranges();
   [[nodiscard]] std::uint64_t bytes() const;  ///< on the device, between frames
@@ -83,6 +88,7 @@ struct ResidentVolume::Impl {
   int highest_level = 0;    ///< of any brick and axis
   bool is_uniform = false;  ///< every brick reads a float32 base
   AtlasLayout layout;
+  LitLayout lit_layout;
 
   /// Kept between frames so that a frame allocates nothing but its picture.
   struct FrameCache {
@@ -106,6 +112,7 @@ struct ResidentVolume::Impl {
   std::optional<std::array<cl::Image3D, 3>> atlas_;
   opencl::DeviceArray<std::uint32_t> atlas_bricks_;
   opencl::DeviceArray<cl_float2> ranges_;
+  std::optional<LitSamples> lit_;
 };
 
 }  // namespace vdvr

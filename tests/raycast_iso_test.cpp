@@ -8,21 +8,14 @@
 #include "host/raycast.hpp"
 #include "host/resident_volume.hpp"
 #include "tests/reference/first_root.hpp"
-#include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
-#include "tests/support/tolerance.hpp"
+#include "tests/support/rendering.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;
+using support::device, support::u;
 
 namespace {
-
-constexpr double u = tolerance::unit_roundoff;
-
-Device& device() {
-  static Device d;
-  return d;
-}
 
 RenderOptions surface_at(const Camera& camera, double value, std::int64_t size = 33) {
   RenderOptions o;

@@ -9,35 +9,15 @@
 #include "host/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"
-#include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
-#include "tests/support/tolerance.hpp"
+#include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;
+using support::device, support::scattered_levels, support::u;
 
 namespace {
-
-constexpr double u = tolerance::unit_roundoff;
-
-Device& device() {
-  static Device d;
-  return d;
-}
-
-LevelTriple scattered_levels(const Index3& b) {
-  switch ((3 * b[0] + 5 * b[1] + 7 * b[2]) % 5) {
-    case 0:
-      return {1, 1, 1};
-    case 1:
-      return {2, 0, 1};
-    case 2:
-      return {0, 3, 0};
-    default:
-      return {0, 0, 0};
-  }
-}
 
 RenderOptions normals_of(const Grid& grid, double azimuth, double elevation, double iso) {
   RenderOptions o;

@@ -7,22 +7,15 @@
 #include "host/raycast.hpp"
 #include "host/resident_volume.hpp"
 #include "tests/reference/raycast.hpp"
-#include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
-#include "tests/support/tolerance.hpp"
+#include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;
+using support::device, support::scattered_levels, support::u;
 
 namespace {
-
-constexpr double u = tolerance::unit_roundoff;
-
-Device& device() {
-  static Device d;
-  return d;
-}
 
 RenderOptions options_for(const Grid& grid, RenderMode mode, std::int64_t size = 48) {
   RenderOptions o;
@@ -58,18 +51,6 @@ double largest_difference(const std::vector<cl_float4>& a, const std::vector<cl_
 double blob(double x, double y, double z) {
   const double r2 = (x - 3) * (x - 3) + (y + 2) * (y + 2) * 1.5 + (z - 1) * (z - 1) * 0.7;
   return std::max(0.0, 1 - r2 / 90);
-}
-LevelTriple scattered_levels(const Index3& b) {
-  switch ((3 * b[0] + 5 * b[1] + 7 * b[2]) % 5) {
-    case 0:
-      return {1, 1, 1};
-    case 1:
-      return {2, 0, 1};
-    case 2:
-      return {0, 2, 0};
-    default:
-      return {0, 0, 0};
-  }
 }
 MixedVolume mixed_blob() { return fields::mixed(centred_grid({30, 27, 33}), 4, scattered_levels, blob); }
 

@@ -184,6 +184,8 @@ int bench_render(Arguments& args) {
   add_orbit(args, first);
   args.value("sampler", "auto|image3d|buffer", "default auto");
   args.value("step", "S", "in base cells (default 1)");
+  args.value("gradient", "auto|central|stored|analytic", "as `render` takes it (default auto)")
+      .flag("no-shading", "colours of the transfer function alone, without light");
   add_scan(args);
   add_projection_options(args);
   add_common(args);
@@ -202,6 +204,9 @@ int bench_render(Arguments& args) {
     o.height = (*size)[1];
   }
   o.step = args.positive_or("step", o.step);
+  o.shading = !args.has("no-shading");
+  if (!o.shading) refuse(args, {"gradient"}, "excludes --no-shading");
+  o.gradient = gradient_option(args);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.sampler = safe_sampler(sampler == "auto"     ? SamplerKind::automatic
                            : sampler == "buffer" ? SamplerKind::buffer
@@ -232,6 +237,7 @@ int bench_render(Arguments& args) {
   line["cells"] = scene.volume.grid.cells;
   line["transfer"] = o.transfer.name;
   line["step"] = o.step;
+  line["gradient"] = o.shading ? gradient_name(last.gradient) : "none";
   line["orbit"] = {orbit.azimuth, orbit.elevation, orbit.zoom};
   line["sampler"] = sampler_name(last.sampler);
   line["resident_bytes"] = source.bytes();

@@ -51,9 +51,9 @@ void add_options(Arguments& args) {
       .value("classification", "post|preintegrated",
              "of dvr; post: colour of each sample; preintegrated: of the path between two (default post)")
       .value(
-          "gradient", "central|analytic",
-          "which way a surface faces: differences over one base cell, or the derivative of the cell itself "
-          "(default central)")
+          "gradient", "auto|central|stored|analytic",
+          "which way a surface faces: differences over one base cell, the same kept at the samples, or the "
+          "derivative of the cell itself (default auto: stored for dvr where there is room, else central)")
       .values("light", "head|X,Y,Z",
               "at the eye, or from a direction in world axes; may be given several times (default head)")
       .flag("no-shading", "colours of the transfer function alone, without light")
@@ -107,9 +107,7 @@ void set_light(const Arguments& args, RenderOptions& o) {
   o.shading = !args.has("no-shading");
   if (!o.shading) refuse(args, {"light"}, "excludes --no-shading");
   if (!o.shading && o.output != RenderOutput::normal) refuse(args, {"gradient"}, "excludes --no-shading");
-  o.gradient = args.choice("gradient", {"central", "analytic"}, "central") == "analytic"
-                   ? GradientKind::analytic
-                   : GradientKind::central;
+  o.gradient = gradient_option(args);
   if (!args.has("light")) return;
   o.head_light = false;
   for (const std::string& light : args.texts("light")) {
@@ -181,7 +179,7 @@ void check_d2vr(const Arguments& args, const RenderOptions& o) {
                     "--mode dvr; build the volume for the others",
                     args.text("mode")));
   if (o.classification != Classification::post || o.step_mode != StepMode::fixed ||
-      o.gradient != GradientKind::central || o.sampler == SamplerKind::image3d)
+      o.gradient != GradientKind::automatic || o.sampler == SamplerKind::image3d)
     refuse(args, {"classification", "step-mode", "gradient", "sampler"},
            "--method d2vr has no stored samples: it classifies after sampling, steps evenly, takes central "
            "differences and reads buffers");
@@ -432,11 +430,14 @@ int render_command(Arguments& args) {
                                 ? "UNVERIFIED: the content was not compared with the certificate"
                                 : "no certificate";
   const bool has_transfer = o.mode == RenderMode::dvr || o.mode == RenderMode::mip;
+  const bool lit = (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) &&
+                   (o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour));
   const Json json = {{"output", output.string()},
                      {"frames", frames},
                      {"verified", certified},
                      {"sampler", sampler_name(result.sampler)},
                      {"sampler_reason", result.sampler_reason},
+                     {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
                      {"samples", result.samples},
                      {"seconds", result.seconds},
                      {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
@@ -449,6 +450,9 @@ int render_command(Arguments& args) {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
+    if (result.gradient == GradientKind::stored)
+      fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n",
+                 static_cast<double>(source.bytes()) / (1 << 20));
     if (method == "d2vr")
       fmt::print("  projections  {:.1f} MiB on the device\n",
                  static_cast<double>(source.bytes()) / (1 << 20));

@@ -52,6 +52,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   RenderOptions o;
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
+  o.gradient = GradientKind::automatic;
   o.transfer = two_material_transfer(bright);
   o.surfaces = {{bright.threshold}};
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};

@@ -117,4 +117,23 @@ Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit) {
                  args.positive_or("camera-view-angle", camera.view_angle_deg));
 }
 
+constexpr std::array<std::pair<const char*, GradientKind>, 4> kGradients{
+    {{"auto", GradientKind::automatic},
+     {"central", GradientKind::central},
+     {"stored", GradientKind::stored},
+     {"analytic", GradientKind::analytic}}};
+
+GradientKind gradient_option(const Arguments& args) {
+  std::vector<std::string> names;
+  for (const auto& [name, kind] : kGradients) names.emplace_back(name);
+  const std::string asked = args.choice("gradient", names, "auto");
+  return std::find_if(kGradients.begin(), kGradients.end(), [&](const auto& g) { return asked == g.first; })
+      ->second;
+}
+
+const char* gradient_name(GradientKind kind) {
+  return std::find_if(kGradients.begin(), kGradients.end(), [&](const auto& g) { return kind == g.second; })
+      ->first;
+}
+
 }  // namespace vdvr::cli

@@ -20,6 +20,10 @@ std::optional<std::pair<double, double>> given_range(const Arguments& args);
 /// Opacities are those of one base cell of the grid. What a reader filled in stands in `note`.
 TransferFunction transfer_for(const Arguments& args, const Brightness& brightness, const Grid& grid);
 
+/// From --gradient.
+GradientKind gradient_option(const Arguments& args);
+const char* gradient_name(GradientKind kind);
+
 /// An orbit around the volume, as --azimuth, --elevation and --zoom say.
 struct Orbit {
   double azimuth = 30, elevation = 20, zoom = 1;

@@ -76,9 +76,13 @@ struct IsoSurface {
 };
 
 enum class SamplerKind { automatic, image3d, buffer };
-/// How the direction of a surface is found: central differences over one base cell at every level, without a
-/// seam where levels or cells meet, or the derivative of the trilinear cell itself, which jumps at its faces.
-enum class GradientKind { central, analytic };
+/// How the direction of a surface is found. central: differences over one base cell at the very point, at
+/// every level, without a seam where levels or cells meet. stored: those at the samples, made once a volume
+/// (8 bytes a sample on the device) and interpolated as the field is; without a seam, and several times
+/// faster in bricks with tiles; buffer sampler only. analytic: the derivative of the trilinear cell itself,
+/// which jumps at its faces. automatic: stored for mode dvr where the device has room and the sampler is
+/// `buffer`, else central.
+enum class GradientKind { automatic, central, stored, analytic };
 
 /// Mode dvr: colour and opacity of each sample, or of the path between two samples, along which the field is
 /// taken as linear: no transfer function is then too sharp for a step.
@@ -119,8 +123,9 @@ struct RenderResult {
   FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
-  std::int64_t samples = 0;    ///< taken along rays
-  double seconds = 0;          ///< kernel and read-back
+  GradientKind gradient = GradientKind::central;  ///< what `automatic` took
+  std::int64_t samples = 0;                       ///< taken along rays
+  double seconds = 0;                             ///< kernel and read-back
 };
 
 struct ImageLimits;  // host/resident_volume.hpp

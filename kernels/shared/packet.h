@@ -65,6 +65,8 @@
 #endif
 #define TO_V(x) PACKET(convert_float)(x)
 #define TO_I(x) PACKET(convert_int)(x)
+#define AS_I(x) PACKET(as_int)(x)
+#define AS_U(x) PACKET(as_uint)(x)
 
 typedef PACKET(float) V;
 typedef PACKET(int) I;
@@ -93,9 +95,11 @@ RAY_INLINE int any_lane16(int16 m) { return any_lane8(m.lo | m.hi); }
 #if VDVR_LANES == 1
 typedef ulong Offset;
 #define TO_OFFSET(i) ((ulong)(i))
+#define TO_ULONG(i) (i)
 #else
 typedef I Offset;
 #define TO_OFFSET(i) (i)
+#define TO_ULONG(i) ((ulong)(uint)(i))  // of one lane; no offset is negative
 #endif
 
 // m ? a : b, lane by lane.
@@ -111,5 +115,58 @@ typedef struct {
 typedef struct {
   I x, y, z;
 } I3;
+
+// Four numbers of every lane, from one float4 a lane: TURN(ROW), ROW(n) that of lane n. One load and half a
+// dozen shuffles a lane, where four loads and as many inserts would stand.
+typedef struct {
+  V x, y, z, w;
+} V4;
+#if VDVR_LANES == 1
+RAY_INLINE V4 turned(float4 a) {
+  const V4 t = {a.x, a.y, a.z, a.w};
+  return t;
+}
+#define TURN(ROW) turned(ROW(0))
+#elif VDVR_LANES == 4
+RAY_INLINE V4 turned(float4 a, float4 b, float4 c, float4 d) {
+  const V4 t = {(V)(a.x, b.x, c.x, d.x), (V)(a.y, b.y, c.y, d.y), (V)(a.z, b.z, c.z, d.z),
+                (V)(a.w, b.w, c.w, d.w)};
+  return t;
+}
+#define TURN(ROW) turned(ROW(0), ROW(1), ROW(2), ROW(3))
+#else
+typedef struct {
+  float8 x, y, z, w;
+} Turned8;
+RAY_INLINE Turned8 turned8(float4 a, float4 b, float4 c, float4 d, float4 e, float4 f, float4 g, float4 h) {
+  const float8 ae = (float8)(a, e), bf = (float8)(b, f), cg = (float8)(c, g), dh = (float8)(d, h);
+#define LOW(p, q) (float8)(p.s0, q.s0, p.s1, q.s1, p.s4, q.s4, p.s5, q.s5)
+#define HIGH(p, q) (float8)(p.s2, q.s2, p.s3, q.s3, p.s6, q.s6, p.s7, q.s7)
+#define EVEN(p, q) (float8)(p.s01, q.s01, p.s45, q.s45)
+#define ODD(p, q) (float8)(p.s23, q.s23, p.s67, q.s67)
+  const float8 ab_xy = LOW(ae, bf), ab_zw = HIGH(ae, bf), cd_xy = LOW(cg, dh), cd_zw = HIGH(cg, dh);
+  const Turned8 t = {EVEN(ab_xy, cd_xy), ODD(ab_xy, cd_xy), EVEN(ab_zw, cd_zw), ODD(ab_zw, cd_zw)};
+#undef LOW
+#undef HIGH
+#undef EVEN
+#undef ODD
+  return t;
+}
+#if VDVR_LANES == 8
+RAY_INLINE V4 as_columns(Turned8 t) {
+  const V4 v = {t.x, t.y, t.z, t.w};
+  return v;
+}
+#define TURN(ROW) as_columns(turned8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)))
+#else
+RAY_INLINE V4 as_columns(Turned8 a, Turned8 b) {
+  const V4 v = {(V)(a.x, b.x), (V)(a.y, b.y), (V)(a.z, b.z), (V)(a.w, b.w)};
+  return v;
+}
+#define TURN(ROW)                                                                     \
+  as_columns(turned8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)), \
+             turned8(ROW(8), ROW(9), ROW(a), ROW(b), ROW(c), ROW(d), ROW(e), ROW(f)))
+#endif
+#endif
 
 #endif

@@ -3,8 +3,19 @@
 // what is shared between lanes is only which brick records are open. Included by raycast.cl.
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
+//
+// VDVR_LIT: the buffer holds lit samples (host/lit_samples.hpp), each the float32 sample and behind it the
+// gradient there, so that light costs no further samples.
 #ifndef VDVR_PACKET_SAMPLER_H
 #define VDVR_PACKET_SAMPLER_H
+#ifndef VDVR_LIT
+#define VDVR_LIT 0
+#endif
+#if VDVR_LIT && (defined(VDVR_SAMPLER_IMAGE3D) || VDVR_SAMPLE_TYPES != 1)
+#error "lit samples are float32 in a buffer"
+#endif
+
+#include "shared/lit_gradient.h"
 
 // One image per sample type; the launcher binds any to those that do not occur. THE_FIELD hands it on.
 #ifdef VDVR_SAMPLER_IMAGE3D
@@ -37,6 +48,7 @@ typedef struct {
   I base_around, type;
   Offset place, stride_y, stride_z;
   V value_scale, bias;
+  int alike;  // all lanes' strides are those of lane 0
 #endif
 } OpenBrick;
 
@@ -78,6 +90,11 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
 #endif
   b.stride_y = TO_OFFSET(PICK(in_base, (I)(grid.cells_x), (I)(VDVR_GRANULARITY) << lx) + 1);
   b.stride_z = b.stride_y * TO_OFFSET(PICK(in_base, (I)(grid.cells_y), (I)(VDVR_GRANULARITY) << ly) + 1);
+#if VDVR_LANES == 1
+  b.alike = 0;
+#else
+  b.alike = !ANY((b.stride_y != LANE(b.stride_y, 0)) | (b.stride_z != LANE(b.stride_z, 0)));
+#endif
   b.base_around = (bits & 512) != 0;
   open_axis(&b, lx, low.x, grid.cells_x, &b.scale.x, &b.reach.x, &b.top.x, &b.first.x, &b.last.x);
   open_axis(&b, ly, low.y, grid.cells_y, &b.scale.y, &b.reach.y, &b.top.y, &b.first.y, &b.last.y);
@@ -88,6 +105,29 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
 #endif
   return b;
 }
+
+#if !VDVR_UNIFORM && defined(VDVR_SAMPLER_BUFFER)
+// All of the base as one brick.
+RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias) {
+  const I none = (I)(0);
+  const V zero = (V)(0.0f), one = (V)(1.0f);
+  OpenBrick b = no_brick();
+  b.low = v3(zero, zero, zero);
+  b.scale = v3(one, one, one);
+  b.reach.x = b.reach.y = b.reach.z = none;
+  b.top.x = (I)(grid.cells_x - 1);
+  b.top.y = (I)(grid.cells_y - 1);
+  b.top.z = (I)(grid.cells_z - 1);
+  b.place = (Offset)(0);
+  b.stride_y = (Offset)(grid.cells_x + 1);
+  b.stride_z = b.stride_y * (Offset)(grid.cells_y + 1);
+  b.type = (I)(type);
+  b.value_scale = (V)(scale);
+  b.bias = (V)(bias);
+  b.alike = VDVR_LANES > 1;
+  return b;
+}
+#endif
 
 // --- buffer: cells and their corners
 // -----------------------------------------------------------------------------------------------------------
@@ -174,10 +214,22 @@ RAY_INLINE V load(FIELD, const Cell* c, Place p) {
 // A sample and its neighbour along x, which lies behind it: one load.
 typedef struct {
   V at, next;
+#if VDVR_LIT
+  U at_gradient, next_gradient;
+#endif
 } Pair;
 RAY_INLINE Pair load_pair(FIELD, const Cell* c, Place p) {
   Pair v;
-#ifdef VDVR_ONE_TYPE
+#if VDVR_LIT
+  __global const float* s = (__global const float*)field + 2 * (ulong)p.all;
+#define ROW(n) vload4(0, s + 2 * TO_ULONG(LANE(p.lane, n)))
+  const V4 t = TURN(ROW);
+#undef ROW
+  v.at = t.x;
+  v.at_gradient = AS_U(t.y);
+  v.next = t.z;
+  v.next_gradient = AS_U(t.w);
+#elif defined(VDVR_ONE_TYPE)
   __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
   VDVR_ONE_VECTOR at, next;
 #define TWO(n)                                             \
@@ -230,29 +282,55 @@ RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
   return cell;
 }
 
-// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>.
+// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>, gradients
+// g<z><y><x>.
 typedef struct {
   Cell cell;
   V s000, s001, s010, s011, s100, s101, s110, s111;
+#if VDVR_LIT
+  U g000, g001, g010, g011, g100, g101, g110, g111;
+#endif
   V value;
 } Sampled;
+
+RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
+  const Cell* q = &k->cell;
+  const Place i = q->lowest, iy = after(i, y), iz = after(i, z), iyz = after(iy, z);
+  const Pair p00 = load_pair(field, q, i), p01 = load_pair(field, q, iy);
+  const Pair p10 = load_pair(field, q, iz), p11 = load_pair(field, q, iyz);
+  k->s000 = p00.at;
+  k->s001 = p00.next;
+  k->s010 = p01.at;
+  k->s011 = p01.next;
+  k->s100 = p10.at;
+  k->s101 = p10.next;
+  k->s110 = p11.at;
+  k->s111 = p11.next;
+#if VDVR_LIT
+  k->g000 = p00.at_gradient;
+  k->g001 = p00.next_gradient;
+  k->g010 = p01.at_gradient;
+  k->g011 = p01.next_gradient;
+  k->g100 = p10.at_gradient;
+  k->g101 = p10.next_gradient;
+  k->g110 = p11.at_gradient;
+  k->g111 = p11.next_gradient;
+#endif
+}
 
 // As vdvr_trilinear: x first, then y, then z.
 RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   Sampled k;
   k.cell = cell_at(grid, b, c);
-  const Cell* q = &k.cell;
-  const Place i = q->lowest, y = after(i, q->y), z = after(i, q->z), yz = after(y, q->z);
-  const Pair p00 = load_pair(field, q, i), p01 = load_pair(field, q, y);
-  const Pair p10 = load_pair(field, q, z), p11 = load_pair(field, q, yz);
-  k.s000 = p00.at;
-  k.s001 = p00.next;
-  k.s010 = p01.at;
-  k.s011 = p01.next;
-  k.s100 = p10.at;
-  k.s101 = p10.next;
-  k.s110 = p11.at;
-  k.s111 = p11.next;
+#if VDVR_UNIFORM || VDVR_LANES == 1 || !VDVR_LIT
+  load_corners(field, k.cell.y, k.cell.z, &k);
+#else
+  // Strides that all lanes share cost nothing in an address.
+  if (b->alike)
+    load_corners(field, place((Offset)(0), LANE(b->stride_y, 0)), place((Offset)(0), LANE(b->stride_z, 0)),
+                 &k);
+  else load_corners(field, k.cell.y, k.cell.z, &k);
+#endif
   const V3 f = k.cell.fraction;
   k.value = lerp(lerp(lerp(k.s000, k.s001, f.x), lerp(k.s010, k.s011, f.x), f.y),
                  lerp(lerp(k.s100, k.s101, f.x), lerp(k.s110, k.s111, f.x), f.y), f.z);
@@ -434,7 +512,25 @@ RAY_INLINE CellBox cell_box(VdvrGrid grid, const OpenBrick* b, const Sampled* k,
   return box;
 }
 
-#if VDVR_GRADIENT_ANALYTIC
+#if VDVR_LIT
+// Density per length along the world axes: what stands at the corners of the cell, interpolated as the field
+// is. The grid's step is the gradients' here.
+RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,
+                          float3 cells_per_length, I needed) {
+  const V3 f = k->cell.fraction;
+#define BETWEEN(a, b, t) (a + t * (b - a))
+#define BLEND(F)                                                                                    \
+  BETWEEN(BETWEEN(BETWEEN(F(k->g000), F(k->g001), f.x), BETWEEN(F(k->g010), F(k->g011), f.x), f.y), \
+          BETWEEN(BETWEEN(F(k->g100), F(k->g101), f.x), BETWEEN(F(k->g110), F(k->g111), f.x), f.y), f.z)
+#define X_OF(g) TO_V(LIT_X(AS_I(g)))
+#define Y_OF(g) TO_V(LIT_Y(AS_I(g)))
+#define Z_OF(g) TO_V(LIT_Z(AS_I(g)))
+  const V x = BLEND(X_OF), y = BLEND(Y_OF), z = BLEND(Z_OF);
+#undef BLEND
+#undef BETWEEN
+  return v3(x * grid.step, y * grid.step, z * grid.step);
+}
+#elif VDVR_GRADIENT_ANALYTIC
 // Density per length along the world axes: the derivative of the trilinear cell that the point lies in. Jumps
 // from cell to cell.
 RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,

@@ -141,18 +141,13 @@ RAY_INLINE V opacity_of(__global const float4* restrict table, const VdvrRaycast
 }
 
 RAY_INLINE V3 colour_of(__global const float4* restrict table, Row r) {
-  V3 rgb;
-#define ROW(n)                                                                               \
-  {                                                                                          \
-    const float f = LANE(r.fraction, n);                                                     \
-    const float4 e = (1.0f - f) * table[LANE(r.entry, n)] + f * table[LANE(r.entry, n) + 1]; \
-    LANE(rgb.x, n) = e.x;                                                                    \
-    LANE(rgb.y, n) = e.y;                                                                    \
-    LANE(rgb.z, n) = e.z;                                                                    \
-  }
-  EACH(ROW)
-#undef ROW
-  return rgb;
+#define LOWER(n) table[LANE(r.entry, n)]
+#define UPPER(n) table[LANE(r.entry, n) + 1]
+  const V4 a = TURN(LOWER), b = TURN(UPPER);
+#undef LOWER
+#undef UPPER
+  const V f = r.fraction, e = 1.0f - f;
+  return v3(e * a.x + f * b.x, e * a.y + f * b.y, e * a.z + f * b.z);
 }
 
 RAY_INLINE V3 background(const VdvrRaycast* p, I py) {
