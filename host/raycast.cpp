@@ -12,6 +12,7 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <span>
 
 #include "host/bake.hpp"
 #include "host/opencl/kernel.hpp"
@@ -300,11 +301,12 @@ float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
 }
 
 // Packets address samples and records by 32-bit numbers.
-int lanes_for(const Impl& v, SamplerKind sampler, const RaycastTuning& tuning) {
+int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
   if (sampler == SamplerKind::image3d || v.field->samples.size() > most || v.field->bricks.size() > most)
     return 1;
-  return tuning.lanes.value_or(v.state->info.is_cpu ? 8 : 1);
+  // Lit samples come in wide loads, of which twice as many keep the shuffles busy.
+  return tuning.lanes.value_or(!v.state->info.is_cpu ? 1 : gradient == GradientKind::stored ? 16 : 8);
 }
 
 GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind sampler) {
@@ -414,7 +416,9 @@ std::uint8_t to_byte(float x) {
 
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
-FloatImage values_of(const std::vector<cl_float4>& pixels, const RenderOptions& o) {
+using Pixels = std::span<const cl_float4>;
+
+FloatImage values_of(Pixels pixels, const RenderOptions& o) {
   FloatImage image{o.width, o.height, {}, o.output == RenderOutput::normal ? 3 : 1};
   image.values.resize(pixels.size() * static_cast<std::size_t>(image.channels));
   float* to = image.values.data();
@@ -430,7 +434,7 @@ FloatImage values_of(const std::vector<cl_float4>& pixels, const RenderOptions& 
   return image;
 }
 
-Image coloured(const std::vector<cl_float4>& pixels, const RenderOptions& o) {
+Image coloured(Pixels pixels, const RenderOptions& o) {
   Image image{o.width, o.height, std::vector<std::uint8_t>(3 * pixels.size())};
   std::uint8_t* to = image.rgb.data();
   for (const cl_float4& p : pixels)
@@ -455,10 +459,29 @@ Image shown(const FloatImage& values) {
   return image;
 }
 
-}  // namespace
+// Values and picture.
+void convert(Pixels pixels, const RenderOptions& o, RenderResult& r) {
+  r.values = values_of(pixels, o);
+  r.image = o.output == RenderOutput::colour ? coloured(pixels, o) : shown(r.values);
+}
 
-FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& o,
-                           const RaycastTuning& tuning) {
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::int64_t samples_of(const Impl& v) {
+  std::int64_t samples = 0;
+  for (const cl_uint n : v.frame.row_samples.to_host()) samples += n;
+  return samples;
+}
+
+/// Enqueues a frame; what it will be, without pixels.
+struct Enqueued {
+  FloatPicture picture;
+  std::chrono::steady_clock::time_point start;
+};
+Enqueued enqueue_frame(Device& device, const ResidentVolume& volume, const RenderOptions& o,
+                       const RaycastTuning& tuning) {
   check_options(o);
   Impl& v = volume.impl();
   FloatPicture result;
@@ -470,8 +493,8 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   prepare_frame(v, o, table);
   if (!sliced && o.mode != RenderMode::mip) update_distance(v, o, table, slack);
 
-  const int lanes = lanes_for(v, result.sampler, tuning);
   result.gradient = choose_gradient(v, o, result.sampler);
+  const int lanes = lanes_for(v, result.sampler, result.gradient, tuning);
   const auto defines = defines_for(v, o, result.sampler, result.gradient, tuning, lanes);
   const bool image = result.sampler == SamplerKind::image3d, lit = result.gradient == GradientKind::stored;
   if (image) v.atlas();
@@ -484,8 +507,16 @@ FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const R
   if (image) draw(v.field->grid, v.atlas_bricks(), v.atlas()[0], v.atlas()[1], v.atlas()[2]);
   else if (lit) draw(v.lit().grid(), v.lit().bricks(), v.lit().samples());
   else draw(v.field->grid, v.field->bricks.buffer(), v.field->samples.buffer());
-  read_frame(v, start, result);
-  return result;
+  return {std::move(result), start};
+}
+
+}  // namespace
+
+FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& o,
+                           const RaycastTuning& tuning) {
+  Enqueued frame = enqueue_frame(device, volume, o, tuning);
+  read_frame(volume.impl(), frame.start, frame.picture);
+  return std::move(frame.picture);
 }
 
 DvrFrame prepare_dvr(Impl& v, const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
@@ -498,12 +529,25 @@ DvrFrame prepare_dvr(Impl& v, const RenderOptions& o, const RaycastTuning& tunin
 
 void read_frame(Impl& v, std::chrono::steady_clock::time_point start, FloatPicture& picture) {
   picture.pixels = v.frame.picture.to_host();
-  picture.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (const cl_uint n : v.frame.row_samples.to_host()) picture.samples += n;
+  picture.seconds = seconds_since(start);
+  picture.samples = samples_of(v);
 }
 
+// As to_result(raycast_float()), but converts the pixels where they lie: a copy of them would be a tenth of a
+// fast frame.
 RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options) {
-  return to_result(raycast_float(device, volume, options), options);
+  Enqueued frame = enqueue_frame(device, volume, options, {});
+  Impl& v = volume.impl();
+  RenderResult r;
+  r.sampler = frame.picture.sampler;
+  r.sampler_reason = std::move(frame.picture.sampler_reason);
+  r.gradient = frame.picture.gradient;
+  v.frame.picture.read_mapped([&](Pixels pixels) {
+    r.seconds = seconds_since(frame.start);
+    convert(pixels, options, r);
+  });
+  r.samples = samples_of(v);
+  return r;
 }
 
 RenderResult to_result(FloatPicture picture, const RenderOptions& options) {
@@ -513,8 +557,7 @@ RenderResult to_result(FloatPicture picture, const RenderOptions& options) {
   r.gradient = picture.gradient;
   r.samples = picture.samples;
   r.seconds = picture.seconds;
-  r.values = values_of(picture.pixels, options);
-  r.image = options.output == RenderOutput::colour ? coloured(picture.pixels, options) : shown(r.values);
+  convert(picture.pixels, options, r);
   return r;
 }
 

@@ -19,8 +19,8 @@ namespace vdvr {
 /// Never changes a picture.
 struct RaycastTuning {
   int group_x = 8, group_y = 8;  ///< pixels of one work-group
-  /// Rays that a work-item follows side by side: 1, 4, 8 or 16; default: 8 on CPUs, else 1. The image3d
-  /// sampler and volumes of 2^31 samples take 1.
+  /// Rays that a work-item follows side by side: 1, 4, 8 or 16; default: on CPUs 8, or 16 with stored
+  /// gradients, else 1. The image3d sampler and volumes of 2^31 samples take 1.
   std::optional<int> lanes;
 };
 

@@ -96,7 +96,7 @@ RAY_INLINE float3 gradient_in(const LitTile* t, int at) {
 RAY_INLINE void put_gradient(const LitTile* t, int at, float3 g) {
   t->samples[at].y = word_of((int)rint(g.x), (int)rint(g.y), (int)rint(g.z));
 }
-RAY_INLINE float3 between(float3 a, float3 b, float t) { return (1.0f - t) * a + t * b; }
+RAY_INLINE float3 between3(float3 a, float3 b, float t) { return (1.0f - t) * a + t * b; }
 
 // The lowest level along `axis` of the bricks around an entity: the tile's own and those beside it by
 // `away` along two axes (0 where the entity does not lie on that side's face).
@@ -127,7 +127,8 @@ RAY_INLINE void close_edges(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
                      far_v * (VDVR_GRANULARITY << t->level[v]) * t->stride[v];
     for (int i = 0; i < last; i += run) {
       const float3 a = gradient_in(t, edge + i * w), b = gradient_in(t, edge + (i + run) * w);
-      for (int k = 1; k < run; ++k) put_gradient(t, edge + (i + k) * w, between(a, b, (float)k / (float)run));
+      for (int k = 1; k < run; ++k)
+        put_gradient(t, edge + (i + k) * w, between3(a, b, (float)k / (float)run));
     }
   }
 }
@@ -152,8 +153,8 @@ RAY_INLINE void close_faces(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
         const float fu = (float)di / (float)run_u, fv = (float)dj / (float)run_v;
         put_gradient(
             t, face + i * wu + j * wv,
-            between(between(gradient_in(t, at), gradient_in(t, at + next_u), fu),
-                    between(gradient_in(t, at + next_v), gradient_in(t, at + next_u + next_v), fu), fv));
+            between3(between3(gradient_in(t, at), gradient_in(t, at + next_u), fu),
+                     between3(gradient_in(t, at + next_v), gradient_in(t, at + next_u + next_v), fu), fv));
       }
   }
 }

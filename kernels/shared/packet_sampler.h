@@ -513,22 +513,31 @@ RAY_INLINE CellBox cell_box(VdvrGrid grid, const OpenBrick* b, const Sampled* k,
 }
 
 #if VDVR_LIT
+// Light is not certified: one rounding less where the device has it.
+RAY_INLINE V between(V a, V b, V t) {
+#ifdef FP_FAST_FMAF
+  return fma(t, b - a, a);
+#else
+  return a + t * (b - a);
+#endif
+}
+
 // Density per length along the world axes: what stands at the corners of the cell, interpolated as the field
 // is. The grid's step is the gradients' here.
 RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,
                           float3 cells_per_length, I needed) {
   const V3 f = k->cell.fraction;
-#define BETWEEN(a, b, t) (a + t * (b - a))
-#define BLEND(F)                                                                                    \
-  BETWEEN(BETWEEN(BETWEEN(F(k->g000), F(k->g001), f.x), BETWEEN(F(k->g010), F(k->g011), f.x), f.y), \
-          BETWEEN(BETWEEN(F(k->g100), F(k->g101), f.x), BETWEEN(F(k->g110), F(k->g111), f.x), f.y), f.z)
-#define X_OF(g) TO_V(LIT_X(AS_I(g)))
-#define Y_OF(g) TO_V(LIT_Y(AS_I(g)))
-#define Z_OF(g) TO_V(LIT_Z(AS_I(g)))
-  const V x = BLEND(X_OF), y = BLEND(Y_OF), z = BLEND(Z_OF);
+#define OF(AXIS, g) TO_V(AXIS(AS_I(k->g)))
+#define BLEND(AXIS)                                                   \
+  between(between(between(OF(AXIS, g000), OF(AXIS, g001), f.x),       \
+                  between(OF(AXIS, g010), OF(AXIS, g011), f.x), f.y), \
+          between(between(OF(AXIS, g100), OF(AXIS, g101), f.x),       \
+                  between(OF(AXIS, g110), OF(AXIS, g111), f.x), f.y), \
+          f.z)
+  const V3 g = v3(BLEND(LIT_X), BLEND(LIT_Y), BLEND(LIT_Z));
 #undef BLEND
-#undef BETWEEN
-  return v3(x * grid.step, y * grid.step, z * grid.step);
+#undef OF
+  return v3(g.x * grid.step, g.y * grid.step, g.z * grid.step);
 }
 #elif VDVR_GRADIENT_ANALYTIC
 // Density per length along the world axes: the derivative of the trilinear cell that the point lies in. Jumps
