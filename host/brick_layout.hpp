@@ -1,5 +1,5 @@
 // Where each brick's samples lie: in one sample buffer on the device (base first, then the tiles of each
-// triple in map order, each block at a multiple of 4 bytes), and in the host's own arrays. Called by
+// triple and type in map order, each block at a multiple of 4 bytes), and in the host's own arrays. Called by
 // mixed_volume.cpp, device_field.cpp, resident_volume.cpp and whatever reads stored samples on the host.
 #pragma once
 
@@ -22,19 +22,27 @@ int sample_types(const MixedVolume& volume);
 
 VdvrGrid sampler_grid(const MixedVolume& volume);
 
-/// Offset of each triple's first tile in the sample buffer, in bytes; base lies at 0.
-std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& volume);
+/// Where a brick of a level above 0 has its samples.
+struct StoredTile {
+  TileKind kind;
+  const SampleBlock* block = nullptr;
+  std::size_t number = 0;  ///< in the block
+};
+StoredTile stored_tile(const MixedVolume& volume, std::size_t brick);
+
+/// Offset of the first tile of each triple and type in the sample buffer, in bytes; base lies at 0.
+std::map<TileKind, std::uint64_t> tile_offsets(const MixedVolume& volume);
 /// Bytes of the sample buffer.
 std::uint64_t sample_buffer_bytes(const MixedVolume& volume);
 
 /// The record of brick (bx, by, bz), unpacked; `base_around` is left 0.
-VdvrBrick brick_record(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets,
+VdvrBrick brick_record(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz);
 
 /// Two words per brick, three where the volume holds integers (mixed_sampler.h), [bz][by][bx][words].
 class PackedRecords {
  public:
-  PackedRecords(const MixedVolume& volume, const std::map<LevelTriple, std::uint64_t>& offsets);
+  PackedRecords(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets);
   void set_base_around(std::size_t brick) { words_[brick * count_ + 1] |= 1u << 9; }
   /// Puts something else in the place of the first sample: a texel. Below 2^47.
   void set_place(std::size_t brick, std::uint64_t place);

@@ -1,10 +1,11 @@
-// Closes the bricks and packs them: finds the type of every triple and the step of every tile with which the
-// closed samples fit, then stores them. Called by build.cpp. Calls close_coarse.cpp and close_paper.cpp.
+// Closes the bricks and packs them: finds the type and the step of every tile with which the closed samples
+// fit, then stores them. Called by build.cpp. Calls close_coarse.cpp and close_paper.cpp.
 #include "host/close_boundaries.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <functional>
+#include <utility>
 
 #include "host/brick_layout.hpp"
 #include "host/parallel.hpp"
@@ -23,9 +24,8 @@ class Packer {
         closing_(closing),
         stored_{
             b, closing == Closing::paper ? levels_by_paper(b) : b.level, {}, base_limits(b.base, b.lattice)},
+        type_(b.level.size(), b.lattice.least),
         shift_(b.level.size(), 0) {
-    for (const LevelTriple& l : stored_.level)
-      if (l != in_base) type_[l] = b.lattice.least;
     if (b.lattice.step > 0) find_steps();
     update_units();
   }
@@ -38,19 +38,37 @@ class Packer {
     v.level = stored_.level;
     v.step = open_.lattice.step;
     v.tile.assign(v.level.size(), 0);
-    std::map<LevelTriple, std::uint32_t> counts;
-    for (std::size_t i = 0; i < v.level.size(); ++i)
-      if (v.level[i] != in_base) v.tile[i] = counts[v.level[i]]++;
-    for (const auto& [triple, n] : counts)
-      v.tiles[triple] = empty_block(type_.at(triple), n, static_cast<std::uint64_t>(v.tile_size(triple)));
+    number_tiles(v);
     for_each_tile([&](std::int64_t i, const std::vector<float>& tile) {
-      pack(tile, open_.lattice, shift_[at(i)], v.tile[at(i)], v.tiles.at(v.level[at(i)]));
+      const StoredTile stored = stored_tile(v, at(i));
+      pack(tile, open_.lattice, shift_[at(i)], stored.number, v.tiles.at(stored.kind));
     });
     v.base = pack_base(closing_ == Closing::none ? open_.base : shared_base(), open_.lattice);
     return v;
   }
 
  private:
+  // The narrowest type of a triple comes first.
+  void number_tiles(MixedVolume& v) const {
+    std::map<LevelTriple, std::array<std::uint32_t, 3>> counts;
+    for (std::size_t i = 0; i < v.level.size(); ++i)
+      if (v.level[i] != in_base) ++counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])];
+    for (auto& [triple, of_type] : counts) {
+      TileKind kind(triple);
+      std::uint32_t next = 0;
+      for (std::size_t t = 0; t < 3; ++t) {
+        const std::uint32_t n = std::exchange(of_type[t], next);
+        next += n;
+        if (n == 0) continue;
+        v.tiles[kind] =
+            empty_block(static_cast<SampleType>(2 - t), n, static_cast<std::uint64_t>(v.tile_size(triple)));
+        ++kind.part;
+      }
+    }
+    for (std::size_t i = 0; i < v.level.size(); ++i)
+      if (v.level[i] != in_base) v.tile[i] = counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])]++;
+  }
+
   std::vector<float> tile_of(std::int64_t brick) const {
     if (closing_ == Closing::coarse) return tile_by_coarse(stored_, brick);
     if (closing_ == Closing::paper) return tile_by_paper(stored_, brick);
@@ -70,7 +88,7 @@ class Packer {
     for (std::size_t i = 0; i < stored_.unit.size(); ++i) {
       const bool base = stored_.level[i] == in_base;
       if (base) stored_.unit[i] = l.base_step();
-      else if (type_.at(stored_.level[i]) != SampleType::f32) stored_.unit[i] = std::ldexp(l.step, shift_[i]);
+      else if (type_[i] != SampleType::f32) stored_.unit[i] = std::ldexp(l.step, shift_[i]);
     }
   }
 
@@ -81,7 +99,7 @@ class Packer {
       update_units();
       std::vector<int> needed(shift_.size(), 0);
       for_each_tile([&](std::int64_t i, const std::vector<float>& tile) {
-        const SampleType type = type_.at(stored_.level[at(i)]);
+        const SampleType type = type_[at(i)];
         if (type == SampleType::f32) return;
         const auto [lo, hi] = std::minmax_element(tile.begin(), tile.end());
         const auto shift = fitting_shift(*lo, *hi, open_.lattice, type, open_.lattice.base_shift);
@@ -93,16 +111,13 @@ class Packer {
     }
   }
 
-  // The triples of tiles that fit no step take the next wider type, and their tiles begin again.
+  // Tiles that fit no step take the next wider type, and begin again.
   void widen_types() {
-    std::map<LevelTriple, SampleType> wider;
-    for (std::size_t i = 0; i < shift_.size(); ++i)
-      if (shift_[i] < 0)
-        wider[stored_.level[i]] =
-            type_.at(stored_.level[i]) == SampleType::u8 ? SampleType::u16 : SampleType::f32;
-    for (const auto& [triple, type] : wider) type_[triple] = type;
-    for (std::size_t i = 0; i < shift_.size(); ++i)
-      if (wider.contains(stored_.level[i])) shift_[i] = 0;
+    for (std::size_t i = 0; i < shift_.size(); ++i) {
+      if (shift_[i] >= 0) continue;
+      type_[i] = type_[i] == SampleType::u8 ? SampleType::u16 : SampleType::f32;
+      shift_[i] = 0;
+    }
   }
 
   // The base with the values of tiles where only bricks that take no part would read its own.
@@ -144,7 +159,7 @@ class Packer {
   const OpenBricks& open_;
   Closing closing_;
   StoredAs stored_;
-  std::map<LevelTriple, SampleType> type_;
+  std::vector<SampleType> type_;  // by brick; of those that have tiles
   std::vector<int> shift_;
 };
 

@@ -23,10 +23,6 @@ constexpr LevelTriple in_base{0, 0, 0};
 
 std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }
 
-const SampleBlock& block_of(const MixedVolume& v, const LevelTriple& level) {
-  return level == in_base ? v.base : v.tiles.at(level);
-}
-
 template <class T>
 void decode(const std::vector<T>& stored, const SampleBlock& b, double step, std::vector<float>& out) {
   const std::size_t per_tile = b.offset.empty() ? 1 : stored.size() / b.offset.size();
@@ -71,8 +67,20 @@ VdvrGrid sampler_grid(const MixedVolume& v) {
           static_cast<float>(v.step)};
 }
 
-std::map<LevelTriple, std::uint64_t> tile_offsets(const MixedVolume& v) {
-  std::map<LevelTriple, std::uint64_t> offsets;
+StoredTile stored_tile(const MixedVolume& v, std::size_t brick) {
+  StoredTile t{{v.level[brick]}, nullptr, v.tile[brick]};
+  for (;; ++t.kind.part) {
+    t.block = &v.tiles.at(t.kind);
+    const std::size_t count = t.block->size() / at(v.tile_size(t.kind));
+    // The last part takes what is left: whoever reads beyond it finds nothing there.
+    if (t.number < count || !v.tiles.contains({t.kind.level, static_cast<std::uint8_t>(t.kind.part + 1)}))
+      return t;
+    t.number -= count;
+  }
+}
+
+std::map<TileKind, std::uint64_t> tile_offsets(const MixedVolume& v) {
+  std::map<TileKind, std::uint64_t> offsets;
   std::uint64_t next = aligned(v.base.bytes());
   for (const auto& [triple, block] : v.tiles) {
     offsets[triple] = next;
@@ -96,18 +104,18 @@ struct RecordBits {
 };
 RecordBits record_bits(const MixedVolume& v, std::size_t brick) {
   const LevelTriple level = v.level[brick];
-  const SampleBlock& block = block_of(v, level);
-  const std::size_t tile = level == in_base ? 0 : v.tile[brick];
+  const StoredTile stored = level == in_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, brick);
+  const SampleBlock& block = *stored.block;
   RecordBits r;
   r.bits = level[2] | static_cast<std::uint32_t>(level[1]) << 3 | static_cast<std::uint32_t>(level[0]) << 6 |
            static_cast<std::uint32_t>(block.type) << 10;
   if (block.type == SampleType::f32) return r;
-  r.bits |= static_cast<std::uint32_t>(block.shift.at(tile)) << 12;
-  r.offset = block.offset.at(tile);
+  r.bits |= static_cast<std::uint32_t>(block.shift.at(stored.number)) << 12;
+  r.offset = block.offset.at(stored.number);
   return r;
 }
 
-std::uint64_t place_of(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
+std::uint64_t place_of(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz) {
   const Index3 bricks = v.bricks(), samples = v.grid.samples();
   const std::size_t brick = at((bz * bricks[1] + by) * bricks[0] + bx);
@@ -115,13 +123,14 @@ std::uint64_t place_of(const MixedVolume& v, const std::map<LevelTriple, std::ui
   const std::int64_t g = v.granularity;
   if (level == in_base)
     return static_cast<std::uint64_t>((bz * g * samples[1] + by * g) * samples[0] + bx * g);
-  return offsets.at(level) / v.tiles.at(level).sample_bytes() +
-         std::uint64_t{v.tile[brick]} * static_cast<std::uint64_t>(v.tile_size(level));
+  const StoredTile tile = stored_tile(v, brick);
+  return offsets.at(tile.kind) / tile.block->sample_bytes() +
+         std::uint64_t{tile.number} * static_cast<std::uint64_t>(v.tile_size(level));
 }
 
 }  // namespace
 
-VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets,
+VdvrBrick brick_record(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz) {
   const Index3 b = v.bricks();
   const RecordBits r = record_bits(v, at((bz * b[1] + by) * b[0] + bx));
@@ -130,7 +139,7 @@ VdvrBrick brick_record(const MixedVolume& v, const std::map<LevelTriple, std::ui
                      r.bits | static_cast<std::uint32_t>(place >> 32) << 17, r.offset, sampler_grid(v));
 }
 
-PackedRecords::PackedRecords(const MixedVolume& v, const std::map<LevelTriple, std::uint64_t>& offsets)
+PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets)
     : count_(sample_types(v) == 1 << VDVR_F32 ? 2 : 3), words_(v.level.size() * count_) {
   const Index3 b = v.bricks();
   std::size_t brick = 0;
@@ -156,9 +165,11 @@ void PackedRecords::set_place(std::size_t brick, std::uint64_t place) {
 BrickSamples::BrickSamples(const MixedVolume& v, const Index3& brick)
     : grid_(sampler_grid(v)), brick_(brick) {
   const Index3 b = v.bricks();
-  const LevelTriple level = v.level[static_cast<std::size_t>((brick[2] * b[1] + brick[1]) * b[0] + brick[0])];
-  record_ = brick_record(v, {{level, 0}}, brick[0], brick[1], brick[2]);
-  data_ = block_of(v, level).data();
+  const std::size_t id = vdvr::at((brick[2] * b[1] + brick[1]) * b[0] + brick[0]);
+  const LevelTriple level = v.level[id];
+  const StoredTile stored = level == in_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, id);
+  record_ = brick_record(v, {{stored.kind, 0}}, brick[0], brick[1], brick[2]);
+  data_ = stored.block->data();
   for (std::size_t a = 0; a < 3; ++a)
     end_[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity)
               << level[2 - a];
@@ -240,7 +251,8 @@ Storage storage_of(const MixedVolume& v, bool interior) {
         if (level != in_base) {
           tiles += static_cast<double>(v.tile_size(level));
           tile_bytes +=
-              static_cast<double>(v.tile_size(level)) * static_cast<double>(v.tiles.at(level).sample_bytes());
+              static_cast<double>(v.tile_size(level)) *
+              static_cast<double>(stored_tile(v, at((z * b[1] + y) * b[0] + x)).block->sample_bytes());
         }
         double cells = 1;
         for (std::size_t a = 0; a < 3; ++a) {

@@ -24,7 +24,7 @@ std::vector<std::uint64_t> candidates(std::uint64_t least, std::uint64_t most) {
 
 struct AtlasImage {
   Size3 size{0, 0, 0};
-  std::map<LevelTriple, AtlasShelves> shelves;
+  std::map<TileKind, AtlasShelves> shelves;
   [[nodiscard]] std::uint64_t texels() const { return size[0] * size[1] * size[2]; }
 };
 
@@ -251,7 +251,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     : state(&device.state()), grid(v.grid), lit_layout((check_sizes(v), v)) {
   is_uniform = v.base.type == SampleType::f32 && v.tiles.empty();
   offsets_ = tile_offsets(v);
-  types_[{0, 0, 0}] = v.base.type;
+  types_[{}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
   PackedRecords records(v, offsets_);
   mark_base_around(v, records);
@@ -264,7 +264,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     texel_records_ = records.words();
   }
   for (const auto& [triple, block] : v.tiles)
-    highest_level = std::max<int>(highest_level, *std::max_element(triple.begin(), triple.end()));
+    highest_level = std::max<int>(highest_level, *std::max_element(triple.level.begin(), triple.level.end()));
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const BrickSamples stored(v, position_of(v, i));
     host_ranges.push_back(range_of(stored));
@@ -296,7 +296,10 @@ void ResidentVolume::Impl::set_texels(const MixedVolume& v, PackedRecords& recor
     Size3 origin{};
     if (v.level[i] == LevelTriple{0, 0, 0})
       for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<std::uint64_t>(p[a] * v.granularity);
-    else origin = layout.shelves.at(v.level[i]).origin(v.tile[i]);
+    else {
+      const StoredTile tile = stored_tile(v, i);
+      origin = layout.shelves.at(tile.kind).origin(tile.number);
+    }
     records.set_place(i, origin[0] | origin[1] << 15 | origin[2] << 31);
   }
 }
@@ -311,7 +314,7 @@ void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type)
   state->queue.enqueueFillImage(image, cl_float4{{0, 0, 0, 0}}, region({0, 0, 0}),
                                 region(layout.size[static_cast<std::size_t>(type)]));
   const Index3 base = grid.samples();
-  if (types_.at({0, 0, 0}) == type)
+  if (types_.at({}) == type)
     state->queue.enqueueCopyBufferToImage(
         samples, image, 0, region({0, 0, 0}),
         region({static_cast<std::uint64_t>(base[0]), static_cast<std::uint64_t>(base[1]),

@@ -49,7 +49,7 @@ struct AtlasLayout {
   std::string reason;  ///< why it does not, or its size
   /// Texels x, y, z of the image of each SampleType; 0 where the volume has no such samples.
   std::array<std::array<std::uint64_t, 3>, 3> size{};
-  std::map<LevelTriple, AtlasShelves> shelves;  ///< in the image of the triple's type
+  std::map<TileKind, AtlasShelves> shelves;  ///< in the image of the tiles' type
   [[nodiscard]] std::uint64_t bytes() const;
   /// The longest side of any image.
   [[nodiscard]] std::uint64_t longest() const;
@@ -106,8 +106,8 @@ struct ResidentVolume::Impl {
   void set_texels(const MixedVolume& volume, PackedRecords& records) const;
   void fill_image(const cl::Image3D& image, SampleType type);
 
-  std::map<LevelTriple, std::uint64_t> offsets_;
-  std::map<LevelTriple, SampleType> types_;  ///< of the tiles; base under 000
+  std::map<TileKind, std::uint64_t> offsets_;
+  std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
   std::vector<std::uint32_t> texel_records_;
   std::optional<std::array<cl::Image3D, 3>> atlas_;
   opencl::DeviceArray<std::uint32_t> atlas_bricks_;

@@ -27,8 +27,9 @@ namespace h5 = io::hdf5_file;
 static_assert(std::endian::native == std::endian::little,
               "content_sha256 hashes memory, which must be little-endian");
 
-// Version 2 is version 1 with integer samples; files without any are still written as 1.
-constexpr int newest_version = 2;
+// Version 2 is version 1 with integer samples, version 3 with triples whose tiles have several types; a file
+// has the lowest that says what it holds.
+constexpr int newest_version = 3;
 // Below and above, products of the step with a stored integer would leave the normal numbers of fp32.
 constexpr double smallest_step = 0x1p-126, largest_step = 0x1p103;
 constexpr int largest_shift = 24;
@@ -46,7 +47,9 @@ struct Problem {
 };
 
 std::string name_of(const LevelTriple& l) { return fmt::format("{}{}{}", l[0], l[1], l[2]); }
-std::string path_of(const LevelTriple& l) { return "/tiles/" + name_of(l); }
+std::string path_of(const TileKind& k) {
+  return "/tiles/" + name_of(k.level) + (k.part == 0 ? "" : fmt::format("_{}", k.part));
+}
 
 template <class T>
 std::array<T, 3> zyx(const std::array<T, 3>& xyz) {
@@ -103,11 +106,13 @@ std::string brick_text(const MixedVolume& v, std::size_t brick) {
 }
 
 /// Levels within the rate, and every tile of every triple used by exactly one brick.
-std::optional<Problem> index_problem(const MixedVolume& v,
-                                     const std::map<LevelTriple, std::uint64_t>& counts) {
+std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& counts) {
   const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
   std::map<LevelTriple, std::vector<bool>> used;
-  for (const auto& [triple, count] : counts) used[triple].assign(count, false);
+  for (const auto& [kind, count] : counts) {
+    auto& flags = used[kind.level];
+    flags.resize(flags.size() + count, false);
+  }
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const LevelTriple l = v.level[i];
     const std::uint32_t t = v.tile[i];
@@ -196,6 +201,26 @@ std::optional<Problem> size_problem(const std::string& where, std::uint64_t have
   return Problem{where, fmt::format("holds {} elements, the grid needs {}", have, expected)};
 }
 
+/// The parts of a triple follow one another, and no two have the same type.
+std::optional<Problem> parts_problem(const std::map<TileKind, SampleType>& types) {
+  for (const auto& [kind, type] : types)
+    for (std::uint8_t part = 0; part < kind.part; ++part) {
+      const auto other = types.find({kind.level, part});
+      if (other == types.end())
+        return Problem{path_of(kind),
+                       fmt::format("is there without {}", path_of(TileKind(kind.level, part)))};
+      if (other->second == type)
+        return Problem{path_of(kind),
+                       fmt::format("has the type of {}, expected another", path_of(other->first))};
+    }
+  return std::nullopt;
+}
+
+bool has_parts(const MixedVolume& v) {
+  return std::any_of(v.tiles.begin(), v.tiles.end(),
+                     [](const auto& tiles) { return tiles.first.part > 0 && tiles.second.size() > 0; });
+}
+
 /// Everything the reader would refuse, so that the writer never writes it.
 std::optional<Problem> volume_problem(const MixedVolume& v) {
   if (auto p = grid_problem(v)) return p;
@@ -204,7 +229,8 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
     return p;
   if (auto p = size_problem("/level", v.level.size(), bricks)) return p;
   if (auto p = size_problem("/tile", v.tile.size(), bricks)) return p;
-  std::map<LevelTriple, std::uint64_t> counts;
+  std::map<TileKind, std::uint64_t> counts;
+  std::map<TileKind, SampleType> types;
   const auto tables_problem = [](const std::string& where, const SampleBlock& b,
                                  std::uint64_t tiles) -> std::optional<Problem> {
     if (b.type == SampleType::f32) tiles = 0;
@@ -216,15 +242,20 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
   if (has_integers(v))
     if (auto p = step_problem(v)) return p;
   for (const auto& [triple, samples] : v.tiles) {
-    if (triple == in_base) return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
-    if (*std::max_element(triple.begin(), triple.end()) > 6)
+    if (triple.level == in_base)
+      return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
+    if (*std::max_element(triple.level.begin(), triple.level.end()) > 6)
       return Problem{path_of(triple), "a level above 6"};
+    if (triple.part >= most_parts) return Problem{path_of(triple), "more parts than sample types"};
     const auto size = static_cast<std::uint64_t>(v.tile_size(triple));
     if (samples.size() % size != 0)
       return Problem{path_of(triple), fmt::format("{} samples are no whole number of tiles", samples.size())};
     if (auto p = tables_problem(path_of(triple), samples, samples.size() / size)) return p;
-    if (samples.size() != 0) counts[triple] = samples.size() / size;
+    if (samples.size() == 0) continue;
+    counts[triple] = samples.size() / size;
+    types[triple] = samples.type;
   }
+  if (auto p = parts_problem(types)) return p;
   if (auto p = index_problem(v, counts)) return p;
   if (auto p = block_problem("/base", v.base)) return p;
   for (const auto& [triple, samples] : v.tiles)
@@ -323,14 +354,19 @@ h5::Dataset expect(const h5::Reader& file, const std::string& path, const std::v
   return d;
 }
 
-LevelTriple triple_of(const h5::Reader& file, const std::string& name) {
-  const bool digits =
-      name.size() == 3 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '6'; });
-  if (!digits || name == "000")
-    file.refuse("/tiles/" + name, "is not named by a level triple, three digits z, y, x such as 111 or 021");
-  LevelTriple l{};
-  for (std::size_t a = 0; a < 3; ++a) l[a] = static_cast<std::uint8_t>(name[a] - '0');
-  return l;
+TileKind kind_of(const h5::Reader& file, const std::string& name) {
+  const std::string triple = name.substr(0, 3);
+  const bool digits = triple.size() == 3 && triple != "000" &&
+                      std::all_of(triple.begin(), triple.end(), [](char c) { return c >= '0' && c <= '6'; });
+  const bool part = name.size() == 5 && name[3] == '_' && name[4] >= '1' && name[4] < '0' + most_parts;
+  if (!digits || (name.size() != 3 && !part))
+    file.refuse("/tiles/" + name,
+                "is not named by a level triple, three digits z, y, x such as 111 or 021, and for tiles of a "
+                "second or third type _1 or _2");
+  TileKind kind;
+  for (std::size_t a = 0; a < 3; ++a) kind.level[a] = static_cast<std::uint8_t>(name[a] - '0');
+  if (part) kind.part = static_cast<std::uint8_t>(name[4] - '0');
+  return kind;
 }
 
 const std::vector<h5::Element> kSampleElements{h5::Element::f32, h5::Element::u16, h5::Element::u8};
@@ -338,9 +374,15 @@ const std::vector<h5::Element> kSampleElements{h5::Element::f32, h5::Element::u1
 /// All datasets of one file, checked but not yet read.
 struct Contents {
   h5::Dataset base, level, tile;
-  std::map<LevelTriple, h5::Dataset> tiles, offsets, shifts;
-  std::map<LevelTriple, std::uint64_t> counts;
+  std::map<TileKind, h5::Dataset> tiles, offsets, shifts;
+  std::map<TileKind, std::uint64_t> counts;
 };
+
+SampleType type_of(const h5::Dataset& d) {
+  return d.element == h5::Element::f32   ? SampleType::f32
+         : d.element == h5::Element::u16 ? SampleType::u16
+                                         : SampleType::u8;
+}
 
 /// Offsets and shifts go with integer tiles, and with no others.
 void open_tables(const h5::Reader& file, Contents& c) {
@@ -367,11 +409,11 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
   std::vector<std::string> tables;
   for (const std::string& name : file.members("/tiles")) {
     if (name.ends_with("_offset") || name.ends_with("_shift")) {
-      tables.push_back(name.substr(0, name.find('_')));
+      tables.push_back(name.substr(0, name.rfind('_')));
       continue;
     }
-    const LevelTriple l = triple_of(file, name);
-    if (*std::max_element(l.begin(), l.end()) > finest)
+    const TileKind l = kind_of(file, name);
+    if (*std::max_element(l.level.begin(), l.level.end()) > finest)
       file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate, finest));
     const auto side = v.tile_shape(l);
     c.tiles[l] = expect(file, path_of(l), kSampleElements, shape_of({0, side[0], side[1], side[2]}));
@@ -379,9 +421,12 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
     if (c.counts[l] > c.tile.count)
       file.refuse(path_of(l), fmt::format("{} tiles for {} bricks", c.counts[l], c.tile.count));
   }
+  std::map<TileKind, SampleType> types;
+  for (const auto& [kind, d] : c.tiles) types[kind] = type_of(d);
+  if (const auto p = parts_problem(types)) file.refuse(p->where, p->what);
   open_tables(file, c);
   for (const std::string& name : tables) {
-    const auto found = c.offsets.find(triple_of(file, name));
+    const auto found = c.offsets.find(kind_of(file, name));
     if (found == c.offsets.end())
       file.refuse("/tiles/" + name + "_offset or _shift", "belongs to no integer tiles of that name");
   }
@@ -412,9 +457,7 @@ void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) 
     samples.resize(d.count);
     file.read(d, samples.data());
   };
-  b.type = d.element == h5::Element::f32   ? SampleType::f32
-           : d.element == h5::Element::u16 ? SampleType::u16
-                                           : SampleType::u8;
+  b.type = type_of(d);
   if (b.type == SampleType::f32) into(b.f32);
   else if (b.type == SampleType::u16) into(b.u16);
   else into(b.u8);
@@ -534,7 +577,7 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
   {
     h5::Writer file(target.temporary(), path);
     file.attribute("/", "format", std::string("vdvr"));
-    file.attribute("/", "format_version", std::int64_t{has_integers(v) ? 2 : 1});
+    file.attribute("/", "format_version", std::int64_t{has_parts(v) ? 3 : has_integers(v) ? 2 : 1});
     file.attribute("/", "generator", std::string("vdvr " VDVR_VERSION));
     if (has_integers(v)) file.attribute("/", "step", v.step);
     write_grid(file, v);

@@ -125,8 +125,13 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
     const std::int64_t per_sample = v.rate >> levels[a];
     p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? b[a] * v.granularity : 0);
   }
-  p.dataset = base ? "/base" : fmt::format("/tiles/{}{}{}", p.level[0], p.level[1], p.level[2]);
-  p.tile = base ? 0 : v.tile[at(brick)];
+  p.dataset = "/base";
+  if (!base) {
+    const StoredTile tile = stored_tile(v, at(brick));
+    p.dataset = fmt::format("/tiles/{}{}{}", p.level[0], p.level[1], p.level[2]);
+    if (tile.kind.part > 0) p.dataset += fmt::format("_{}", tile.kind.part);
+    p.tile = static_cast<std::uint32_t>(tile.number);
+  }
   return p;
 }
 

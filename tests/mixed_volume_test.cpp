@@ -167,8 +167,9 @@ BOOST_AUTO_TEST_CASE(one_sampler_for_packed_records_and_for_single_points) {
   for (const auto& types :
        {std::vector{SampleType::f32}, std::vector{SampleType::u16}, std::vector{SampleType::u8},
         std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
-    const MixedVolume v =
-        support::in_types(support::random_mixed(grid_of({9, 5, 7}), 4, 8, mixed_triples, 21), types);
+    const MixedVolume random_floats = support::random_mixed(grid_of({9, 5, 7}), 4, 8, mixed_triples, 21);
+    const MixedVolume v = types.size() > 1 ? support::in_types_by_tile(random_floats, types)
+                                           : support::in_types(random_floats, types);
     BOOST_TEST(v.level.size() > 1u);
     const auto offsets = tile_offsets(v);
     std::vector<std::uint8_t> samples(sample_buffer_bytes(v));

@@ -255,7 +255,8 @@ BOOST_AUTO_TEST_CASE(samplers_agree_in_every_way_of_stepping_and_shading) {
 BOOST_AUTO_TEST_CASE(integer_samples_give_the_picture_of_their_decoded_values_to_the_bit) {
   for (const auto& types : {std::vector{SampleType::u16}, std::vector{SampleType::u8},
                             std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
-    const MixedVolume integers = support::in_types(mixed_blob(), types);
+    const MixedVolume integers = types.size() > 1 ? support::in_types_by_tile(mixed_blob(), types)
+                                                  : support::in_types(mixed_blob(), types);
     MixedVolume floats = integers;
     floats.base = decoded(integers.base, integers.step);
     for (auto& [triple, block] : floats.tiles) block = decoded(block, integers.step);

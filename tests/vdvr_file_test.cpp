@@ -425,7 +425,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_file_is_rejected) {
 // ----------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_newer_or_invalid_format_version_is_refused) {
-  BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 3)), {"format_version", "3", "newer"}));
+  BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 4)), {"format_version", "4", "newer"}));
   BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 0)), {"format_version"}));
   BOOST_TEST(says(refusal_after(set_attribute<double>("/", "format_version", H5T_NATIVE_DOUBLE, {1.0})),
                   {"format_version", "integer"}));
@@ -535,6 +535,46 @@ BOOST_AUTO_TEST_CASE(volumes_of_every_type_come_back_and_files_without_integers_
     BOOST_TEST(file.format_version == (integers ? 2 : 1));
     BOOST_TEST(content_sha256(file.volume) == content_sha256(v));
   }
+}
+
+BOOST_AUTO_TEST_CASE(tiles_of_one_triple_in_several_types_come_back_and_damaged_parts_are_refused) {
+  const Folder folder;
+  const fs::path path = folder.path / "a.vdvr";
+  const MixedVolume v =
+      support::in_types_by_tile(support::random_mixed({{9, 5, 27}, {0, 1, 2}, {1, 1, 1}, "mm"}, 4, 8,
+                                                      {{0, 0, 0}, {1, 1, 1}, {0, 2, 1}}, 5),
+                                {SampleType::u8, SampleType::f32, SampleType::u16});
+  BOOST_REQUIRE(v.tiles.contains({LevelTriple{1, 1, 1}, 2}));
+  write_vdvr(path, v, support::full_certificate());
+  const VdvrFile file = read_vdvr(path);
+  BOOST_TEST(file.format_version == 3);
+  BOOST_TEST(same_volume(file.volume, v));
+  BOOST_TEST(content_sha256(file.volume) == content_sha256(v));
+
+  const auto refused = [&](const std::function<void(MixedVolume&)>& make, const char* where) {
+    MixedVolume m = v;
+    make(m);
+    BOOST_CHECK_EXCEPTION(write_vdvr(path, m, support::full_certificate()), InputError,
+                          [&](const InputError& e) { return says(e.what(), {where}); });
+  };
+  const TileKind second{LevelTriple{1, 1, 1}, 1}, third{LevelTriple{1, 1, 1}, 2};
+  refused([&](MixedVolume& m) { m.tiles.erase(second); }, "/tiles/111_2");
+  refused([&](MixedVolume& m) { m.tiles[third] = m.tiles[second]; }, "/tiles/111_2");
+  refused([&](MixedVolume& m) { m.tiles[third].shift.pop_back(); }, "/tiles/111_2");
+
+  const auto refused_file = [&](const Edit& edit) {
+    write_vdvr(path, v, support::full_certificate());
+    const hid_t opened = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    edit(opened);
+    H5Fclose(opened);
+    return refusal(path);
+  };
+  const auto rename = [](const char* from, const char* to) {
+    return [from, to](hid_t f) { H5Lmove(f, from, f, to, H5P_DEFAULT, H5P_DEFAULT); };
+  };
+  BOOST_TEST(says(refused_file(rename("/tiles/111_1", "/tiles/111_3")), {"/tiles/111_3", "level triple"}));
+  BOOST_TEST(says(refused_file(rename("/tiles/111_1", "/tiles/222_1")), {"/tiles/222_1"}));
+  BOOST_TEST(says(refused_file(rename("/tiles/111_2_shift", "/tiles/111_1_shift")), {"/tiles/111_2_shift"}));
 }
 
 BOOST_AUTO_TEST_CASE(damaged_lattices_are_refused_with_the_dataset) {

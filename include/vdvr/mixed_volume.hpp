@@ -52,15 +52,32 @@ struct SampleBlock {
 /// All samples of a block as floats, exactly. `step` as in MixedVolume.
 std::vector<float> decoded(const SampleBlock& block, double step);
 
+/// Tiles of one level triple and one sample type. A triple whose tiles have several types has a part for
+/// each, numbered from 0; tile numbers run on from part to part.
+struct TileKind {
+  LevelTriple level{};
+  std::uint8_t part = 0;
+
+  TileKind() = default;
+  // NOLINTBEGIN(google-explicit-constructor): most triples have one type, and no need to speak of parts
+  TileKind(const LevelTriple& triple, std::uint8_t number = 0) : level(triple), part(number) {}
+  TileKind(std::uint8_t z, std::uint8_t y, std::uint8_t x) : level{z, y, x} {}
+  operator const LevelTriple&() const { return level; }
+  // NOLINTEND(google-explicit-constructor)
+  auto operator<=>(const TileKind&) const = default;
+};
+/// As many as there are sample types.
+inline constexpr std::uint8_t most_parts = 3;
+
 struct MixedVolume {
   Grid grid;
   int granularity = 4;
-  int rate = 1;                              ///< gold rate: no level is finer than log2(rate)
-  SampleBlock base;                          ///< [nz+1][ny+1][nx+1]
-  std::vector<LevelTriple> level;            ///< [bz][by][bx]
-  std::vector<std::uint32_t> tile;           ///< [bz][by][bx]
-  std::map<LevelTriple, SampleBlock> tiles;  ///< per triple: [count][sz][sy][sx]
-  double step = 0;                           ///< of the lattice of integer samples; 0 where there are none
+  int rate = 1;                           ///< gold rate: no level is finer than log2(rate)
+  SampleBlock base;                       ///< [nz+1][ny+1][nx+1]
+  std::vector<LevelTriple> level;         ///< [bz][by][bx]
+  std::vector<std::uint32_t> tile;        ///< [bz][by][bx]: its number among its triple's
+  std::map<TileKind, SampleBlock> tiles;  ///< per triple and type: [count][sz][sy][sx]
+  double step = 0;                        ///< of the lattice of integer samples; 0 where there are none
 
   /// ceil(cells / granularity) per axis x, y, z.
   [[nodiscard]] Index3 bricks() const {

@@ -31,9 +31,14 @@ inline double stored_sample(const MixedVolume& v, const Index3& brick, const Ind
   }
   const std::int64_t sx = (v.granularity << l[2]) + 1, sy = (v.granularity << l[1]) + 1,
                      sz = (v.granularity << l[0]) + 1;
-  const std::int64_t first = static_cast<std::int64_t>(v.tile.at(b)) * sz * sy * sx;
-  return sample_of(v, v.tiles.at(l),
-                   static_cast<std::size_t>(first + sample[0] + sx * (sample[1] + sy * sample[2])));
+  auto i = static_cast<std::size_t>(static_cast<std::int64_t>(v.tile.at(b)) * sz * sy * sx + sample[0] +
+                                    sx * (sample[1] + sy * sample[2]));
+  // Tile numbers run on from one type's dataset to the next.
+  for (std::uint8_t part = 0;; ++part) {
+    const SampleBlock& block = v.tiles.at({l, part});
+    if (i < block.size()) return sample_of(v, block, i);
+    i -= block.size();
+  }
 }
 
 /// The brick a cell coordinate belongs to along one axis: half-open, the last brick closed.

@@ -114,4 +114,38 @@ inline MixedVolume in_types(MixedVolume v, const std::vector<SampleType>& types)
   return v;
 }
 
+/// The same with the tiles of every triple in these types, tile by tile in turn: parts in the order of
+/// `types`.
+inline MixedVolume in_types_by_tile(const MixedVolume& v, const std::vector<SampleType>& types) {
+  MixedVolume out = v;
+  out.tiles.clear();
+  for (const auto& [kind, block] : v.tiles) {
+    const auto size = static_cast<std::size_t>(v.tile_size(kind));
+    const std::size_t count = block.f32.size() / size;
+    std::vector<std::uint32_t> number(count);
+    std::uint32_t next = 0;
+    std::uint8_t part = 0;
+    for (std::size_t t = 0; t < types.size(); ++t) {
+      MixedVolume one;
+      one.base.f32 = {0, 1};
+      for (std::size_t tile = t; tile < count; tile += types.size()) {
+        const auto from = block.f32.begin() + static_cast<std::ptrdiff_t>(tile * size);
+        auto& to = one.tiles[kind].f32;
+        to.insert(to.end(), from, from + static_cast<std::ptrdiff_t>(size));
+        number[tile] = next++;
+      }
+      if (one.tiles.empty()) continue;
+      one.granularity = v.granularity;
+      out.tiles[{kind.level, part++}] = in_types(one, {types[0], types[t]}).tiles.at(kind);
+    }
+    for (std::size_t i = 0; i < v.level.size(); ++i)
+      if (v.level[i] == kind.level) out.tile[i] = number[v.tile[i]];
+  }
+  MixedVolume base = v;
+  base.tiles.clear();
+  out.base = in_types(base, types).base;
+  out.step = 0x1p-20;
+  return out;
+}
+
 }  // namespace vdvr::support
