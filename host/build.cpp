@@ -256,7 +256,10 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.epsilon_abs = plan.epsilon_abs;
   c.reference_range = plan.reference_range;
   const BrickMeasure* worst = nullptr;
+  c.brick_totals.reserve(builder.measures().size());
   for (const BrickMeasure& m : builder.measures()) {
+    // Two sums in fp32, and this product.
+    c.brick_totals.push_back(m.total < 0 ? -1.0f : m.total * (1 + 0x1p-21f));
     if (m.total < 0) continue;
     c.measured_max = std::max(c.measured_max, static_cast<double>(m.error));
     if (!worst || m.total > worst->total) worst = &m;

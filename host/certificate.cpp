@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -271,6 +272,24 @@ Certificate certificate_from_json(const std::string& text) {
   read_scope(m, c);
   read_origin(m, c);
   return c;
+}
+
+std::vector<float> brick_bounds(const Certificate& c, bool image3d) {
+  if (c.brick_totals.empty())
+    throw InputError(
+        "the file has no bounds by brick: an earlier version wrote it, or nothing is certified; build it "
+        "again");
+  if (image3d && !c.budget.sampler.image3d)
+    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+  const double rest =
+      c.budget.arithmetic.value + (image3d ? *c.budget.sampler.image3d : c.budget.sampler.buffer).value;
+  std::vector<float> bounds(c.brick_totals.size());
+  std::transform(c.brick_totals.begin(), c.brick_totals.end(), bounds.begin(), [&](float total) {
+    if (total < 0) return std::numeric_limits<float>::infinity();
+    return std::nextafter(static_cast<float>(static_cast<double>(total) + rest),
+                          std::numeric_limits<float>::infinity());
+  });
+  return bounds;
 }
 
 }  // namespace vdvr

@@ -181,16 +181,43 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
   return result;
 }
 
-ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool image3d,
-                       const ErrorSliceOptions& options) {
+namespace {
+
+/// By brick, or of all bricks alike; infinite where nothing is known.
+std::vector<float> bounds_of(const MixedVolume& volume, const Certificate& c, bool image3d) {
   if (image3d && !c.total_image3d)
     throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+  if (!c.brick_totals.empty()) return brick_bounds(c, image3d);
+  std::vector<float> bounds(volume.level.size(),
+                            static_cast<float>(image3d ? *c.total_image3d : c.total_buffer));
+  const Index3 n = volume.bricks();
+  for (std::size_t i = 0; c.roi && i < bounds.size(); ++i) {
+    const auto k = static_cast<std::int64_t>(i);
+    if (!brick_inside(volume, *c.roi, {k % n[0], k / n[0] % n[1], k / (n[0] * n[1])}))
+      bounds[i] = std::numeric_limits<float>::infinity();
+  }
+  return bounds;
+}
+
+Colour bound_colour(float bound, double epsilon) {
+  if (!std::isfinite(bound)) return kNotCompared;
+  const auto b = static_cast<double>(bound);
+  return b <= epsilon ? error_colour(b / epsilon) : kAbove;
+}
+
+std::string share_text(double bound, double epsilon) {
+  return fmt::format("|V - F| <= {} = {:.1f} % of epsilon", number(bound), 100 * bound / epsilon);
+}
+
+}  // namespace
+
+ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool image3d,
+                       const ErrorSliceOptions& options) {
+  const std::vector<float> bounds = bounds_of(volume, c, image3d);
+  const Index3 n = volume.bricks();
   const PixelGrid pixels = pixel_grid(volume.grid, options);
   const Axes axes = axes_of(options.axis);
   ErrorSlice result = empty_slice(options);
-  const double total = image3d ? *c.total_image3d : c.total_buffer;
-  result.max_error = total;
-  const Colour colour = total <= c.epsilon_abs ? error_colour(total / c.epsilon_abs) : kAbove;
   const std::int64_t left = (result.image.width - pixels.width) / 2;
   const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
   for (std::int64_t y = 0; y < pixels.height; ++y)
@@ -199,18 +226,33 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
       at[axes.across] = x;
       at[axes.down] = y;
       at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
-      const Vec3 point = pixels.grid.position(at);
-      const bool inside = !c.roi || brick_inside(volume, *c.roi, brick_at(volume, point));
-      put(result.image, left + x, top + y, inside ? colour : kNotCompared);
-      if (!inside) continue;
+      const Index3 brick = brick_at(volume, pixels.grid.position(at));
+      const float bound = bounds[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])];
+      put(result.image, left + x, top + y, bound_colour(bound, c.epsilon_abs));
+      if (!std::isfinite(bound)) continue;
       ++result.pixels;
-      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] =
-          static_cast<float>(total);
+      result.max_error = std::max(result.max_error, static_cast<double>(bound));
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = bound;
     }
   draw_caption(result.image, c.epsilon_abs,
-               fmt::format("|V - F| <= {} = {:.1f} % of epsilon where covered, {}", number(total),
-                           100 * total / c.epsilon_abs, image3d ? "image3d" : "buffer"));
+               fmt::format("{} where covered, {}", share_text(result.max_error, c.epsilon_abs),
+                           image3d ? "image3d" : "buffer"));
   return result;
+}
+
+Image bound_picture(const FloatImage& bounds, double epsilon) {
+  Image image{bounds.width, bounds.height + kCaption, {}};
+  image.rgb.resize(static_cast<std::size_t>(image.width * image.height * 3));
+  for (std::int64_t i = 0; i < image.width * image.height; ++i) put(image, i, 0, kPaper);
+  double most = 0;
+  for (std::int64_t i = 0; i < bounds.width * bounds.height; ++i) {
+    const float bound = bounds.values[static_cast<std::size_t>(i)];
+    if (std::isnan(bound)) continue;
+    put(image, i, 0, bound_colour(bound, epsilon));
+    if (std::isfinite(bound)) most = std::max(most, static_cast<double>(bound));
+  }
+  draw_caption(image, epsilon, share_text(most, epsilon) + " of what is seen");
+  return image;
 }
 
 }  // namespace vdvr

@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <span>
+#include <type_traits>
 
 #include "host/bake.hpp"
 #include "host/opencl/kernel.hpp"
@@ -89,7 +90,7 @@ void check_options(const RenderOptions& o) {
     throw InputError("an error slice is not ray-cast: use `run` or `render --mode error`");
   if (o.mode == RenderMode::slice) {
     if (o.output != RenderOutput::colour)
-      throw InputError("--show depth and normal do not apply to a slice, which has no camera");
+      throw InputError("--show depth, normal and error do not apply to a slice, which has no camera");
     if (o.slice_axis < 0 || o.slice_axis > 2)
       throw InputError(fmt::format("slice axis {} is not 0 (x), 1 (y) or 2 (z)", o.slice_axis));
     if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
@@ -310,7 +311,7 @@ int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const R
 }
 
 GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind sampler) {
-  const bool needed = o.shading || o.output != RenderOutput::colour;
+  const bool needed = o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour);
   if (o.gradient == GradientKind::automatic)
     return o.mode == RenderMode::dvr && needed && sampler == SamplerKind::buffer && v.lit_fits()
                ? GradientKind::stored
@@ -329,6 +330,7 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
+          {"VDVR_BOUNDS", o.output == RenderOutput::error ? "1" : "0"},
           {"VDVR_GRADIENT_ANALYTIC", gradient == GradientKind::analytic ? "1" : "0"},
           {"VDVR_LIT", lit ? "1" : "0"},
           {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
@@ -403,10 +405,15 @@ void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, con
   }
   // dvr and iso leap by distances, mip by the bricks' maxima.
   const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : v.frame.distance.buffer();
-  opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer, cl::Buffer>
-      kernel(*v.state, "raycast", kernel_name(o), defines);
-  kernel(range, field..., bricks, grid, guide, v.frame.table.buffer(), make_params(v, o, table, slack),
-         picture, v.frame.row_samples.buffer());
+  const auto draw = [&](const auto&... bounds) {
+    opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
+                   cl::Buffer, std::remove_cvref_t<decltype(bounds)>...>
+        kernel(*v.state, "raycast", kernel_name(o), defines);
+    kernel(range, field..., bricks, grid, guide, v.frame.table.buffer(), make_params(v, o, table, slack),
+           picture, v.frame.row_samples.buffer(), bounds...);
+  };
+  if (o.output == RenderOutput::error) draw(v.bounds.buffer());
+  else draw();
 }
 
 std::uint8_t to_byte(float x) {
@@ -427,8 +434,10 @@ FloatImage values_of(Pixels pixels, const RenderOptions& o) {
       for (std::size_t c = 0; c < 3; ++c) *to++ = p.s[c];
       continue;
     }
-    const bool missed =
-        (o.mode == RenderMode::iso && p.s[3] < 0) || (o.mode == RenderMode::mip && !std::isfinite(p.s[3]));
+    const bool missed = o.output == RenderOutput::error ? p.s[3] < 0
+                        : o.mode == RenderMode::iso     ? p.s[3] < 0
+                        : o.mode == RenderMode::mip     ? !std::isfinite(p.s[3])
+                                                        : false;
     *to++ = missed ? kNothing : p.s[3];
   }
   return image;
@@ -484,6 +493,8 @@ Enqueued enqueue_frame(Device& device, const ResidentVolume& volume, const Rende
                        const RaycastTuning& tuning) {
   check_options(o);
   Impl& v = volume.impl();
+  if (o.output == RenderOutput::error && v.bounds.size() == 0)
+    throw InputError("--show error: the volume has no bounds by brick");
   FloatPicture result;
   std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
   const float slack = range_slack(device, v, result.sampler);

@@ -399,4 +399,11 @@ std::pair<float, float> ResidentVolume::value_range() const { return impl_->valu
 const Grid& ResidentVolume::grid() const { return impl_->grid; }
 std::uint64_t ResidentVolume::bytes() const { return impl_->bytes(); }
 
+void ResidentVolume::set_bounds(const std::vector<float>& bounds) {
+  if (bounds.size() != impl_->host_ranges.size())
+    throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), impl_->host_ranges.size()));
+  impl_->bounds =
+      opencl::DeviceArray<float>(*impl_->state, std::span<const float>(bounds), "bounds of bricks");
+}
+
 }  // namespace vdvr

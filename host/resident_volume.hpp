@@ -101,6 +101,7 @@ struct ResidentVolume::Impl {
   } frame;
 
   std::optional<DeviceField> field;
+  opencl::DeviceArray<float> bounds;  ///< ResidentVolume::set_bounds
 
  private:
   void set_texels(const MixedVolume& volume, PackedRecords& records) const;

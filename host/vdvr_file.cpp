@@ -463,6 +463,29 @@ void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) 
   else into(b.u8);
 }
 
+constexpr const char* kTotals = "/brick_total";
+
+void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
+  const Index3 b = v.bricks();
+  if (const auto p = size_problem(kTotals, totals.size(), v.level.size()))
+    throw InputError(fmt::format("not written: {}: {}", p->where, p->what));
+  file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
+}
+
+/// Bounds by brick, where the file has them; none is above what the certificate promises of all.
+void read_totals(const h5::Reader& file, const MixedVolume& v, Certificate& c) {
+  if (!file.has(kTotals)) return;
+  const Index3 b = v.bricks();
+  const h5::Dataset d = expect(file, kTotals, {h5::Element::f32}, shape_of({b[2], b[1], b[0]}));
+  c.brick_totals.resize(d.count);
+  file.read(d, c.brick_totals.data());
+  const double most = c.measured_total * (1 + 0x1p-20);
+  for (const float total : c.brick_totals)
+    if (!(static_cast<double>(total) <= most))
+      file.refuse(kTotals, fmt::format("holds {}, above the certificate's measured_total {}", total,
+                                       c.measured_total));
+}
+
 /// The base's offset and shift, as attributes of any integer type.
 void read_base_table(const h5::Reader& file, SampleBlock& b) {
   const auto value = [&](const char* name, std::int64_t most) {
@@ -591,6 +614,7 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
       write_block(file, path_of(triple), shape_of({count, side[0], side[1], side[2]}), samples);
     }
     file.text("/certificate", json);
+    if (!certificate.brick_totals.empty()) write_totals(file, v, certificate.brick_totals);
     file.close();
   }
   target.commit();
@@ -610,6 +634,7 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
   result.certificate = read_certificate(path.string(), result.certificate_json);
   try {
     read_volume_data(file, contents, result.volume);
+    read_totals(file, result.volume, result.certificate);
   } catch (const std::bad_alloc&) {
     throw ResourceError(
         fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));

@@ -181,8 +181,8 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   VerifyResult result;
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
-  std::int64_t worst = -1;
-  Index3 worst_cell{};
+  std::int64_t worst = -1, broken = -1;
+  Index3 worst_cell{}, broken_cell{};
   {
     VerifyField field(state, exact, volume, stored.window, progress);
     field.run(
@@ -193,6 +193,12 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
           result.cells_tested += b.cells;
           result.nodes_tested += b.nodes;
           result.measured_max = std::max(result.measured_max, b.error);
+          if (!stored.brick_totals.empty() &&
+              !(b.error - field.arithmetic() <=
+                static_cast<double>(stored.brick_totals[at(b.brick)]) + stored.budget.arithmetic.value)) {
+            broken = b.brick;
+            broken_cell = b.worst_cell;
+          }
           if (b.total <= result.measured_total && worst >= 0) return;
           result.measured_total = b.total;
           worst = b.brick;
@@ -217,6 +223,12 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     result.holds = false;
     result.failure = fmt::format("|V - F| reaches {:.6g}, above the total {:.6g} of the certificate, {}",
                                  result.measured_max, promised, place_text(result.worst));
+  }
+  if (result.holds && broken >= 0) {
+    result.holds = false;
+    result.failure = fmt::format("|V - F| exceeds the certificate's bound {:.6g} of one brick, {}",
+                                 stored.brick_totals[at(broken)],
+                                 place_text(worst_sample(volume, exact, broken, broken_cell)));
   }
   if (options.exhaustive) {
     const Seams seams = compare_seams(volume);

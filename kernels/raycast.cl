@@ -7,7 +7,8 @@
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where
 // worth sampling), ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities
-// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth). Called by:
+// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth
+// | bound). Called by:
 // raycast() in host/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
@@ -39,7 +40,8 @@
 // normal.
 __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const float2* restrict ranges,
                                     __global const float4* restrict table, VdvrRaycast p,
-                                    __global float4* restrict picture, __global uint* restrict row_samples) {
+                                    __global float4* restrict picture,
+                                    __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
   const V nothing = (V)(NAN);
   V largest = (V)(-INFINITY), depth = nothing;
@@ -72,7 +74,11 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
     samples += PICK(active, (I)(1), (I)(0));
     const I raised = active & (value > largest);
     largest = PICK(raised, value, largest);
+#if VDVR_BOUNDS
+    depth = PICK(raised, GATHER(V, bounds, brick_index(grid, brick_at(grid, c))), depth);
+#else
     depth = PICK(raised, (ray.first + t) * p.length_unit, depth);
+#endif
     ++k;
   }
 #if VDVR_GEOMETRY

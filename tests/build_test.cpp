@@ -89,13 +89,22 @@ void check_certificate(const ProjectionSet& scan, const Built& built, const std:
   BOOST_TEST(c.measured_total <= c.total_buffer);
   const ExactField exact(scan, c.field);
   const auto F = exact.at(points);
+  const std::vector<float> bounds = brick_bounds(c, false);
+  const Index3 n = built.result.volume.bricks();
   double worst = 0;
-  std::int64_t tested = 0;
+  std::int64_t tested = 0, beyond = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!exact.covered(points[i]) || !applies(F[i])) continue;
     ++tested;
-    worst = std::max(worst, std::abs(static_cast<double>(sample_at(built.result.volume, points[i])) - F[i]));
+    const double error = std::abs(static_cast<double>(sample_at(built.result.volume, points[i])) - F[i]);
+    worst = std::max(worst, error);
+    const Index3 b = brick_at(built.result.volume, points[i]);
+    if (!(error <= static_cast<double>(bounds[static_cast<std::size_t>((b[2] * n[1] + b[1]) * n[0] + b[0])])))
+      ++beyond;
   }
+  BOOST_TEST(beyond == 0, beyond << " of " << tested << " points err by more than their brick's bound");
+  BOOST_TEST(*std::max_element(c.brick_totals.begin(), c.brick_totals.end()) >=
+             static_cast<float>(c.measured_total));
   BOOST_TEST(tested > 100);
   BOOST_TEST(worst <= tolerance::bound(c.total_buffer), "|V - F| reaches " << worst << ", certified "
                                                                            << c.total_buffer << " of epsilon "

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host/decorate.hpp"
+#include "host/error_slice.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -65,9 +66,19 @@ Overlay overlay_options(const Arguments& args, RenderMode mode) {
 
 RenderResult render_with_overlay(Source& source, const RenderOptions& o, const Overlay& overlay,
                                  bool certified) {
+  const Scene& scene = source.scene();
+  if (o.output == RenderOutput::error) {
+    RenderOptions above_caption = o;
+    above_caption.height -= kErrorCaption;
+    if (o.width < 160 || above_caption.height < 16)
+      throw InputError(fmt::format("--size {}x{}: an error picture needs at least 160x{} pixels", o.width,
+                                   o.height, 16 + kErrorCaption));
+    RenderResult r = source.draw(above_caption);
+    r.image = bound_picture(r.values, scene.certificate->epsilon_abs);
+    return r;
+  }
   RenderResult r = source.draw(o);
   if (!overlay.any()) return r;
-  const Scene& scene = source.scene();
   const bool translucent =
       std::any_of(o.surfaces.begin(), o.surfaces.end(), [](const IsoSurface& s) { return s.opacity < 1; });
   if (overlay.box && o.mode == RenderMode::iso && translucent)

@@ -17,7 +17,7 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kOutputs{"colour", "depth", "normal"};
+const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
 // Twenty pictures a second: a turn of 60 takes three.
@@ -41,8 +41,9 @@ void add_options(Arguments& args) {
   args.value("iso", "V[,V...]",
              "densities of up to 8 iso-surfaces (default: one between background and object)")
       .value("iso-opacity", "O[,O...]", "of each (default 1; of several the densest 1, others 0.3)")
-      .value("show", "colour|depth|normal",
-             "what a pixel says: its colour, how far what is seen lies from the eye, or which way it faces")
+      .value("show", "colour|depth|normal|error",
+             "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, or "
+             "how far the samples it was made of can lie from the scan")
       .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
@@ -158,6 +159,7 @@ RenderOptions render_options(const Arguments& args) {
   const std::string output = args.choice("show", kOutputs, "colour");
   o.output = output == "depth"    ? RenderOutput::depth
              : output == "normal" ? RenderOutput::normal
+             : output == "error"  ? RenderOutput::error
                                   : RenderOutput::colour;
   set_light(args, o);
   set_background(args, o);
@@ -210,7 +212,13 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (o.output != RenderOutput::colour)
     refuse(args, {"axes", "box", "colorbar", "background", "no-shading", "light"},
            "applies to --show colour");
-  if (o.output == RenderOutput::depth) refuse(args, {"gradient"}, "does not apply to --show depth");
+  if (o.output == RenderOutput::depth || o.output == RenderOutput::error)
+    refuse(args, {"gradient"}, "applies to --show colour and normal");
+  if (o.output == RenderOutput::error) {
+    refuse(args, {"caption"}, "is part of --show error");
+    if (method_option(args) != "vdvr" || args.has("unverified"))
+      throw InputError("--show error is of certified volumes: it does not go with --method or --unverified");
+  }
   if (o.output == RenderOutput::normal && o.mode == RenderMode::mip)
     throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
   if (o.mode == RenderMode::iso) refuse(args, {"tf", "tf-range"}, "does not apply to --mode iso");

@@ -71,6 +71,15 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
 }
 
 RenderResult Source::draw(const RenderOptions& options) {
+  if (options.output == RenderOutput::error && !bounds_set_) {
+    if (!scene_->certificate)
+      throw InputError("--show error: the volume has no certificate to take bounds from");
+    const bool image3d = options.sampler == SamplerKind::image3d ||
+                         (options.sampler == SamplerKind::automatic && resident_->has_image3d() &&
+                          probe_sampler(*device_).chosen == "image3d");
+    resident_->set_bounds(brick_bounds(*scene_->certificate, image3d));
+    bounds_set_ = true;
+  }
   return projections_ ? raycast(*device_, *projections_, options) : raycast(*device_, *resident_, options);
 }
 

@@ -39,6 +39,7 @@ class Source {
   std::optional<Scene> scene_;
   std::optional<Device> device_;
   std::optional<ResidentVolume> resident_;
+  bool bounds_set_ = false;
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
 };

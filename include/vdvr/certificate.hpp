@@ -59,6 +59,9 @@ struct Certificate {
   ErrorBudget budget;
   double measured_max = 0;    ///< max |V - gold| over tested gold nodes
   double measured_total = 0;  ///< max over them of |V - gold| + T + P
+  /// [bz][by][bx] the same brick by brick, whose largest is measured_total; negative where nothing was
+  /// tested. Empty for files of earlier versions. Not in the JSON: a dataset of the file.
+  std::vector<float> brick_totals;
   Vec3 worst_at{0, 0, 0};
   int upsampling_u = 8;
   std::string u_filter = "linear";
@@ -79,6 +82,11 @@ struct Certificate {
   std::string options_json = "{}";  ///< the options the volume was built with, as a JSON object
   std::vector<std::string> notes;   ///< what the certificate does not cover, and what was noticed
 };
+
+/// What |V - F| can be at covered points of each brick, sampled by `buffer` or image3d: its total, rounding
+/// and the sampler; infinite where nothing was tested. Throws InputError where the certificate has no totals
+/// by brick, or says nothing of image3d.
+std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
 
 /// The JSON of docs/file-format.md; finite numbers only.
 std::string to_json(const Certificate& certificate);

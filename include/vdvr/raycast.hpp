@@ -65,9 +65,9 @@ Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optiona
                double view_angle_deg);
 
 enum class RenderMode { dvr, iso, mip, slice, error };
-/// What a picture shows of modes dvr and iso (depth also of mip): colours, or where and how what is seen
-/// stands.
-enum class RenderOutput { colour, depth, normal };
+/// What a picture shows of modes dvr and iso (depth and error also of mip): colours, where and how what is
+/// seen stands, or the largest bound of the samples that it was made of (ResidentVolume::set_bounds).
+enum class RenderOutput { colour, depth, normal, error };
 
 /// An iso-surface; several may be translucent. At most 8 a picture.
 struct IsoSurface {
@@ -119,7 +119,9 @@ struct RenderResult {
   /// What lies behind the pixels, NaN where nothing does. Colour: of dvr the opacity; of iso the distance
   /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field.
   /// Depth: that distance of iso, of dvr to the sample that brings the opacity to a half, of mip to the
-  /// maximum. Normal: three channels, x, y, z of the unit vector towards lower density there.
+  /// maximum. Normal: three channels, x, y, z of the unit vector towards lower density there. Error: the
+  /// largest bound of the samples that add to the pixel (of iso and mip: of the points that it shows),
+  /// infinite where one lies in a brick without.
   FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
@@ -147,6 +149,9 @@ class ResidentVolume {
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::pair<float, float> value_range() const;
   [[nodiscard]] const Grid& grid() const;
+  /// [bz][by][bx] what the field errs by at most in each brick, infinite where nothing is known
+  /// (certificate.hpp, brick_bounds): what RenderOutput::error looks up. Throws InputError for another count.
+  void set_bounds(const std::vector<float>& bounds);
 
   struct Impl;
   [[nodiscard]] Impl& impl() const { return *impl_; }

@@ -199,14 +199,24 @@ RAY_INLINE Seen nothing_seen(V depth) {
   return seen;
 }
 
+#if VDVR_BOUNDS
+// Takes note of the bounds of bricks `at` in the lanes `seeing`.
+RAY_INLINE void raise_bound(VdvrGrid grid, I3 at, I seeing, Seen* seen BOUNDS) {
+  const V bound = GATHER(V, bounds, brick_index(grid, at));
+  seen->depth = PICK(seeing & (bound > seen->depth), bound, seen->depth);
+}
+#endif
+
 // Composites lanes of positive weight: `sampled` was taken at c, parameter t. Geometry: where the opacity
 // passes a half.
 RAY_INLINE void absorb(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
                        const OpenBrick* brick, const Sampled* sampled, V3 c, V t, V3 rgb, V weight,
-                       V shaded_weight, Seen* seen) {
+                       V shaded_weight, Seen* seen BOUNDS) {
   const float3 cells_per_length =
       (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
-#if VDVR_GEOMETRY
+#if VDVR_BOUNDS
+  raise_bound(grid, brick->at, weight > 0.0f, seen THE_BOUNDS);
+#elif VDVR_GEOMETRY
   const I half_way = (seen->alpha < 0.5f) & (seen->alpha + weight >= 0.5f);
   if (ANY(half_way)) {
     const V3 g = gradient_at(THE_FIELD, bricks, grid, brick, sampled, c, cells_per_length, half_way);
@@ -241,9 +251,10 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 // that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
-                                    __global float4* restrict picture, __global uint* restrict row_samples) {
+                                    __global float4* restrict picture,
+                                    __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
-  Seen seen = nothing_seen((V)(NAN));
+  Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
@@ -272,7 +283,7 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
     const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
     if (ANY(weight > 0.0f))
       absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
-             (V)(SHADED_WEIGHT * p.step), &seen);
+             (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
     ++k;
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);

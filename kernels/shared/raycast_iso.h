@@ -155,7 +155,10 @@ RAY_INLINE V fraction_of(V c, V low, V scale) {
 
 // Adds the crossing of surface `number` at parameter `at` in the lanes `crossing`.
 RAY_INLINE void add_surface(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray, Surfaces s,
-                            V at, I crossing, Seen* seen) {
+                            V at, I crossing, Seen* seen BOUNDS) {
+#if VDVR_BOUNDS
+  raise_bound(grid, brick_at(grid, position_at(ray, grid, at)), crossing, seen THE_BOUNDS);
+#else
   const I first = crossing & (seen->depth < 0.0f);
   seen->depth = PICK(first, (ray->first + at) * p->length_unit, seen->depth);
   if (p->shading || VDVR_GEOMETRY) {
@@ -168,6 +171,7 @@ RAY_INLINE void add_surface(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, 
     seen->normal = pick3(first, normal_of(g), seen->normal);
     s.rgb = shade(p, s.rgb, g, ray->world, 0.0f);
   }
+#endif
   const V weight = PICK(crossing, (1.0f - seen->alpha) * s.opacity, (V)(0.0f));
   seen->colour = plus(seen->colour, scaled(s.rgb, weight));
   seen->alpha += weight;
@@ -176,7 +180,7 @@ RAY_INLINE void add_surface(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, 
 // The surfaces that a cubic over [in, out] meets, front to back, in the lanes `possible`; `was` is on how
 // many the field lies before it, and after.
 RAY_INLINE void meet_surfaces(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
-                              const Cubic* cubic, V in, V out, I possible, I* was, Seen* seen) {
+                              const Cubic* cubic, V in, V out, I possible, I* was, Seen* seen BOUNDS) {
   V from = (V)(0.0f);
   for (int piece = 0; piece < 4; ++piece) {
     const V to = piece == 0   ? (V)(0.0f)
@@ -197,7 +201,7 @@ RAY_INLINE void meet_surfaces(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p
       const I rises = side > *was;
       const Surfaces s = surfaces_at(p, PICK(rises, *was, *was - 1));
       const V root = cubic_root(cubic, from, to, s.value, rises);
-      add_surface(THE_FIELD, bricks, grid, p, ray, s, in + root * (out - in), crossing, seen);
+      add_surface(THE_FIELD, bricks, grid, p, ray, s, in + root * (out - in), crossing, seen THE_BOUNDS);
       *was = PICK(crossing, PICK(rises, *was + 1, *was - 1), *was);
     }
     *was = PICK(possible, side, *was);
@@ -242,7 +246,7 @@ RAY_INLINE Box box_around(const Ray* ray, I3 at, I away) {
 // Meets the surfaces in the cells at c, which `sampled` was taken from. Returns the cells.
 RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
                           const OpenBrick* brick, const Sampled* sampled, V3 c, I active, I* was,
-                          Seen* seen) {
+                          Seen* seen BOUNDS) {
   const CellBox cell = cell_box(grid, brick, sampled, c);
   const V3 low = cell.low;
   const Box box = box_between(
@@ -270,7 +274,7 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
                           fraction_of(b.z, low.z, cell.scale.z)));
 #endif
   const Cubic cubic = cubic_along(&octet);
-  meet_surfaces(THE_FIELD, bricks, grid, p, ray, &cubic, in, out, worth, was, seen);
+  meet_surfaces(THE_FIELD, bricks, grid, p, ray, &cubic, in, out, worth, was, seen THE_BOUNDS);
   return box;
 }
 
@@ -279,7 +283,8 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
 // (`distance`); a jump of the field at a brick's face is a crossing there. Geometry: of the first.
 __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                     __global const float4* restrict table, VdvrRaycast p,
-                                    __global float4* restrict picture, __global uint* restrict row_samples) {
+                                    __global float4* restrict picture,
+                                    __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
   Seen seen = nothing_seen((V)(-1.0f));
   const Ray ray = cast_rays(&p, grid, px, py);
@@ -300,7 +305,8 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
     starts = 0;
     Box box = {c, c, c};
     if (ANY(active & ((away == 0) | (here != was))))
-      box = pass_cells(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, active, &was, &seen);
+      box =
+          pass_cells(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, active, &was, &seen THE_BOUNDS);
     const I leap = active & (away > 0);
     if (ANY(leap)) {
       const Box around = box_around(&ray, brick.at, away);

@@ -22,10 +22,10 @@ RAY_INLINE V opacity_of_level(__global const float4* restrict table, const VdvrR
 __kernel VDVR_HINT void raycast_level(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
                                       __global const float4* restrict table, VdvrRaycast p,
                                       __global float4* restrict picture,
-                                      __global uint* restrict row_samples) {
+                                      __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
   const V none = (V)(0.0f);
-  Seen seen = nothing_seen((V)(NAN));
+  Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step);
@@ -64,7 +64,7 @@ __kernel VDVR_HINT void raycast_level(FIELD, BRICKS, VdvrGrid grid, __global con
       const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of_level(table, &p, row, level), none);
       if (ANY(weight > 0.0f))
         absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, t, colour_of(table, row), weight,
-               SHADED_WEIGHT * part, &seen);
+               SHADED_WEIGHT * part, &seen THE_BOUNDS);
     }
     ++k;
   }

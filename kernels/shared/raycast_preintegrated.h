@@ -61,10 +61,10 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
                                               __global const uchar* restrict distance,
                                               __global const float4* restrict table, VdvrRaycast p,
                                               __global float4* restrict picture,
-                                              __global uint* restrict row_samples) {
+                                              __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
   const V none = (V)(0.0f), one = (V)(1.0f);
-  Seen seen = nothing_seen((V)(NAN));
+  Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0, away = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step);
@@ -85,6 +85,9 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
     samples += PICK(active, (I)(1), (I)(0));
     if (j > 0) {
       const float before = (float)(j - 1) * p.step;
+#if VDVR_BOUNDS
+      const I3 before_at = brick_at(grid, position_at(&ray, grid, (V)(before)));
+#endif
       V opacity = opacity_between(table, &p, front, back);
       const I is_part = active & (j == ends) & (opacity > 0.0f);
       if (ANY(is_part)) {
@@ -98,7 +101,11 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
         const OpenBrick around = open_brick(bricks, grid, brick_at(grid, at));
         const Sampled sampled = sample_open(THE_FIELD, &around, grid, at);
         absorb(THE_FIELD, bricks, grid, &p, &ray, &around, &sampled, at, middle,
-               colour_between(table, &p, front, back), weight, (V)(SHADED_WEIGHT * p.step), &seen);
+               colour_between(table, &p, front, back), weight, (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
+#if VDVR_BOUNDS
+        raise_bound(grid, before_at, weight > 0.0f, &seen THE_BOUNDS);
+        raise_bound(grid, brick_at(grid, c), weight > 0.0f, &seen THE_BOUNDS);
+#endif
       }
     }
     front = back;
