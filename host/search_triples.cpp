@@ -13,7 +13,7 @@ constexpr float first_scale = 0.9f;
 constexpr float slack_share = 0.5f;
 // A brick whose errors are no sum over axes is hard to guess; after so many failures only isotropic levels
 // are left.
-constexpr std::size_t most_failures = 6;
+constexpr std::size_t most_failures = 4;
 
 double samples_of(int granularity, const LevelTriple& l) {
   double n = 1;

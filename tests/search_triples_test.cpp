@@ -69,7 +69,7 @@ BOOST_AUTO_TEST_CASE(every_search_ends_and_nothing_coarser_than_a_failure_is_tri
     const TripleSearch search(4, top, true, fitted);
     for (int trial = 0; trial < 100; ++trial) {
       const auto levels = tried(search, curved(error(random), error(random), error(random)), 1.0f);
-      BOOST_TEST(levels.size() <= 6u + top - 1);
+      BOOST_TEST(levels.size() <= 4u + top - 1);
       for (std::size_t i = 0; i < levels.size(); ++i) {
         BOOST_TEST((levels[i] != LevelTriple{0, 0, 0} && levels[i] != LevelTriple{top, top, top}));
         for (std::size_t j = 0; j < i; ++j)
