@@ -14,6 +14,7 @@
 #include "host/close_boundaries.hpp"
 #include "host/gold_stream.hpp"
 #include "host/host_memory.hpp"
+#include "host/raise_levels.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
 #include "host/worst_node.hpp"
@@ -95,6 +96,7 @@ class Builder {
     GoldSettings settings{plan.grid,         bricks_.granularity, plan.gold_rate,
                           plan.upsampling_u, plan.u_filter,       options.window};
     settings.midrange = plan.settings.coefficients == "midrange";
+    settings.anisotropic = plan.settings.levels == "anisotropic" && closing_ != Closing::paper;
     settings.grid_only = plan.settings.terms == "grid";
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     node_test_.emplace(state_, *gold_, bricks_, host_, journal_, progress_,
@@ -107,7 +109,8 @@ class Builder {
   /// Puts the base on the lattice of integer samples; before it is measured.
   void choose_storage(StorageChoice storage) {
     bricks_.base = plan_.fitted.empty() ? plan_.base.samples : plan_.fitted;
-    bricks_.lattice = choose_lattice(bricks_.base, storage, most_rounding(plan_.epsilon_abs));
+    bricks_.lattice = choose_lattice(
+        bricks_.base, storage, most_rounding(plan_.epsilon_abs, plan_.settings.levels == "anisotropic"));
     round_base(bricks_.base, bricks_.lattice);
   }
   bool rounds() const { return bricks_.lattice.step > 0; }
@@ -202,32 +205,19 @@ class Builder {
                     plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
   }
 
-  // A violation on a shared part raises the coarser bricks there; any other raises the brick itself. Levels
-  // only rise.
+  // Levels only rise.
   std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
     const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
-    std::vector<std::uint8_t> raise(bricks_.level.size(), 0);
-    for (std::size_t i = 0; i < pending.size(); ++i) {
-      if (!pending[i] || measures()[i].violated == 0) continue;
-      for (int part = 0; part < 27; ++part) {
-        if (!(measures()[i].violated >> part & 1)) continue;
-        const auto incident =
-            incident_bricks(bricks_, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9});
-        bool any_coarser = false;
-        for (const std::int64_t j : incident)
-          if (bricks_.level[at(j)][0] < bricks_.level[i][0]) {
-            raise[at(j)] = 1;
-            any_coarser = true;
-          }
-        if (any_coarser) continue;
-        if (bricks_.level[i][0] == top) refuse(measures()[i].total, plan_.epsilon_abs);
-        raise[i] = 1;
-      }
-    }
-    for (std::size_t i = 0; i < raise.size(); ++i)
-      if (raise[i])
-        for (std::uint8_t& l : bricks_.level[i]) ++l;
-    return raise;
+    std::vector<LevelTriple> to = bricks_.level;
+    for (std::size_t i = 0; i < pending.size(); ++i)
+      if (pending[i] && measures()[i].violated != 0 &&
+          !raise_levels(bricks_, static_cast<std::int64_t>(i), measures()[i].violated, top,
+                        gold_->fine().settings().anisotropic ? &node_test_->along()[i] : nullptr, to))
+        refuse(measures()[i].total, plan_.epsilon_abs);
+    std::vector<std::uint8_t> raised(bricks_.level.size(), 0);
+    for (std::size_t i = 0; i < raised.size(); ++i) raised[i] = to[i] != bricks_.level[i];
+    bricks_.level = std::move(to);
+    return raised;
   }
 
   opencl::State& state_;

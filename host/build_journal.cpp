@@ -56,7 +56,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "2"},
+      {"record format", "3"},
       {"version", VDVR_VERSION},
       {"device", device.info().name},
       {"driver", device.info().driver},
@@ -71,6 +71,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"epsilon", exact(plan.epsilon_abs)},
       {"rates", fmt::format("u {}x {}, gold {}x", plan.upsampling_u, plan.u_filter, plan.gold_rate)},
       {"coefficients", plan.settings.coefficients},
+      {"levels", plan.settings.levels},
       {"terms", plan.settings.terms},
       {"granularity", std::to_string(stream.settings().granularity)},
       {"closing", name(options.closing)},

@@ -13,17 +13,23 @@ namespace vdvr {
 
 using Bytes = std::vector<std::byte>;
 
+/// Numbers, and arrays of small integers.
+template <class T>
+inline constexpr bool has_plain_bytes = std::is_arithmetic_v<T> ||
+                                        (std::is_trivially_copyable_v<T> &&
+                                         std::has_unique_object_representations_v<T>);
+
 class ByteWriter {
  public:
   template <class T>
   void put(const T& value) {
-    static_assert(std::is_arithmetic_v<T>, "structs have padding, whose bytes are anything");
+    static_assert(has_plain_bytes<T>, "structs may have padding, whose bytes are anything");
     append(&value, sizeof value);
   }
   /// Its length, then its elements.
   template <class T>
   void put(const std::vector<T>& values) {
-    static_assert(std::is_arithmetic_v<T>);
+    static_assert(has_plain_bytes<T>);
     put(static_cast<std::uint64_t>(values.size()));
     append(values.data(), values.size() * sizeof(T));
   }
@@ -45,7 +51,7 @@ class ByteReader {
   explicit ByteReader(std::span<const std::byte> bytes) : rest_(bytes) {}
   template <class T>
   T get() {
-    static_assert(std::is_arithmetic_v<T>);
+    static_assert(has_plain_bytes<T>);
     T value{};
     copy(&value, sizeof value);
     return value;

@@ -17,10 +17,7 @@ constexpr double easy_share = 0.48;
 // Of the bricks: how many at most the search for the largest error measures again at once.
 constexpr std::size_t sharpened_share = 32;
 
-LevelTriple triple(int level) {
-  const auto l = static_cast<std::uint8_t>(level);
-  return {l, l, l};
-}
+bool is_above_base(const LevelTriple& level) { return level != LevelTriple{0, 0, 0}; }
 
 bool any(const std::vector<std::uint8_t>& flags) {
   return std::find(flags.begin(), flags.end(), 1) != flags.end();
@@ -30,8 +27,24 @@ int top_level(const GoldStream& gold) {
   return std::countr_zero(static_cast<unsigned>(gold.settings().rate));
 }
 
+int finest_of(const LevelTriple& level) { return *std::max_element(level.begin(), level.end()); }
+
 bool passes(const BrickMeasure& m, double tolerance) {
   return m.total < 0 || static_cast<double>(m.total) <= tolerance;
+}
+
+void put(ByteWriter& out, const AxisErrors& along) {
+  for (const auto& axis : along.of)
+    for (const auto& level : axis)
+      for (const float error : level) out.put(error);
+}
+
+AxisErrors get_along(ByteReader& in) {
+  AxisErrors along;
+  for (auto& axis : along.of)
+    for (auto& level : axis)
+      for (float& error : level) error = in.get<float>();
+  return along;
 }
 
 GoldSettings with_coarse(GoldSettings settings) {
@@ -76,27 +89,28 @@ bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
 void ClassifyBricks::classify(const DeviceField& base, double tolerance,
                               const std::vector<std::uint8_t>& near) {
   measures_.assign(bricks_.level.size(), {});
+  along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);
   std::vector<std::uint8_t> refined = near;
   if (GoldStream* coarse = gold_.coarse()) {
     std::vector<std::uint8_t> undecided(near.size(), 0);
     test(*coarse, base, tolerance, near, "screen", [&](const Levels& l) {
-      const std::size_t id = at(l.result.base.brick);
-      coarse_slack_[id] = l.result.base.slack;
-      const Verdict verdict = coarse_verdict(l.result.base, tolerance);
+      const std::size_t id = at(l.base.brick);
+      coarse_slack_[id] = l.base.slack;
+      const Verdict verdict = coarse_verdict(l.base, tolerance);
       if (verdict != Verdict::beyond) refined[id] = 0;
       if (verdict == Verdict::undecided) undecided[id] = 1;
       if (verdict == Verdict::within) take(l);
     });
     test(gold_.fine(), base, tolerance, undecided, "screen", [&](const Levels& l) {
-      if (passes(l.result.base, tolerance)) take(l);
-      else refined[at(l.result.base.brick)] = 1;
+      if (passes(l.base, tolerance)) take(l);
+      else refined[at(l.base.brick)] = 1;
     });
     std::vector<std::uint8_t> easy = refined;
     for (std::size_t i = 0; i < easy.size(); ++i) easy[i] = easy[i] && is_easy(i, tolerance);
     refine(*coarse, base, tolerance, easy);
     for (std::size_t i = 0; i < easy.size(); ++i)
-      if (bricks_.level[i] != LevelTriple{0, 0, 0}) refined[i] = 0;
+      if (is_above_base(bricks_.level[i])) refined[i] = 0;
   }
   refine(gold_.fine(), base, tolerance, refined);
 }
@@ -112,8 +126,8 @@ void ClassifyBricks::test(GoldStream& gold, const DeviceField& base, double tole
            {[&](GoldStream::Batch& batch) {
               std::vector<Levels> levels;
               for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
-                levels.push_back({{m, 0}, 0, 0});
-              return record(batch, std::move(levels), {});
+                levels.push_back({m, {}, false, {}, 0, 0});
+              return record(batch, std::move(levels), {}, {});
             },
             [&](ByteReader in) { read(in, visit); }},
            journal_, progress_, stage);
@@ -126,26 +140,28 @@ void ClassifyBricks::refine(GoldStream& gold, const DeviceField& base, double to
   const bool fine = &gold == &gold_.fine();
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
                                                     "bricks to classify");
-  const auto taken = [&](const BrickClass& c) {
-    return fine || (c.base.total >= 0 && c.level > 0 && c.level < top_level(gold));
+  const auto taken = [&](const Levels& l) {
+    return fine || (l.base.total >= 0 && l.passes && is_above_base(l.level));
   };
   gold.run(
       selected,
       {[&](GoldStream::Batch& batch) {
          std::vector<Levels> levels;
          Tiles tiles;
-         for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device)) {
-           levels.push_back({c, 0, 0});
-           if (taken(c) && c.base.total >= 0 && c.level > 0)
-             tiles.emplace_back(c.base.brick, triple(c.level));
+         std::vector<float> samples;
+         for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device, fine)) {
+           levels.push_back({c.base, c.level, c.passes, c.along, 0, 0});
+           if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
+           tiles.emplace_back(c.base.brick, c.level);
+           samples.insert(samples.end(), c.tile.begin(), c.tile.end());
          }
-         return record(batch, std::move(levels), tiles);
+         return record(batch, std::move(levels), tiles, samples);
        },
        [&](ByteReader in) {
          read(in, [&](const Levels& l) {
-           if (!taken(l.result)) return;
-           if (fine && l.result.base.total >= 0 && !(static_cast<double>(l.result.base.slack) <= tolerance))
-             refuse_(l.result.base.slack, tolerance);
+           if (!taken(l)) return;
+           if (fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
+             refuse_(l.base.slack, tolerance);
            take(l);
          });
          take_tiles(in);
@@ -154,29 +170,33 @@ void ClassifyBricks::refine(GoldStream& gold, const DeviceField& base, double to
 }
 
 void ClassifyBricks::take(const Levels& l) {
-  const BrickMeasure& m = l.result.base;
+  const BrickMeasure& m = l.base;
   const std::size_t id = at(m.brick);
   bricks_.involved.at(id) = m.total >= 0;
   if (m.total < 0) return;
   measures_[id] = m;
-  bricks_.level[id] = triple(l.result.level);
+  bricks_.level[id] = l.level;
+  along_[id] = l.along;
   const auto slack = static_cast<double>(m.slack);
   bounds_.total = std::max(bounds_.total, slack);
   bounds_.projection = std::max(bounds_.projection, static_cast<double>(l.largest_p));
   bounds_.gold = std::max(bounds_.gold, slack - static_cast<double>(l.smallest_p));
 }
 
-Bytes ClassifyBricks::record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles) const {
+Bytes ClassifyBricks::record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
+                             const std::vector<float>& samples) const {
   ByteWriter out;
   const auto p = batch.largest_p();
   out.put(static_cast<std::uint64_t>(levels.size()));
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    put(out, levels[i].result.base);
-    out.put(levels[i].result.level);
+    put(out, levels[i].base);
+    out.put(levels[i].level);
+    out.put(static_cast<std::uint8_t>(levels[i].passes));
+    if (is_above_base(levels[i].level)) put(out, levels[i].along);
     out.put(p[i].first);
     out.put(p[i].second);
   }
-  put_tiles(out, batch, tiles);
+  put_tiles(out, tiles, samples);
   return out.take();
 }
 
@@ -184,34 +204,36 @@ void ClassifyBricks::read(ByteReader& in, const std::function<void(const Levels&
   const auto n = in.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < n; ++i) {
     Levels l;
-    l.result.base = get_measure(in);
-    l.result.level = in.get<int>();
+    l.base = get_measure(in);
+    l.level = in.get<LevelTriple>();
+    l.passes = in.get<std::uint8_t>() != 0;
+    if (is_above_base(l.level)) l.along = get_along(in);
     l.largest_p = in.get<float>();
     l.smallest_p = in.get<float>();
     visit(l);
   }
 }
 
-void ClassifyBricks::put_tiles(ByteWriter& out, GoldStream::Batch& batch, const Tiles& tiles) const {
+void ClassifyBricks::put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples) {
   std::vector<std::int64_t> bricks;
-  std::vector<std::uint8_t> levels;
+  std::vector<LevelTriple> levels;
   for (const auto& [brick, level] : tiles) {
     bricks.push_back(brick);
-    levels.push_back(level[0]);
+    levels.push_back(level);
   }
   out.put(bricks);
   out.put(levels);
-  out.put(batch.extract(tiles));
+  out.put(samples);
 }
 
-void ClassifyBricks::take_tiles(ByteReader& in) {
+std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
   const auto bricks = in.get_vector<std::int64_t>();
-  const auto levels = in.get_vector<std::uint8_t>();
+  const auto levels = in.get_vector<LevelTriple>();
   const auto samples = in.get_vector<float>();
   auto next = samples.begin();
   const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}, 0};
   for (std::size_t i = 0; i < bricks.size(); ++i) {
-    const std::int64_t size = shape.tile_size(triple(levels.at(i)));
+    const std::int64_t size = shape.tile_size(levels.at(i));
     if (size > samples.end() - next)
       throw FileError("a journal record lacks samples; start without --resume");
     const auto end = next + size;
@@ -223,6 +245,7 @@ void ClassifyBricks::take_tiles(ByteReader& in) {
     tile.assign(next, end);
     next = end;
   }
+  return bricks;
 }
 
 void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
@@ -232,10 +255,13 @@ void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
                       for (const std::int64_t id : batch.bricks())
                         tiles.emplace_back(id, bricks_.level[at(id)]);
                       ByteWriter out;
-                      put_tiles(out, batch, tiles);
+                      put_tiles(out, tiles, batch.extract(tiles));
+                      for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
                       return out.take();
                     },
-                    [&](ByteReader in) { take_tiles(in); }},
+                    [&](ByteReader in) {
+                      for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
+                    }},
                    journal_, progress_, "repair", GoldStream::For::samples);
 }
 
@@ -265,7 +291,7 @@ void ClassifyBricks::measure(const DeviceField& field, double tolerance,
     // The test needs V to be trilinear in every cell of gold.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && bricks_.level[i][0] <= top_level(*coarse) && is_easy(i, tolerance);
+      easy[i] = easy[i] && finest_of(bricks_.level[i]) <= top_level(*coarse) && is_easy(i, tolerance);
     measure_at(*coarse, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
       if (coarse_verdict(m, tolerance) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;

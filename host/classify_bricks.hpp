@@ -66,13 +66,18 @@ class ClassifyBricks {
   void sharpen(const DeviceField& field, double tolerance);
 
   [[nodiscard]] const std::vector<BrickMeasure>& measures() const { return measures_; }
+  /// By brick; of those refined, with levels per axis.
+  [[nodiscard]] const std::vector<AxisErrors>& along() const { return along_; }
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] std::uint64_t tile_bytes() const { return tile_bytes_; }
 
  private:
   using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
   struct Levels {
-    BrickClass result;
+    BrickMeasure base;
+    LevelTriple level{};
+    bool passes = false;
+    AxisErrors along{};
     float largest_p = 0, smallest_p = 0;
   };
   void test(GoldStream& gold, const DeviceField& base, double tolerance,
@@ -83,11 +88,12 @@ class ClassifyBricks {
   void measure_at(GoldStream& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
-  Bytes record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles) const;
+  Bytes record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
+               const std::vector<float>& samples) const;
   static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
   void take(const Levels& levels);
-  void put_tiles(ByteWriter& out, GoldStream::Batch& batch, const Tiles& tiles) const;
-  void take_tiles(ByteReader& in);
+  static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);
+  std::vector<std::int64_t> take_tiles(ByteReader& in);  // of which bricks
   [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
   opencl::State& state_;
@@ -98,6 +104,7 @@ class ClassifyBricks {
   Progress progress_;
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;
+  std::vector<AxisErrors> along_;
   std::vector<float> coarse_slack_;  // by brick; negative: not known
   Bounds bounds_;
   std::uint64_t tile_bytes_ = 0;  // of bricks_.samples

@@ -2,6 +2,7 @@
 // the sampler's own lerp, so that the stored samples of a fine brick lie on what its coarse neighbour
 // interpolates.
 #include <algorithm>
+#include <utility>
 
 #include "host/brick_layout.hpp"
 #include "host/close_boundaries.hpp"
@@ -22,16 +23,20 @@ class Closer {
         entity_(stored, brick, side),
         own_(stored.open, brick, stored.level[at(brick)]),
         tile_(tile) {
-    const auto sum = [&](std::int64_t i) {
+    lowest_ = own_.level;
+    for (const std::int64_t i : entity_.incident())
+      for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min<int>(lowest_[a], stored.level[at(i)][2 - a]);
+    // The coarsest of those that have the entity's own lattice, if any has: its samples are fitted to that.
+    // Only one that reads the base is as coarse as one can be.
+    const auto rank = [&](std::int64_t i) {
       const LevelTriple& l = stored.level[at(i)];
-      return l[0] + l[1] + l[2];
+      bool same = true;
+      for (const std::size_t a : entity_.along()) same = same && l[2 - a] == lowest_[a];
+      return std::pair(same ? 0 : 1, l[0] + l[1] + l[2]);
     };
     owner_ = entity_.incident().front();
-    lowest_ = own_.level;
-    for (const std::int64_t i : entity_.incident()) {
-      if (sum(i) < sum(owner_)) owner_ = i;
-      for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min<int>(lowest_[a], stored.level[at(i)][2 - a]);
-    }
+    for (const std::int64_t i : entity_.incident())
+      if (rank(i) < rank(owner_)) owner_ = i;
     bool unchanged = owner_ == brick && stored.open.lattice.step == 0;
     for (const std::size_t a : entity_.along()) unchanged = unchanged && lowest_[a] == own_.level[a];
     if (unchanged) return;
@@ -50,7 +55,7 @@ class Closer {
   float rounded(float value, const Index3& i) const { return round_to(value, entity_.unit(own_, i)); }
   float value(const Index3& i) const { return tile_[own_.index(i)]; }
 
-  // At the entity's level all incident bricks take the samples of the coarsest of them: at level 0 these are
+  // At the entity's level all incident bricks take the samples of its owner: at level 0 these are
   // base samples, and any others may differ from them.
   void take_from_owner() {
     const LevelTriple& level = stored_.level[at(owner_)];

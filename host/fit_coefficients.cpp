@@ -1,7 +1,8 @@
 // Fits lattices on the device. Launches kernels/fit_coefficients.cl.
 #include "host/fit_coefficients.hpp"
 
-#include <utility>
+#include <algorithm>
+#include <limits>
 
 #include "host/opencl/kernel.hpp"
 
@@ -13,72 +14,131 @@ namespace {
 constexpr float share = 0.8f;
 // Room for 16-lane reads that begin at the last node of the last column.
 constexpr std::uint64_t room = 64;
+constexpr float not_needed = -std::numeric_limits<float>::max();
 
 cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
 std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+template <class T>
+void grow(opencl::State& state, opencl::DeviceArray<T>& array, std::uint64_t size, const char* what) {
+  if (array.size() >= size) return;
+  array = {};  // before the next one is allocated
+  array = opencl::DeviceArray<T>(state, size, what);
+  array.fill(0);  // 16 lanes read beyond what is interpolated
+}
 
 }  // namespace
 
-LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& b, const opencl::DeviceArray<float>& gold,
-                         const opencl::DeviceArray<float>& margin, std::int64_t spacing, int steps,
-                         float curvature) {
-  LevelSamples l;
-  l.spacing = spacing;
-  l.reach = b.halo / spacing;
-  l.cx = (b.nx - 1) / spacing + 1 + 2 * l.reach;
-  l.cy = (b.ny - 1) / spacing + 1 + 2 * l.reach;
-  l.cz = (b.nz - 1) / spacing + 1 + 2 * l.reach;
-  l.stride = l.cz;
-  const std::uint64_t columns = count(b.count * l.cx * l.cy);
-  l.samples = opencl::DeviceArray<float>(state, columns * count(l.stride), "samples of a level");
-  l.along = opencl::DeviceArray<float>(state, columns * count(b.gold_stride) + room, "interpolated columns");
-  l.along.fill(0.0f);  // 16 lanes read beyond what is interpolated
-
-  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
-               s = to_int(spacing), reach = to_int(l.reach), cx = to_int(l.cx), cy = to_int(l.cy),
-               cz = to_int(l.cz), blocks = to_int(b.count);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int>
-      take(state, "fit_coefficients", "take_lattice");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int>
-      interpolate(state, "fit_coefficients", "interpolate_lattice");
-  const opencl::Range per_sample{{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}};
-  take(per_sample, l.samples.buffer(), gold.buffer(), nx, ny, halo, stride, s, reach, cx, cy, cz,
-       to_int(l.stride), blocks);
-  const auto along = [&] {
-    interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, l.along.buffer(), l.samples.buffer(),
-                halo, stride, s, reach, cx, cy, cz, to_int(l.stride), blocks);
+void LatticeFit::shape_for(const Index3& spacing) {
+  const GoldBlocks& b = blocks_;
+  const auto reach = [&](std::size_t a) { return b.halo / spacing[a]; };
+  const auto samples = [&](std::int64_t nodes, std::size_t a) {
+    return to_int((nodes - 1) / spacing[a] + 1 + 2 * reach(a));
   };
-  along();
-  if (steps == 0) return l;
+  level_.shape = {to_int(spacing[0]), to_int(spacing[1]), to_int(spacing[2]),
+                  to_int(reach(0)),   to_int(reach(1)),   to_int(reach(2)),
+                  samples(b.nx, 0),   samples(b.ny, 1),   samples(b.nz, 2)};
+}
 
-  const opencl::DeviceArray<float> errors(state, gold.size(), "errors of an interpolant");
-  const opencl::DeviceArray<float> low(state, columns * count(b.gold_stride), "smallest errors"),
-      high(state, columns * count(b.gold_stride), "largest errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
-      err(state, "fit_coefficients", "lattice_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int>
-      pool(state, "fit_coefficients", "pool_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_float>
-      shift(state, "fit_coefficients", "shift_lattice");
+// A step looks half a spacing around a sample, the next one at what its neighbours did: columns within as
+// many spacings of the boxes, less a half, take part, and the lattice's columns on and beside those.
+void LatticeFit::mark(const std::vector<float>& margins, const std::vector<ColumnBox>& wanted, int steps) {
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const std::int64_t wide = b.nx + 2 * b.halo, deep = b.ny + 2 * b.halo;
+  host_margin_.assign(at(b.count * wide * deep), not_needed);
+  host_needed_.assign(at(b.count * l.cx * l.cy), 0);
+  for (const ColumnBox& w : wanted) {
+    const std::int64_t halves = std::max(2 * steps - 1, 0), dx = (halves * l.spacing_x + 1) / 2,
+                       dy = (halves * l.spacing_y + 1) / 2;
+    const std::int64_t x0 = std::max(w.first_x - dx + b.halo, std::int64_t{0}),
+                       x1 = std::min(w.last_x + dx + b.halo, wide - 1),
+                       y0 = std::max(w.first_y - dy + b.halo, std::int64_t{0}),
+                       y1 = std::min(w.last_y + dy + b.halo, deep - 1);
+    for (std::int64_t y = y0; y <= y1; ++y) {
+      const auto row = static_cast<std::ptrdiff_t>((w.block * deep + y) * wide);
+      std::copy(margins.begin() + row + x0, margins.begin() + row + x1 + 1, host_margin_.begin() + row + x0);
+    }
+    // Of the lattice, whose first column need not lie on the halo's rim.
+    const std::int64_t from_x = b.halo - l.reach_x * l.spacing_x, from_y = b.halo - l.reach_y * l.spacing_y;
+    const auto below = [](std::int64_t node, std::int64_t spacing) {
+      return std::max<std::int64_t>(node / spacing - 1, 0);
+    };
+    for (std::int64_t y = below(y0 - from_y, l.spacing_y); y < l.cy && (y - 2) * l.spacing_y <= y1 - from_y;
+         ++y)
+      for (std::int64_t x = below(x0 - from_x, l.spacing_x); x < l.cx && (x - 2) * l.spacing_x <= x1 - from_x;
+           ++x)
+        host_needed_[at((w.block * l.cy + y) * l.cx + x)] = 1;
+  }
+  grow(state_, margin_, host_margin_.size(), "margins where samples are fitted");
+  margin_.write(host_margin_);
+  grow(state_, needed_, host_needed_.size(), "columns of a lattice");
+  needed_.write(host_needed_);
+}
+
+void LatticeFit::reserve(std::uint64_t gold, int steps) {
+  const VdvrLattice& l = level_.shape;
+  const std::uint64_t columns = count(blocks_.count * l.cx * l.cy);
+  grow(state_, level_.samples, columns * count(l.cz), "samples of a level");
+  grow(state_, level_.along, columns * count(blocks_.gold_stride) + room, "interpolated columns");
+  if (steps == 0) return;
+  grow(state_, errors_, gold, "errors of an interpolant");
+  grow(state_, low_, columns * count(blocks_.gold_stride), "smallest errors");
+  grow(state_, high_, columns * count(blocks_.gold_stride), "largest errors");
+}
+
+// One step.
+void LatticeFit::fit(const opencl::DeviceArray<float>& gold, float curvature) {
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
+               blocks = to_int(b.count);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, VdvrLattice, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_float>
+      err(state_, "fit_coefficients", "lattice_errors");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl::Buffer, VdvrLattice, cl_int,
+                 cl_int, cl_int, cl_int, cl_int>
+      pool(state_, "fit_coefficients", "pool_errors");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_float>
+      shift(state_, "fit_coefficients", "shift_lattice");
   const std::uint64_t chunks = count(b.gold_stride / 16);
   // Columns that have a lattice column on every side within half a spacing.
-  const std::int64_t wide = (l.cx - 1) * spacing + 1 - 2 * (spacing / 2),
-                     deep = (l.cy - 1) * spacing + 1 - 2 * (spacing / 2);
-  for (int step = 0; step < steps; ++step) {
-    err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors.buffer(), l.along.buffer(),
-        gold.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s, reach, cx, cy, blocks, curvature);
-    pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low.buffer(), high.buffer(),
-         errors.buffer(), margin.buffer(), b.lowest, nx, ny, halo, stride, s, reach, cx, cy, blocks);
-    shift(per_sample, l.samples.buffer(), low.buffer(), high.buffer(), halo, stride, s, reach, cx, cy, cz,
-          to_int(l.stride), blocks, to_int(b.z_first), to_int(b.z_last), share);
-    along();
+  const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1 - 2 * (l.spacing_x / 2),
+                     deep = (l.cy - 1) * l.spacing_y + 1 - 2 * (l.spacing_y / 2);
+  err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors_.buffer(), level_.along.buffer(),
+      gold.buffer(), margin_.buffer(), b.lowest, l, nx, ny, halo, stride, blocks, curvature);
+  pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low_.buffer(), high_.buffer(),
+       errors_.buffer(), margin_.buffer(), b.lowest, needed_.buffer(), l, nx, ny, halo, stride, blocks);
+  shift({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
+        low_.buffer(), high_.buffer(), needed_.buffer(), l, halo, stride, blocks, to_int(b.z_first),
+        to_int(b.z_last), share);
+}
+
+const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gold,
+                                           const std::vector<float>& margins,
+                                           const std::vector<ColumnBox>& wanted, const Index3& spacing,
+                                           int steps, float curvature) {
+  shape_for(spacing);
+  mark(margins, wanted, steps);
+  reserve(gold.size(), steps);
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
+               blocks = to_int(b.count);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int, cl_int>
+      take(state_, "fit_coefficients", "take_lattice");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int> interpolate(
+      state_, "fit_coefficients", "interpolate_lattice");
+  take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
+       gold.buffer(), needed_.buffer(), l, nx, ny, halo, stride, blocks);
+  for (int step = 0;; ++step) {
+    interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, level_.along.buffer(),
+                level_.samples.buffer(), needed_.buffer(), l, halo, stride, blocks);
+    if (step == steps) return level_;
+    fit(gold, curvature);
   }
-  return l;
 }
 
 }  // namespace vdvr

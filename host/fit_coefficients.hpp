@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "host/opencl/array.hpp"
+#include "shared/lattice_shape.h"
+#include "vdvr/grid.hpp"
 
 namespace vdvr {
 
@@ -17,9 +20,14 @@ struct GoldBlocks {
   std::int64_t z_first = 0, z_last = 0;  ///< tested nodes along z
 };
 
-/// Every `spacing`-th node of blocks of gold: float[block][cy][cx][stride], node n at n / spacing + reach.
+/// Nodes of a block, across z, on which samples are wanted: closed.
+struct ColumnBox {
+  std::int64_t block = 0, first_x = 0, first_y = 0, last_x = 0, last_y = 0;
+};
+
+/// Every spacing-th node of blocks of gold per axis: float[block][cy][cx][cz], node n at n / spacing + reach.
 struct LevelSamples {
-  std::int64_t spacing = 1, reach = 0, cx = 0, cy = 0, cz = 0, stride = 0;
+  VdvrLattice shape{};
   opencl::DeviceArray<float> samples;
   opencl::DeviceArray<float>
       along;  ///< interpolated along z: [block][cy][cx][gold_stride], node z at z + halo
@@ -29,12 +37,37 @@ struct LevelSamples {
 /// samples gain from many steps (most bricks read them), those of finer levels hardly after two.
 constexpr int base_fit_steps = 12, level_fit_steps = 2;
 
-/// `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many second differences below gold's
-/// interpolant, on average over a gold cell of the grid that is certified. Right inside the blocks where halo
-/// >= steps * spacing. Cost: per step about two evaluations of the interpolant per gold node. Memory: (2 + 2
-/// / spacing) / spacing^2 of the gold.
-LevelSamples fit_lattice(opencl::State& state, const GoldBlocks& blocks,
-                         const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                         std::int64_t spacing, int steps, float curvature);
+/// Fits lattices of one batch of blocks; keeps its buffers from one to the next.
+class LatticeFit {
+ public:
+  LatticeFit(opencl::State& state, const GoldBlocks& blocks) : state_(state), blocks_(blocks) {}
+
+  /// `spacing` along x, y, z; `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many
+  /// second differences below gold's interpolant, on average over a gold cell of the grid that is certified.
+  /// `margins`: the blocks' margins. Right on the boxes wanted, and undefined further out, where halo >=
+  /// steps * spacing; along an axis with less halo the samples around the block stay gold. Valid until the
+  /// next call. Cost: per step about two evaluations of the interpolant per gold node of the boxes, widened
+  /// by as many spacings less a half. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the gold, and as
+  /// much as the gold.
+  const LevelSamples& operator()(const opencl::DeviceArray<float>& gold, const std::vector<float>& margins,
+                                 const std::vector<ColumnBox>& wanted, const Index3& spacing, int steps,
+                                 float curvature);
+  /// What the last call gave.
+  [[nodiscard]] const LevelSamples& last() const { return level_; }
+
+ private:
+  void shape_for(const Index3& spacing);
+  void mark(const std::vector<float>& margins, const std::vector<ColumnBox>& wanted, int steps);
+  void reserve(std::uint64_t gold, int steps);
+  void fit(const opencl::DeviceArray<float>& gold, float curvature);
+
+  opencl::State& state_;
+  const GoldBlocks& blocks_;
+  LevelSamples level_;
+  std::vector<float> host_margin_;
+  std::vector<std::uint8_t> host_needed_;
+  opencl::DeviceArray<float> margin_, errors_, low_, high_;
+  opencl::DeviceArray<std::uint8_t> needed_;
+};
 
 }  // namespace vdvr

@@ -174,8 +174,13 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
     bricks.samples.resize(near.size());
     ClassifyBricks test(state, gold, bricks, host, nullptr, {}, [](float, double) {});
     test.classify(field, tolerance, selected);
-    std::vector<std::pair<int, BrickMeasure>> out;
-    for (std::size_t i = 0; i < near.size(); ++i) out.emplace_back(bricks.level[i][0], test.measures()[i]);
+    std::vector<std::pair<double, BrickMeasure>> out;
+    const MixedVolume shape{base.grid, settings.granularity, settings.rate, {}, {}, {}, {}, 0};
+    for (std::size_t i = 0; i < near.size(); ++i)
+      out.emplace_back(bricks.level[i] == LevelTriple{0, 0, 0}
+                           ? 0.0
+                           : static_cast<double>(shape.tile_size(bricks.level[i])),
+                       test.measures()[i]);
     return out;
   };
 
@@ -200,12 +205,12 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   const auto classes = classify(sampled);
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
-      const auto& [level, m] = classes[at(i)];
+      const auto& [samples, m] = classes[at(i)];
       s.seen += 1;
-      s.tile_samples += level > 0 ? std::pow((settings.granularity << level) + 1, 3) : 0.0;
+      s.tile_samples += samples;
       const bool fine = m.rate == settings.rate;
       if (m.total >= 0)
-        s.share[level > 0 ? (fine ? fine_refined : coarse_refined) : fine ? fine_stays : coarse_stays] += 1;
+        s.share[samples > 0 ? (fine ? fine_refined : coarse_refined) : fine ? fine_stays : coarse_stays] += 1;
     }
 
   // A stratum without a brick in the layers takes after the one below it.

@@ -39,7 +39,6 @@ void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, s
   first_brick_.clear();
   bricks_.clear();
   place_.clear();
-  lattices_.clear();
   shape_.count = static_cast<std::int64_t>(first.size());
   for (std::size_t b = 0; b < first.size(); ++b) {
     const auto [bx, by] = first[b];
@@ -55,18 +54,40 @@ void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, s
   }
 }
 
-const LevelSamples& GoldStream::Batch::lattice(std::int64_t spacing) {
-  const auto found = lattices_.find(spacing);
-  if (found != lattices_.end()) return found->second;
-  const int steps = !settings_.midrange ? 0 : spacing == settings_.rate ? base_fit_steps : level_fit_steps;
-  return lattices_
-      .emplace(spacing, fit_lattice(state_, shape_, gold_, margin_, spacing, steps, settings_.curvature))
-      .first->second;
+Index3 GoldStream::Batch::spacing_of(const LevelTriple& level) const {
+  const std::int64_t rate = settings_.rate;
+  return {rate >> level[2], rate >> level[1], rate >> level[0]};
 }
 
-GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, std::int64_t spacing,
+std::size_t GoldStream::Batch::slot(std::int64_t brick) const {
+  const auto [b, x, y, z] = place(brick);
+  return at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+}
+
+std::vector<std::uint8_t> GoldStream::Batch::flags(const std::vector<std::int64_t>& bricks) const {
+  std::vector<std::uint8_t> out(at(shape_.count * bricks_z_ * bricks_y_ * bricks_x_), 0);
+  for (const std::int64_t brick : bricks) out[slot(brick)] = 1;
+  return out;
+}
+
+const LevelSamples& GoldStream::Batch::lattice(const LevelTriple& level,
+                                               const std::vector<std::int64_t>& bricks) {
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
+  std::vector<ColumnBox> boxes;
+  for (const std::int64_t brick : bricks) {
+    const auto [b, x, y, z] = place(brick);
+    boxes.push_back({b, x * side, y * side, (x + 1) * side, (y + 1) * side});
+  }
+  const int steps = !settings_.midrange             ? 0
+                    : level == LevelTriple{0, 0, 0} ? base_fit_steps
+                                                    : level_fit_steps;
+  return fit_(gold_, margins_, boxes, spacing_of(level), steps, settings_.curvature);
+}
+
+GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, const Index3& spacing,
                                                           std::uint64_t offset) const {
-  const std::int64_t g = settings_.granularity, rate = settings_.rate, side = g * rate / spacing + 1;
+  const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  const auto side = [&](std::size_t a) { return to_int(g * rate / spacing[a] + 1); };
   const auto [b, x, y, z] = place(brick);
   const auto& first = first_brick_[at(b)];
   TileRequest r{};
@@ -74,13 +95,21 @@ GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, st
   r.node_x = to_int(x * g * rate);
   r.node_y = to_int(y * g * rate);
   r.node_z = to_int(z * g * rate);
-  r.spacing_x = r.spacing_y = r.spacing_z = to_int(spacing);
-  r.side_x = r.side_y = r.side_z = to_int(side);
+  r.spacing_x = to_int(spacing[0]);
+  r.spacing_y = to_int(spacing[1]);
+  r.spacing_z = to_int(spacing[2]);
+  r.side_x = side(0);
+  r.side_y = side(1);
+  r.side_z = side(2);
   r.last_x = to_int(std::min(shape_.nx - 1, (settings_.grid.cells[0] - first[0] * g) * rate));
   r.last_y = to_int(std::min(shape_.ny - 1, (settings_.grid.cells[1] - first[1] * g) * rate));
   r.last_z = to_int(shape_.nz - 1);
   r.offset = offset;
   return r;
+}
+
+opencl::Defines GoldStream::Batch::brick_nodes() const {
+  return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
 }
 
 // Per brick of the blocks, [block][z][y][x].
@@ -140,53 +169,142 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
   return out;
 }
 
-std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, float tolerance,
-                                                    const opencl::DeviceArray<std::uint8_t>& selected) {
-  const std::int64_t rate = settings_.rate, n = static_cast<std::int64_t>(blocks());
-  const int top = std::countr_zero(static_cast<unsigned>(rate));
-  Results level0 = run_measure(base, tolerance, selected);
-  const auto totals = level0.total.to_host(), errors0 = level0.error.to_host(),
-             slacks = level0.slack.to_host();
-  const auto fails = [&](cl_int bits) { return bits >= 0 && !(std::bit_cast<float>(bits) <= tolerance); };
+std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::int64_t>& bricks) {
+  const int levels =
+      std::min(std::countr_zero(static_cast<unsigned>(settings_.rate)), AxisErrors::most_levels);
+  if (!settings_.anisotropic || levels == 0 || bricks.empty()) return std::vector<AxisErrors>(bricks.size());
+  const std::int64_t n = shape_.count;
+  const std::vector<std::uint8_t> wanted = flags(bricks);
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
+                                                    "bricks to look at");
+  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(6 * levels), "errors along axes");
+  errors.fill(0);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+      kernel(state_, "classify", "axis_errors", brick_nodes());
+  kernel({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, errors.buffer(),
+         on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_.lowest, to_int(shape_.nx),
+         to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo), to_int(shape_.gold_stride), levels,
+         to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+  const auto bits = errors.to_host();
+  std::vector<AxisErrors> out(bricks.size());
+  for (std::size_t i = 0; i < bricks.size(); ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t l = 0; l < at(levels); ++l)
+        for (std::size_t sign = 0; sign < 2; ++sign)
+          out[i].of[a][l][sign] =
+              std::bit_cast<float>(bits[((slot(bricks[i]) * 3 + a) * at(levels) + l) * 2 + sign]);
+  return out;
+}
 
-  const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
+// The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
+std::vector<float> GoldStream::Batch::errors_at(const LevelTriple& level,
+                                                const std::vector<std::int64_t>& bricks) {
+  const std::int64_t n = shape_.count;
+  const std::vector<std::uint8_t> wanted = flags(bricks);
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
+                                                    "bricks to test");
+  const LevelSamples& samples = lattice(level, bricks);
+  opencl::DeviceArray<cl_int> error(state_, wanted.size(), "brick errors");
+  error.fill(-1);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_float>
-      level_error(state_, "classify", "level_error", defines);
-  opencl::DeviceArray<cl_int> before = std::move(level0.total), error(state_, before.size(), "brick errors");
-  std::vector<std::vector<cl_int>> by_level{totals};
-  for (int level = 1; level < top && std::any_of(by_level.back().begin(), by_level.back().end(), fails);
-       ++level) {
-    const LevelSamples& samples = lattice(rate >> level);
-    error.fill(-1);
-    level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
-                before.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
-                margin_.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz),
-                to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), to_int(samples.spacing),
-                to_int(samples.reach), to_int(samples.cx), to_int(samples.cy), to_int(bricks_x_),
-                to_int(bricks_y_), to_int(bricks_z_), to_int(n), tolerance);
-    by_level.push_back(error.to_host());
-    std::swap(error, before);
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, VdvrLattice, cl_int, cl_int, cl_int, cl_int>
+      level_error(state_, "classify", "level_error", brick_nodes());
+  level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
+              on_device.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
+              margin_.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz),
+              to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), samples.shape,
+              to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+  const auto bits = error.to_host();
+  std::vector<float> out;
+  for (const std::int64_t brick : bricks) {
+    const cl_int b = bits[slot(brick)];
+    out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
   }
-  std::vector<BrickClass> out;
-  for (const std::int64_t brick : bricks_) {
-    const auto [b, x, y, z] = place(brick);
-    const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
-    BrickClass c;
-    c.base.brick = brick;
-    c.base.rate = settings_.rate;
-    if (totals[i] >= 0) {
-      c.base = {brick,
-                std::bit_cast<float>(totals[i]),
-                std::bit_cast<float>(errors0[i]),
-                std::bit_cast<float>(slacks[i]),
-                0,
-                settings_.rate};
-      while (c.level < static_cast<int>(by_level.size()) && fails(by_level[at(c.level)][i])) ++c.level;
+  return out;
+}
+
+namespace {
+
+// Equal tiles, in the order of the bricks.
+void give_tiles(const std::vector<BrickClass*>& bricks, const std::vector<float>& samples) {
+  const std::size_t size = bricks.empty() ? 0 : samples.size() / bricks.size();
+  for (std::size_t i = 0; i < bricks.size(); ++i)
+    bricks[i]->tile.assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
+                           samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
+}
+
+}  // namespace
+
+struct GoldStream::Batch::Candidate {
+  BrickClass* result;
+  TripleSearch::Brick search;
+};
+
+// Round by round: every brick names its next level, and bricks that name the same are tested together.
+void GoldStream::Batch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
+                                   float tolerance) {
+  while (!candidates.empty()) {
+    std::map<LevelTriple, std::vector<Candidate>> by_level;
+    for (Candidate& c : candidates)
+      if (const auto level = search.next(c.search, tolerance)) by_level[*level].push_back(std::move(c));
+    candidates.clear();
+    for (auto& [level, group] : by_level) {
+      std::vector<std::int64_t> bricks, passed;
+      for (const Candidate& c : group) bricks.push_back(c.result->base.brick);
+      const std::vector<float> errors = errors_at(level, bricks);
+      std::vector<BrickClass*> results;
+      for (std::size_t i = 0; i < group.size(); ++i) {
+        if (errors[i] <= tolerance) {
+          group[i].result->level = level;
+          group[i].result->passes = true;
+          passed.push_back(bricks[i]);
+          results.push_back(group[i].result);
+        } else {
+          search.fail(group[i].search, level, errors[i]);
+          candidates.push_back(std::move(group[i]));
+        }
+      }
+      give_tiles(results, copy_tiles(level, passed, &fit_.last()));
     }
-    out.push_back(c);
   }
+}
+
+std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, float tolerance,
+                                                    const opencl::DeviceArray<std::uint8_t>& selected,
+                                                    bool gold_too) {
+  const int top = std::countr_zero(static_cast<unsigned>(settings_.rate));
+  std::vector<BrickClass> out;
+  for (const BrickMeasure& m : measure(base, tolerance, selected)) {
+    BrickClass c;
+    c.base = m;
+    c.base.violated = 0;
+    c.passes = m.total < 0 || m.total <= tolerance;
+    out.push_back(std::move(c));
+  }
+  std::vector<std::int64_t> open;
+  for (const BrickClass& c : out)
+    if (!c.passes) open.push_back(c.base.brick);
+  const auto errors = axis_errors(open);
+  std::vector<Candidate> candidates;
+  for (BrickClass& c : out)
+    if (!c.passes) {
+      c.along = errors[candidates.size()];
+      candidates.push_back({&c, {c.along, c.base.slack}});
+    }
+  try_levels(candidates, TripleSearch(settings_.granularity, top, settings_.anisotropic, settings_.midrange),
+             tolerance);
+
+  const auto finest = static_cast<std::uint8_t>(std::max(top, 1));
+  std::vector<std::int64_t> bricks;
+  std::vector<BrickClass*> results;
+  for (BrickClass& c : out) {
+    if (c.passes) continue;
+    c.level = {finest, finest, finest};
+    bricks.push_back(c.base.brick);
+    results.push_back(&c);
+  }
+  if (gold_too) give_tiles(results, copy_tiles({finest, finest, finest}, bricks, nullptr));
   return out;
 }
 
@@ -209,51 +327,69 @@ std::vector<std::pair<float, float>> GoldStream::Batch::largest_p() {
   return out;
 }
 
+// Tiles of one level from its lattice, concatenated.
+std::vector<float> GoldStream::Batch::copy_tiles(const LevelTriple& level,
+                                                 const std::vector<std::int64_t>& bricks,
+                                                 const LevelSamples* lattice) {
+  if (bricks.empty()) return {};
+  std::vector<TileRequest> requests;
+  std::uint64_t total = 0, size = 0;
+  for (const std::int64_t brick : bricks) {
+    requests.push_back(request(brick, spacing_of(level), total));
+    size = count(std::int64_t{requests[0].side_x} * requests[0].side_y * requests[0].side_z);
+    total += size;
+  }
+  const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
+  const opencl::DeviceArray<TileRequest> on_device(state_, std::span<const TileRequest>(requests),
+                                                   "tile requests");
+  // Samples at the gold rate are gold, and gold lies as its own lattice would.
+  const VdvrLattice gold{1,
+                         1,
+                         1,
+                         to_int(shape_.halo),
+                         to_int(shape_.halo),
+                         to_int(shape_.halo),
+                         to_int(shape_.nx + 2 * shape_.halo),
+                         to_int(shape_.ny + 2 * shape_.halo),
+                         to_int(shape_.gold_stride)};
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, VdvrLattice,
+                 cl_float>
+      kernel(state_, "classify", "extract_tiles", brick_nodes());
+  kernel({{size, requests.size(), 1}, {64, 1, 1}}, out.buffer(),
+         (lattice ? lattice->samples : gold_).buffer(), margin_.buffer(), on_device.buffer(),
+         to_int(static_cast<std::int64_t>(requests.size())), to_int(shape_.nx), to_int(shape_.ny),
+         to_int(shape_.halo), lattice ? lattice->shape : gold,
+         static_cast<cl_float>(-kept_margin(settings_.grid, 1)));
+  return out.to_host();
+}
+
 std::vector<float> GoldStream::Batch::extract(
     const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
-  std::uint64_t total = 0;
-  std::map<std::int64_t, std::vector<TileRequest>> by_spacing;
-  std::map<std::int64_t, std::uint64_t> largest;
-  for (const auto& [brick, level] : tiles) {
-    const std::int64_t spacing = settings_.rate >> level[0];
-    const TileRequest r = request(brick, spacing, total);
-    const std::uint64_t size = count(std::int64_t{r.side_x} * r.side_y * r.side_z);
-    total += size;
-    largest[spacing] = std::max(largest[spacing], size);
-    by_spacing[spacing].push_back(r);
+  std::map<LevelTriple, std::vector<std::size_t>> by_level;
+  for (std::size_t i = 0; i < tiles.size(); ++i) by_level[tiles[i].second].push_back(i);
+  std::vector<std::vector<float>> parts(tiles.size());
+  for (const auto& [level, members] : by_level) {
+    std::vector<std::int64_t> bricks;
+    for (const std::size_t i : members) bricks.push_back(tiles[i].first);
+    const bool is_gold = spacing_of(level) == Index3{1, 1, 1};
+    const auto samples = copy_tiles(level, bricks, is_gold ? nullptr : &lattice(level, bricks));
+    const std::size_t size = samples.size() / members.size();
+    for (std::size_t i = 0; i < members.size(); ++i)
+      parts[members[i]].assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
+                               samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
   }
-  if (total == 0) return {};
-  const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
-  const opencl::Defines defines{{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_float>
-      kernel(state_, "classify", "extract_tiles", defines);
-  for (const auto& [spacing, requests] : by_spacing) {
-    const opencl::DeviceArray<TileRequest> device_requests(state_, std::span<const TileRequest>(requests),
-                                                           "tile requests");
-    const auto copy = [&](const opencl::DeviceArray<float>& samples, std::int64_t reach, std::int64_t cx,
-                          std::int64_t cy, std::int64_t stride) {
-      kernel({{largest[spacing], requests.size(), 1}, {64, 1, 1}}, out.buffer(), samples.buffer(),
-             margin_.buffer(), device_requests.buffer(), to_int(static_cast<std::int64_t>(requests.size())),
-             to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.halo), to_int(spacing), to_int(reach),
-             to_int(cx), to_int(cy), to_int(stride), static_cast<cl_float>(-kept_margin(settings_.grid, 1)));
-    };
-    if (spacing == 1) {  // samples at the gold rate are gold, and gold lies as its own lattice would
-      copy(gold_, shape_.halo, shape_.nx + 2 * shape_.halo, shape_.ny + 2 * shape_.halo, shape_.gold_stride);
-      continue;
-    }
-    const LevelSamples& l = lattice(spacing);
-    copy(l.samples, l.reach, l.cx, l.cy, l.stride);
-  }
-  return out.to_host();
+  std::vector<float> out;
+  for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
+  return out;
 }
 
 void GoldStream::Batch::fit_base(std::vector<float>& base) {
   const Grid& grid = settings_.grid;
   const Index3 n = grid.samples();
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
-  const LevelSamples& l = lattice(rate);
-  const std::vector<float> samples = l.samples.to_host(), margins = margin_.to_host();
+  const LevelSamples& fitted = lattice({0, 0, 0}, bricks_);
+  const VdvrLattice& l = fitted.shape;
+  const std::vector<float> samples = fitted.samples.to_host(), &margins = margins_;
   const auto kept = static_cast<float>(-kept_margin(grid, 1));
   for (std::size_t b = 0; b < first_brick_.size(); ++b) {
     const auto& first = first_brick_[b];
@@ -266,8 +402,8 @@ void GoldStream::Batch::fit_base(std::vector<float>& base) {
               x * rate + shape_.halo;
           if (!(margins[at(column)] >= kept)) continue;
           const std::int64_t from =
-              ((static_cast<std::int64_t>(b) * l.cy + y + l.reach) * l.cx + x + l.reach) * l.stride + z +
-              l.reach;
+              ((static_cast<std::int64_t>(b) * l.cy + y + l.reach_y) * l.cx + x + l.reach_x) * l.cz + z +
+              l.reach_z;
           base[at(((first[2] * g + z) * n[1] + first[1] * g + y) * n[0] + first[0] * g + x)] =
               samples[at(from)];
         }

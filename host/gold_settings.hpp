@@ -17,8 +17,9 @@ struct GoldSettings {
   int upsampling = 8;
   std::string u_filter = "linear";
   std::optional<std::pair<double, double>> window{};
-  bool midrange = false;   ///< samples fitted to the trilinear filter; else gold at the nodes
-  bool base_only = false;  ///< only fitted base samples are asked for: no slack, no other level
+  bool midrange = false;     ///< samples fitted to the trilinear filter; else gold at the nodes
+  bool anisotropic = false;  ///< levels per axis; else one for all three
+  bool base_only = false;    ///< only fitted base samples are asked for: no slack, no other level
   /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
   float curvature = 0.0625f;
   int coarse_rate = 0;     ///< of a coarser gold that shares this one's bounds of base cells; 0: none

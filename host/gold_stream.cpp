@@ -426,6 +426,7 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     const std::vector<float> margins = this->margins(columns);
     columns.wanted = wanted(margins, columns.nx, columns.ny);
     batch.margin_.write(margins);
+    batch.margins_ = margins;
     back_project(state_, scan_.geometry, projections_, columns, settings_.u_filter, batch.gold_);
     if (node_slack_)
       (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_,

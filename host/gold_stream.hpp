@@ -24,7 +24,9 @@
 #include "host/fit_coefficients.hpp"
 #include "host/gold_settings.hpp"
 #include "host/node_slack.hpp"
+#include "host/opencl/kernel.hpp"
 #include "host/projection_bounds.hpp"
+#include "host/search_triples.hpp"
 #include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -55,8 +57,11 @@ struct BrickMeasure {
 
 /// Result of the node test of one brick.
 struct BrickClass {
-  BrickMeasure base;  ///< the base samples, as stored, measured on it
-  int level = 0;      ///< the lowest that passes; the top where only gold itself does
+  BrickMeasure base;          ///< the base samples, as stored, measured on it
+  LevelTriple level{};        ///< the cheapest found that passes; the gold rate where only gold itself does
+  bool passes = false;        ///< by the node test; gold itself is not tested
+  AxisErrors along{};         ///< of a brick that the base does not suit
+  std::vector<float> tile{};  ///< of a level above 0: its samples [z][y][x], before closing
 };
 
 /// Upsampled rows over all slabs, and gold samples over all blocks, halos included.
@@ -189,11 +194,15 @@ class GoldStream::Batch {
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
 
-  /// In a run for samples: the node test at levels 0 .. log2(rate) (isotropic), per brick of bricks():
-  /// |interpolant - F| may be at most the tolerance. Level 0 is measured on the stored base samples through
-  /// the sampler: closing never changes those, so it is final.
+  /// In a run for samples: the node test at levels 0 .. log2(rate), of all axes together or (anisotropic) of
+  /// each, per brick of bricks(): |interpolant - F| may be at most the tolerance. Level 0 is measured on the
+  /// stored base samples through the sampler: closing never changes those, so it is final. Bricks that no
+  /// level suits get gold itself, with `gold_too`.
   std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
-                                   const opencl::DeviceArray<std::uint8_t>& selected);
+                                   const opencl::DeviceArray<std::uint8_t>& selected, bool gold_too);
+
+  /// What linear interpolation along single axes errs by in these bricks.
+  std::vector<AxisErrors> axis_errors(const std::vector<std::int64_t>& bricks);
 
   /// Writes the fitted base samples of the blocks into `base` [z][y][x] of the whole grid, where they may be
   /// kept.
@@ -223,8 +232,8 @@ class GoldStream::Batch {
         }
   }
 
-  /// In a run for samples: samples of the requested tiles, in the order asked, concatenated: float [z][y][x]
-  /// each. They are gold at the top level, fitted below it if the settings say so.
+  /// In a run for samples: samples of tiles of bricks of the batch, in the order asked, concatenated: float
+  /// [z][y][x] each. They are gold at the top level, fitted below it if the settings say so.
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
   /// Measures a stored field on every selected brick.
@@ -235,24 +244,36 @@ class GoldStream::Batch {
   friend class GoldStream;
   struct Results;
   struct TileRequest;
-  [[nodiscard]] TileRequest request(std::int64_t brick, std::int64_t spacing, std::uint64_t offset) const;
+  struct Candidate;
+  [[nodiscard]] TileRequest request(std::int64_t brick, const Index3& spacing, std::uint64_t offset) const;
+  void try_levels(std::vector<Candidate>& candidates, const TripleSearch& search, float tolerance);
+  std::vector<float> errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks);
+  std::vector<float> copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
+                                const LevelSamples* lattice);
+  [[nodiscard]] opencl::Defines brick_nodes() const;
   Results run_measure(const DeviceField& field, float tolerance,
                       const opencl::DeviceArray<std::uint8_t>& selected);
-  Batch(opencl::State& state, const GoldSettings& settings) : state_(state), settings_(settings) {}
+  Batch(opencl::State& state, const GoldSettings& settings)
+      : state_(state), settings_(settings), fit_(state, shape_) {}
   void choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
               const std::vector<std::uint8_t>& selected);
   [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
   [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }
-  /// Samples of level log2(rate / spacing) on the blocks, made on first use.
-  const LevelSamples& lattice(std::int64_t spacing);
+  /// Samples of a level on these bricks; valid until the next call.
+  const LevelSamples& lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks);
+  [[nodiscard]] Index3 spacing_of(const LevelTriple& level) const;
+  /// Place in arrays per brick of the blocks, [block][z][y][x].
+  [[nodiscard]] std::size_t slot(std::int64_t brick) const;
+  [[nodiscard]] std::vector<std::uint8_t> flags(const std::vector<std::int64_t>& bricks) const;
 
   opencl::State& state_;
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
   GoldBlocks shape_;
   SlabShape slab_;
-  std::int64_t stride_ = 0;                        // of the slack's columns
-  std::map<std::int64_t, LevelSamples> lattices_;  // by spacing
+  std::int64_t stride_ = 0;     // of the slack's columns
+  std::vector<float> margins_;  // what margin_ holds
+  LatticeFit fit_;
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;

@@ -322,6 +322,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
     s.midrange = settings.coefficients == "midrange";
     s.grid_only = grid_only;
+    s.anisotropic = settings.levels == "anisotropic";
     return s;
   };
   const auto stream_at = [&](const Rates& r) {

@@ -28,8 +28,11 @@ struct Lattice {
 /// u16 with the coarsest step of which that holds; else float32.
 Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding);
 
-/// What `automatic` takes for `most_rounding`.
-inline double most_rounding(double epsilon_abs) { return epsilon_abs / 8; }
+/// What `automatic` takes for `most_rounding`: a brick that coarse rounding raises by a level of one axis
+/// costs less than one raised by a level of all.
+inline double most_rounding(double epsilon_abs, bool anisotropic) {
+  return epsilon_abs / (anisotropic ? 5 : 8);
+}
 
 /// Nearest multiple of `unit`; unit 0: the value itself. Never -0, which integers do not have.
 inline float round_to(float value, double unit) {

@@ -1,7 +1,8 @@
 // The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
-// chosen tiles. Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l samples every
-// (rate >> l)-th gold node. Called by host/gold_batch.cpp.
+// chosen tiles. Layouts as in gold_bounds.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
+// samples every (rate >> l)-th gold node. Called by host/gold_batch.cpp.
 #include "shared/largest.h"
+#include "shared/lattice_shape.h"
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
@@ -13,15 +14,15 @@
    vload16(0, gold_column + (z)))
 
 // Raises error[block][brick z][brick y][brick x] to the largest that |interpolant - F| may be at the brick's
-// closed nodes. It starts negative and stays so where no node of a brick is tested. Bricks that `before` (the
-// errors of the level below) found within `tolerance` are left out. Positive floats order as their bits do.
+// closed nodes, for the bricks wanted. It starts negative and stays so where no node of a brick is tested.
+// Positive floats order as their bits do.
 // One work-item does one column of one brick layer; its last node is also the next layer's first.
-__kernel void level_error(volatile __global int* error, __global const int* before,
+__kernel void level_error(volatile __global int* error, __global const uchar* wanted,
                           __global const float* along, __global const float* gold,
                           __global const float* above, __global const float* below,
                           __global const float* margin, float lowest, int nx, int ny, int nz, int halo,
-                          int gold_stride, int stride, int spacing, int reach, int cx, int cy, int bricks_x,
-                          int bricks_y, int bricks_z, int blocks, float tolerance) {
+                          int gold_stride, int stride, VdvrLattice l, int bricks_x, int bricks_y,
+                          int bricks_z, int blocks) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
   if (x >= nx || y >= ny || block >= blocks) return;
@@ -32,20 +33,18 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
   const int bx0 = max((x - 1) / VDVR_BRICK_NODES, 0), bx1 = min(x / VDVR_BRICK_NODES, bricks_x - 1);
   const int by0 = max((y - 1) / VDVR_BRICK_NODES, 0), by1 = min(y / VDVR_BRICK_NODES, bricks_y - 1);
   const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
-  bool wanted = false;
+  bool any = false;
   for (int by = by0; by <= by1; ++by)
-    for (int bx = bx0; bx <= bx1; ++bx) {
-      const int bits = before[(layer + by) * bricks_x + bx];
-      wanted = wanted || (bits >= 0 && !(as_float(bits) <= tolerance));
-    }
-  if (!wanted) return;
-  const int ix = min(x / spacing, (nx - 1) / spacing - 1), iy = min(y / spacing, (ny - 1) / spacing - 1);
-  const float fx = (float)(x - ix * spacing) / (float)spacing,
-              fy = (float)(y - iy * spacing) / (float)spacing;
+    for (int bx = bx0; bx <= bx1; ++bx) any = any || wanted[(layer + by) * bricks_x + bx];
+  if (!any) return;
+  const int ix = min(x / l.spacing_x, (nx - 1) / l.spacing_x - 1),
+            iy = min(y / l.spacing_y, (ny - 1) / l.spacing_y - 1);
+  const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
+              fy = (float)(y - iy * l.spacing_y) / (float)l.spacing_y;
   const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
   __global const float* a =
-      along + (((size_t)block * cy + iy + reach) * cx + ix + reach) * gold_stride + halo + first;
-  __global const float* b = a + (size_t)cx * gold_stride;
+      along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * gold_stride + halo + first;
+  __global const float* b = a + (size_t)l.cx * gold_stride;
   __global const float* gold_column = gold + gold_at * gold_stride + halo + first;
   __global const float *above_column = above + column * stride + first,
                        *below_column = below + column * stride + first;
@@ -69,6 +68,81 @@ __kernel void level_error(volatile __global int* error, __global const int* befo
     for (int bx = bx0; bx <= bx1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
 }
 
+// How far linear interpolation along one axis alone errs in the middles of its cells, for every level below the
+// gold rate: the largest of interpolant - gold and of gold - interpolant. errors[block][brick z][brick y][brick x][axis x, y, z][level][sign], starting at 0. A node that is no
+// sample of the finest level is the middle of a cell of exactly one level.
+inline void raise_pair(volatile __global int* to, float plus, float minus) {
+  if (plus > 0.0f && as_int(plus) > to[0]) atomic_max(to, as_int(plus));
+  if (minus > 0.0f && as_int(minus) > to[1]) atomic_max(to + 1, as_int(minus));
+}
+// The level whose cells have their middles at node i; `levels` where i is a base sample.
+inline int level_of_middle(int i, int levels) {
+  int level = levels;
+  for (int bit = 0; bit < levels; ++bit)
+    if (i & ((1 << (bit + 1)) - 1)) {
+      level = levels - 1 - bit;
+      break;
+    }
+  return level;
+}
+__kernel void axis_errors(volatile __global int* errors, __global const uchar* wanted,
+                          __global const float* gold, __global const float* margin, float lowest, int nx,
+                          int ny, int nz, int halo, int gold_stride, int levels, int bricks_x, int bricks_y,
+                          int bricks_z, int blocks) {
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
+  if (x >= nx || y >= ny || block >= blocks) return;
+  const int row = nx + 2 * halo;
+  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + y + halo) * row + x + halo;
+  if (margin[gold_at] < lowest) return;
+  const int bx0 = max((x - 1) / VDVR_BRICK_NODES, 0), bx1 = min(x / VDVR_BRICK_NODES, bricks_x - 1);
+  const int by0 = max((y - 1) / VDVR_BRICK_NODES, 0), by1 = min(y / VDVR_BRICK_NODES, bricks_y - 1);
+  const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
+  bool any = false;
+  for (int by = by0; by <= by1; ++by)
+    for (int bx = bx0; bx <= bx1; ++bx) any = any || wanted[(layer + by) * bricks_x + bx];
+  if (!any) return;
+  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
+  __global const float* column = gold + gold_at * gold_stride + halo;
+  const int level_x = level_of_middle(x, levels), level_y = level_of_middle(y, levels);
+  const int half_x = 1 << (levels - 1 - min(level_x, levels - 1)),
+            half_y = 1 << (levels - 1 - min(level_y, levels - 1));
+  const long step_x = (long)half_x * gold_stride, step_y = (long)half_y * row * gold_stride;
+  const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const float16 none = (float16)(0.0f);
+  float16 plus_x = none, minus_x = none, plus_y = none, minus_y = none, plus_z[6], minus_z[6];
+  for (int l = 0; l < levels; ++l) plus_z[l] = minus_z[l] = none;
+  for (int z = first; z < last; z += 16) {
+    const int16 node = z + lane, outside = node >= last;
+    __global const float* c = column + z;
+    const float16 centre = vload16(0, c);
+    const float16 ex =
+                      select(0.5f * (vload16(0, c - step_x) + vload16(0, c + step_x)) - centre, none, outside),
+                  ey =
+                      select(0.5f * (vload16(0, c - step_y) + vload16(0, c + step_y)) - centre, none, outside);
+    plus_x = fmax(plus_x, ex);
+    minus_x = fmax(minus_x, -ex);
+    plus_y = fmax(plus_y, ey);
+    minus_y = fmax(minus_y, -ey);
+    for (int l = 0; l < levels; ++l) {
+      const int half_z = 1 << (levels - 1 - l);
+      const float16 ez = select(0.5f * (vload16(0, c - half_z) + vload16(0, c + half_z)) - centre, none,
+                                outside | ((node & (2 * half_z - 1)) != half_z));
+      plus_z[l] = fmax(plus_z[l], ez);
+      minus_z[l] = fmax(minus_z[l], -ez);
+    }
+  }
+  for (int by = by0; by <= by1; ++by)
+    for (int bx = bx0; bx <= bx1; ++bx) {
+      volatile __global int* out = errors + ((layer + by) * bricks_x + bx) * 6 * levels;
+      if (level_x < levels) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
+      if (level_y < levels) 
+        raise_pair(out + 2 * (levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));
+      for (int l = 0; l < levels; ++l) 
+        raise_pair(out + 2 * (2 * levels + l), largest_of_16(plus_z[l]), largest_of_16(minus_z[l]));
+    }
+}
+
 // Copies the samples of tiles out of a lattice: request i writes tile samples float[sz][sy][sx] at `offset`.
 typedef struct {
   int block, node_x, node_y, node_z;    // of the brick's first node in its block
@@ -79,10 +153,10 @@ typedef struct {
   ulong offset;
 } TileRequest;
 
-// From the lattice of their spacing (fit_coefficients.cl): node n at n / spacing + reach.
+// From the lattice of their triple (fit_coefficients.cl).
 __kernel void extract_tiles(__global float* out, __global const float* lattice, __global const float* margin,
                             __global const TileRequest* requests, int count, int nx, int ny, int halo,
-                            int spacing, int reach, int cx, int cy, int lattice_stride, float kept) {
+                            VdvrLattice l, float kept) {
   const int i = (int)get_global_id(0), request = (int)get_global_id(1);
   if (request >= count) return;
   const TileRequest r = requests[request];
@@ -92,6 +166,6 @@ __kernel void extract_tiles(__global float* out, __global const float* lattice, 
   const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
   const bool keep =
       margin[((size_t)r.block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo] >= kept;
-  const size_t column = ((size_t)r.block * cy + y / spacing + reach) * cx + x / spacing + reach;
-  out[r.offset + i] = keep ? lattice[column * lattice_stride + z / spacing + reach] : 0.0f;
+  const size_t column = ((size_t)r.block * l.cy + y / l.spacing_y + l.reach_y) * l.cx + x / l.spacing_x + l.reach_x;
+  out[r.offset + i] = keep ? lattice[column * l.cz + z / l.spacing_z + l.reach_z] : 0.0f;
 }

@@ -28,6 +28,7 @@ struct Wanted {
   BuildOptions options{};
   std::uint64_t max_memory = 0;
   bool sampled = false;
+  bool isotropic = false;
 };
 
 struct Built {
@@ -39,6 +40,7 @@ Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   Device device("", wanted.max_memory);
   PlanSettings settings;
   if (wanted.sampled) settings.coefficients = "sampled";
+  if (wanted.isotropic) settings.levels = "isotropic";
   Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, {wanted.epsilon, {}}, settings);
   BuildResult result = build(device, scan, plan, wanted.options);
   if (wanted.max_memory > 0) BOOST_TEST(device.peak_memory() <= wanted.max_memory);
@@ -285,6 +287,23 @@ BOOST_AUTO_TEST_CASE(window_certifies_what_lies_in_it_with_fewer_tiles) {
   BOOST_TEST(storage_of(built.result.volume, false).samples_ratio <
              storage_of(whole.result.volume, false).samples_ratio);
   BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(levels_per_axis_and_per_brick_are_certified_and_continuous) {
+  const ProjectionSet scan = noise_scan(17, 8, 21, 6);
+  for (const bool isotropic : {false, true}) {
+    Wanted wanted{grid_of(scan, {10, 9, 7}, 0.8), 0.2};
+    wanted.isotropic = isotropic;
+    wanted.options.granularity = 2;
+    const Built built = build_of(scan, wanted);
+    const MixedVolume& v = built.result.volume;
+    const bool triples = std::any_of(v.level.begin(), v.level.end(),
+                                     [](const LevelTriple& l) { return l[0] != l[1] || l[1] != l[2]; });
+    BOOST_TEST(triples == !isotropic);
+    check_shared_bits(v);
+    check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 200, 8));
+    BOOST_TEST(verifies(scan, v, built.result.certificate));
+  }
 }
 
 BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {

@@ -3,6 +3,8 @@
 #define BOOST_TEST_MODULE classify_bricks
 #include "host/classify_bricks.hpp"
 
+#include <algorithm>
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
@@ -35,12 +37,13 @@ Grid grid_around_axis(const Index3& cells, double spacing) {
 
 // A build up to its levels, measured once more on the fine gold.
 struct Case {
-  Case(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range)
+  Case(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range,
+       bool anisotropic = false)
       : chain(scan),
         state(attacks::device().state()),
         base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, "cubic", {})),
         host(state),
-        gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate)),
+        gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate, anisotropic)),
         classify(state, gold, bricks, host, nullptr, {},
                  [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
     const auto [low, high] = std::minmax_element(base.samples.begin(), base.samples.end());
@@ -65,9 +68,10 @@ struct Case {
         },
         {}, "fine");
   }
-  static GoldSettings settings_of(const Grid& grid, int rate) {
+  static GoldSettings settings_of(const Grid& grid, int rate, bool anisotropic = false) {
     GoldSettings s{grid, 2, rate, 8, "cubic"};
     s.midrange = true;
+    s.anisotropic = anisotropic;
     return s;
   }
   [[nodiscard]] bool stays(std::size_t i) const {
@@ -135,6 +139,71 @@ BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_phantoms_is_within_the_toleranc
   const ProjectionSet head = simulated(shepp_logan(10), 21, 17, 30);
   for (const double share : {0.08, 0.2})
     BOOST_TEST(check(head, grid_around_axis({16, 16, 12}, 0.9), 8, share) > 0u);
+}
+
+BOOST_AUTO_TEST_CASE(a_field_that_does_not_vary_along_z_is_not_refined_along_z) {
+  ProjectionSet scan = noise_scan(20, 12, 17, 5);
+  const std::int64_t columns = scan.geometry.columns, rows = scan.geometry.rows;
+  for (std::int64_t i = 0; i < scan.size(); ++i)
+    scan.data[static_cast<std::size_t>(i)] =
+        scan.data[static_cast<std::size_t>(i / (rows * columns) * rows * columns + i % columns)];
+  for (const int rate : {4, 8}) {
+    Case c(scan, grid_around_axis({10, 10, 10}, 0.7), rate, 0.1, true);
+    std::size_t refined = 0, across = 0;
+    for (std::size_t i = 0; i < c.decided.size(); ++i) {
+      const LevelTriple& l = c.bricks.level[i];
+      BOOST_TEST(l[0] == 0);
+      refined += l != LevelTriple{0, 0, 0};
+      across += l[1] != l[2];
+    }
+    BOOST_TEST(refined > 20u);
+    BOOST_TEST(across > 0u);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(tiles_of_every_triple_pass_before_closing_and_take_less_than_isotropic_ones) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  const Grid grid = grid_around_axis({16, 16, 16}, 0.8);
+  std::array<double, 2> samples{};
+  for (const bool anisotropic : {false, true}) {
+    Case c(lobes, grid, 8, 0.03, anisotropic);
+    std::vector<std::uint8_t> refined(c.bricks.level.size(), 0);
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      refined[i] = c.bricks.level[i] != LevelTriple{0, 0, 0};
+      samples[anisotropic] += static_cast<double>(c.bricks.samples[i].size());
+    }
+    const MixedVolume open = close_boundaries(c.bricks, Closing::none);
+    c.classify.measure(DeviceField(c.state, open), c.tolerance, refined, "verify");
+    for (std::size_t i = 0; i < refined.size(); ++i)
+      if (refined[i] && *std::max_element(open.level[i].begin(), open.level[i].end()) < 3)
+        BOOST_TEST(static_cast<double>(c.classify.measures()[i].total) <= c.tolerance + rounding(c));
+  }
+  BOOST_TEST(samples[true] > 0);
+  BOOST_TEST(samples[true] < 0.8 * samples[false]);
+}
+
+// Samples are fitted on the bricks that want them; what lies beside those must not show.
+BOOST_AUTO_TEST_CASE(a_tile_does_not_depend_on_what_else_is_asked_for) {
+  const ProjectionSet scan = noise_scan(20, 14, 17, 5);
+  Case c(scan, grid_around_axis({10, 10, 11}, 0.7), 4, 0.2, true);
+  const auto near = c.gold.fine().bricks_near_coverage();
+  c.gold.fine().run(
+      near,
+      [&](GoldStream::Batch& batch) {
+        for (const LevelTriple& level :
+             {LevelTriple{0, 0, 1}, LevelTriple{1, 0, 2}, LevelTriple{0, 2, 2}, LevelTriple{1, 1, 1}}) {
+          std::vector<std::pair<std::int64_t, LevelTriple>> all;
+          for (const std::int64_t brick : batch.bricks()) all.emplace_back(brick, level);
+          const auto together = batch.extract(all);
+          const std::size_t size = together.size() / all.size();
+          for (std::size_t i = 0; i < all.size(); i += 7) {
+            const auto alone = batch.extract({all[i]});
+            BOOST_TEST((std::equal(alone.begin(), alone.end(),
+                                   together.begin() + static_cast<std::ptrdiff_t>(i * size))));
+          }
+        }
+      },
+      {}, "tiles", GoldStream::For::samples);
 }
 
 BOOST_AUTO_TEST_CASE(bounds_of_cells_for_two_rates_are_no_smaller_than_for_one) {

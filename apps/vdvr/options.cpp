@@ -28,7 +28,10 @@ const std::vector<Limited> kBuildLimits{
      {"midrange", "sampled"},
      {"midrange", "sampled"},
      "samples fitted to the trilinear filter, or F at the nodes (default midrange)"},
-    {"levels", {"isotropic", "anisotropic"}, {"isotropic"}, "levels per brick or per axis"},
+    {"levels",
+     {"isotropic", "anisotropic"},
+     {"isotropic", "anisotropic"},
+     "one level per brick, or one per axis of a brick (default anisotropic)"},
     {"storage",
      {"auto", "f32", "u16", "u8"},
      {"auto", "f32", "u16", "u8"},
@@ -244,11 +247,16 @@ PlanSettings plan_settings(const Arguments& args) {
   settings.coefficients =
       args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
   settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
+  settings.levels =
+      args.choice("levels", {"isotropic", "anisotropic"},
+                  paper || build_options(args).closing == Closing::paper ? "isotropic" : "anisotropic");
   settings.granularity = build_options(args).granularity;
   if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
         "coarse");
+  if (settings.levels == "anisotropic" && build_options(args).closing == Closing::paper)
+    throw InputError("--closing paper is defined for --levels isotropic only; or take --closing coarse");
   return settings;
 }
 
@@ -258,7 +266,7 @@ std::string options_json(const Plan& plan, const BuildOptions& build, bool epsil
   j["granularity"] = build.granularity;
   j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = plan.settings.coefficients;
-  j["levels"] = "isotropic";
+  j["levels"] = plan.settings.levels;
   j["storage"] = name_in(kStorage, build.storage);
   j["terms"] = plan.settings.terms;
   j["epsilon_of"] = epsilon_of_max ? "max" : "range";

@@ -27,8 +27,9 @@ struct RateOptions {
 struct PlanSettings {
   std::string coefficients = "midrange";  ///< midrange: samples fitted to the trilinear filter | sampled
   std::string terms =
-      "all";            ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
-  int granularity = 4;  ///< for what is foreseen
+      "all";  ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
+  std::string levels = "anisotropic";  ///< anisotropic: a level per axis | isotropic: one per brick
+  int granularity = 4;                 ///< for what is foreseen
   bool foresee =
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
 };

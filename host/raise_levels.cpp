@@ -1,0 +1,101 @@
+// The rules by which repair raises levels.
+#include "host/raise_levels.hpp"
+
+#include <algorithm>
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Of linear interpolation along one axis.
+float error(const AxisErrors& along, std::size_t axis, int level, int top) {
+  if (level >= std::min(top, AxisErrors::most_levels)) return 0;
+  const auto& e = along.of[axis][at(level)];
+  return std::max(e[0], e[1]);
+}
+
+void rise(std::uint8_t& level, std::uint8_t to) { level = std::max(level, to); }
+
+class Raise {
+ public:
+  Raise(const OpenBricks& bricks, std::int64_t brick, const AxisErrors* along, std::vector<LevelTriple>& to)
+      : bricks_(bricks), brick_(brick), own_(bricks.level[at(brick)]), along_(along), to_(to) {}
+
+  // Bricks that share this part and are coarser along it: what they store there is what was interpolated
+  // from.
+  bool coarser_neighbours(const std::array<int, 3>& side) {
+    bool any = false;
+    for (const std::int64_t j : incident_bricks(bricks_, brick_, side)) {
+      if (j == brick_) continue;
+      const LevelTriple& other = bricks_.level[at(j)];
+      if (!along_) {
+        if (other[0] >= own_[0]) continue;
+        for (std::uint8_t& l : to_[at(j)]) rise(l, static_cast<std::uint8_t>(other[0] + 1));
+        any = true;
+        continue;
+      }
+      for (std::size_t a = 0; a < 3; ++a) {
+        if (side[a] != 1 || other[2 - a] >= own_[2 - a]) continue;
+        rise(to_[at(j)][2 - a], static_cast<std::uint8_t>(other[2 - a] + 1));
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  // The others: what they store elsewhere bears on this part only through its owner.
+  bool others(const std::array<int, 3>& side, int top) {
+    bool any = false;
+    for (const std::int64_t j : incident_bricks(bricks_, brick_, side)) {
+      if (j == brick_) continue;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::uint8_t level = bricks_.level[at(j)][a];
+        if (level >= top) continue;
+        rise(to_[at(j)][a], static_cast<std::uint8_t>(level + 1));
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  // The axis that errs most; where that is not known, the coarsest ones; with isotropic levels, all.
+  bool itself(int top) {
+    const std::uint8_t lowest = *std::min_element(own_.begin(), own_.end());
+    if (lowest >= top) return false;
+    std::size_t worst = 3;
+    float gain = 0;
+    for (std::size_t a = 0; along_ && a < 3; ++a) {
+      const float g = error(*along_, a, own_[2 - a], top) - error(*along_, a, own_[2 - a] + 1, top);
+      if (own_[2 - a] >= top || g <= gain) continue;
+      worst = a;
+      gain = g;
+    }
+    for (std::size_t a = 0; a < 3; ++a)
+      if (worst < 3 ? a == worst : own_[2 - a] == lowest)
+        rise(to_[at(brick_)][2 - a], static_cast<std::uint8_t>(own_[2 - a] + 1));
+    return true;
+  }
+
+ private:
+  const OpenBricks& bricks_;
+  std::int64_t brick_;
+  LevelTriple own_;
+  const AxisErrors* along_;
+  std::vector<LevelTriple>& to_;
+};
+
+}  // namespace
+
+bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated, int top,
+                  const AxisErrors* along, std::vector<LevelTriple>& to) {
+  Raise raise(bricks, brick, along, to);
+  for (int part = 0; part < 27; ++part) {
+    if (!(violated >> part & 1)) continue;
+    const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
+    if (!raise.coarser_neighbours(side) && !raise.itself(top) && !raise.others(side, top)) return false;
+  }
+  return true;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,12 @@
+// A lattice of every spacing-th gold node of a block, per axis: node n of an axis has index n / spacing + reach.
+// Passed by value from host/fit_coefficients.cpp and host/gold_batch.cpp to fit_coefficients.cl and classify.cl.
+#ifndef VDVR_LATTICE_SHAPE_H
+#define VDVR_LATTICE_SHAPE_H
+
+typedef struct {
+  int spacing_x, spacing_y, spacing_z;  // gold nodes
+  int reach_x, reach_y, reach_z;        // of the lattice's samples in the halo
+  int cx, cy, cz;                       // samples per block
+} VdvrLattice;
+
+#endif
