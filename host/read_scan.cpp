@@ -17,6 +17,7 @@
 #include "host/io/hdf5.hpp"
 #include "host/io/limits.hpp"
 #include "host/io/raster_file.hpp"
+#include "host/io/rehearsal.hpp"
 #include "host/io/scan_readers.hpp"
 #include "host/preprocess.hpp"
 #include "vdvr/error.hpp"
@@ -192,7 +193,8 @@ std::string name_of(const fs::path& path, bool folder) {
   return whole.filename().string();
 }
 
-void choose_center(const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan) {
+void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
+                   ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
   InputReport& r = scan.report;
   if (options.center) {
@@ -217,14 +219,46 @@ void choose_center(const io::RawScan& raw, const ScanOptions& options, Projectio
   }
   const double last = static_cast<double>(g.columns) - 0.5;
   if (!(g.center >= -0.5 && g.center <= last)) {
-    const std::string text =
-        fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}", r.name, g.center, last);
+    const std::string text = fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}",
+                                         path.string(), g.center, last);
     if (options.center) throw InputError(text);
     throw FileError(text);
   }
 }
 
+// A description that may name an HDF5 file: by its member, or by a letter of it written as \\u0068.
+bool may_name_hdf5(const fs::path& description) {
+  std::error_code error;
+  if (!fs::is_regular_file(description, error)) return false;
+  constexpr std::uintmax_t largest = 16u << 20;  // the reader refuses a larger one
+  std::string text(std::min(fs::file_size(description, error), largest), '\0');
+  std::ifstream file(description, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text.find("hdf5") != std::string::npos || text.find('\\') != std::string::npos;
+}
+
+bool holds_hdf5(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return may_name_hdf5(path / "scan.json");
+  if (!fs::is_regular_file(path, error)) return false;
+  return is_hdf5(path) || (path.filename() == "scan.json" && may_name_hdf5(path));
+}
+
+// Everything that comes from the files, and nothing kept.
+void read_frames(const fs::path& path, const ScanOptions& options) {
+  bool folder = false;
+  const io::RawScan raw = open_scan(path, options, folder);
+  static_cast<void>(geometry_of(raw, path.string()));
+  require_room(raw, options, path.string());
+  const std::int64_t step = block_views(raw);
+  std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
+  for (const io::Frames* frames : {&raw.projections, &raw.flats, &raw.darks})
+    for (std::int64_t first = 0; first < frames->count; first += step)
+      frames->read(first, std::min(step, frames->count - first), block.data());
+}
+
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+  if (holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   const io::RawScan raw = open_scan(path, options, folder);
   ProjectionSet scan;
@@ -242,7 +276,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
-  choose_center(raw, options, scan);
+  choose_center(path, raw, options, scan);
   return scan;
 }
 

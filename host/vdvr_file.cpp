@@ -16,6 +16,7 @@
 
 #include "host/io/atomic_file.hpp"
 #include "host/io/hdf5_file.hpp"
+#include "host/io/rehearsal.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 
@@ -498,6 +499,27 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
   add(hash, std::span<const std::int64_t>(counts));
 }
 
+VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  const h5::Reader file(path);
+  VdvrFile result;
+  result.file_bytes = file.file_bytes();
+  result.format_version = read_version(file);
+  result.generator = file.text_attribute("/", "generator");
+  read_grid(file, result.volume);
+  const Contents contents = open_contents(file, result.volume);
+  read_step(file, contents, result.volume);
+  check_memory(file, path.string(), contents, max_memory_bytes);
+  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
+  result.certificate = read_certificate(path.string(), result.certificate_json);
+  try {
+    read_volume_data(file, contents, result.volume);
+  } catch (const std::bad_alloc&) {
+    throw ResourceError(
+        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string content_sha256(const MixedVolume& v) {
@@ -554,31 +576,19 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
 }
 
 VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  const h5::Reader file(path);
-  VdvrFile result;
-  result.file_bytes = file.file_bytes();
-  result.format_version = read_version(file);
-  result.generator = file.text_attribute("/", "generator");
-  read_grid(file, result.volume);
-  const Contents contents = open_contents(file, result.volume);
-  read_step(file, contents, result.volume);
-  check_memory(file, path.string(), contents, max_memory_bytes);
-  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
-  result.certificate = read_certificate(path.string(), result.certificate_json);
-  try {
-    read_volume_data(file, contents, result.volume);
-  } catch (const std::bad_alloc&) {
-    throw ResourceError(
-        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
-  }
-  return result;
+  io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+  return read_whole(path, max_memory_bytes);
 }
 
 bool is_vdvr(const std::filesystem::path& path) {
   const h5::Silence silence;
-  try {
+  const auto says_so = [&] {
     const h5::Reader file(path);
     return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
+  };
+  try {
+    io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
+    return says_so();
   } catch (const Error&) {
     return false;
   }

@@ -11,6 +11,12 @@
 namespace vdvr::io {
 namespace {
 
+// After a damaged or half-written file HDF5 1.10 keeps objects that nobody holds a handle to; its exit handler
+// tries a hundred times to close them, prints "infinite loop closing library", or crashes. Every handle here
+// is closed by its owner, so the handler has nothing to do. Before main: only before HDF5's first use does
+// the call have an effect. The same stands in hdf5_file.cpp, since a program may link one without the other.
+[[maybe_unused]] const herr_t without_exit_handler = H5dont_atexit();
+
 // Silences HDF5's printing while it lives: the setting is global to the process and belongs to the host
 // program.
 class Quiet {
