@@ -62,7 +62,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
   if (options.angles_file && !raster)
     throw InputError(path.string() +
                      ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
-  if (folder) return io::open_scan_folder(path);
+  if (folder) return io::open_scan_folder(path, options.max_memory_bytes);
   if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
   if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
   if (is_hdf5(path)) return io::open_hdf5_scan(path);
@@ -75,7 +75,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
     if (path.filename() != "scan.json")
       throw FileError(path.string() + ": a scan's description is named scan.json");
     folder = true;
-    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".");
+    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes);
   }
   throw FileError(path.string() +
                   ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "
@@ -186,6 +186,17 @@ std::string hash_of(const io::RawScan& raw, bool folder) {
   return sha256_of_text(text);
 }
 
+// Length and time of last change: what tells that somebody wrote into a file while it was read.
+std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps_of(const io::RawScan& raw) {
+  std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps;
+  for (const auto& file : raw.files) {
+    std::error_code gone;
+    const std::uintmax_t bytes = fs::file_size(file.second, gone);
+    stamps.emplace_back(bytes, fs::last_write_time(file.second, gone));
+  }
+  return stamps;
+}
+
 std::string name_of(const fs::path& path, bool folder) {
   fs::path whole = fs::absolute(path).lexically_normal();
   if (folder && whole.filename() == "scan.json") whole = whole.parent_path();
@@ -267,8 +278,14 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.report.notes = raw.notes;
   scan.geometry = geometry_of(raw, path.string());
   require_room(raw, options, path.string());
+  const auto before = stamps_of(raw);
   read_samples(raw, scan, progress);
   scan.report.sha256 = hash_of(raw, folder);
+  if (const auto after = stamps_of(raw); after != before) {
+    const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();
+    throw FileError(fmt::format("{}: was changed while it was read; start again once it is whole",
+                                raw.files[static_cast<std::size_t>(changed)].second.string()));
+  }
   if (scan.report.dead_pixels > 0)
     scan.report.notes.push_back(
         fmt::format("{} of {} samples were dead and got the median of their neighbours",

@@ -132,7 +132,7 @@ Volume read_tiff_folder(const fs::path& folder, std::uint64_t max_memory_bytes) 
   const auto files = tiff_files(folder);
   Volume volume;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const io::TiffImage image = io::read_tiff(files[i]);
+    const io::TiffImage image = io::read_tiff(files[i], max_memory_bytes);
     if (i == 0)
       volume =
           empty_volume(folder.string(), {image.columns, image.rows, static_cast<std::int64_t>(files.size())},
@@ -147,7 +147,7 @@ Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
   Volume volume;
   io::TiffStack stack;
   io::read_tiff_stack(
-      path, [&](const io::TiffStack& s) { stack = s; },
+      path, max_memory_bytes, [&](const io::TiffStack& s) { stack = s; },
       [&](std::int64_t index, const io::TiffImage& image) {
         if (index == 0) {
           volume = empty_volume(path.string(), {image.columns, image.rows, stack.images}, max_memory_bytes);

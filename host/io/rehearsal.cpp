@@ -27,9 +27,8 @@ constexpr char done = '0', no_memory = 'm', foreign = 'x';
 
 // Reading at a hundredth of a disk's speed still ends in time; a loop in the library does not.
 constexpr std::uint64_t least_cpu_s = 4, slowest_bytes_per_s = 1u << 20;
-// What HDF5 and the C library take beside the samples.
-constexpr std::uint64_t aside_bytes = 256u << 20;
 
+#if !defined(__SANITIZE_ADDRESS__)  // its shadow alone is terabytes of address space
 std::uint64_t page_bytes() { return static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)); }
 
 std::uint64_t address_space_bytes() {
@@ -37,6 +36,21 @@ std::uint64_t address_space_bytes() {
   std::ifstream("/proc/self/statm") >> pages;
   return pages * page_bytes();
 }
+
+// What HDF5 and the C library take beside the samples.
+constexpr std::uint64_t aside_bytes = 256u << 20;
+
+void limit_memory(std::uint64_t max_memory_bytes) {
+  const std::uint64_t now = address_space_bytes();
+  const auto physical = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * page_bytes();
+  const std::uint64_t more = max_memory_bytes == 0 ? physical : max_memory_bytes;
+  if (now == 0) return;
+  const rlimit memory{now + more + aside_bytes, RLIM_INFINITY};
+  ::setrlimit(RLIMIT_AS, &memory);
+}
+#else
+void limit_memory(std::uint64_t) {}
+#endif
 
 void set_limits(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   std::error_code error;
@@ -46,15 +60,7 @@ void set_limits(const std::filesystem::path& path, std::uint64_t max_memory_byte
   const rlim_t seconds = least_cpu_s + (error ? 0 : file_bytes / slowest_bytes_per_s);
   const rlimit cpu{seconds, seconds + 1};
   ::setrlimit(RLIMIT_CPU, &cpu);
-#if !defined(__SANITIZE_ADDRESS__)  // its shadow alone is terabytes of address space
-  const std::uint64_t now = address_space_bytes();
-  const auto physical = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * page_bytes();
-  const std::uint64_t more = max_memory_bytes == 0 ? physical : max_memory_bytes;
-  if (now > 0) {
-    const rlimit memory{now + more + aside_bytes, RLIM_INFINITY};
-    ::setrlimit(RLIMIT_AS, &memory);
-  }
-#endif
+  limit_memory(max_memory_bytes);
 }
 
 void tell(int to, char how, const std::string& message) {

@@ -46,7 +46,7 @@ void read(const std::filesystem::path& file) {
   try {
     static_cast<void>(read_volume(file, memory_limit));
   } catch (const FileError&) {
-    static_cast<void>(io::read_tiff(file));
+    static_cast<void>(io::read_tiff(file, memory_limit));
   }
 }
 
