@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < frames; ++i) {
     // A volume uploaded anew now and then, as a viewer opens files.
     RenderOptions options;
-    options.mode = RenderMode::mip;
+    options.transfer = transfer_preset("marschner-lobb", 0, 1);
     options.width = options.height = 32;
     options.sampler = i % 2 == 0 ? SamplerKind::buffer : SamplerKind::automatic;
     const ResidentVolume volume(device, file.volume);
