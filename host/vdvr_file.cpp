@@ -576,7 +576,8 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
 }
 
 VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+  if (io::metadata_unchecked(path))
+    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
   return read_whole(path, max_memory_bytes);
 }
 
@@ -587,7 +588,7 @@ bool is_vdvr(const std::filesystem::path& path) {
     return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
   };
   try {
-    io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
+    if (io::metadata_unchecked(path)) io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
     return says_so();
   } catch (const Error&) {
     return false;

@@ -16,4 +16,8 @@ namespace vdvr::io {
 void rehearse(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
               const std::function<void()>& work);
 
+/// True unless the file starts with a superblock of version 2 or later, as a .vdvr of ours does: from then on
+/// HDF5 checks its metadata by checksums.
+bool metadata_unchecked(const std::filesystem::path& path);
+
 }  // namespace vdvr::io
