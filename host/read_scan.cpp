@@ -17,6 +17,7 @@
 #include "host/io/hdf5.hpp"
 #include "host/io/limits.hpp"
 #include "host/io/raster_file.hpp"
+#include "host/io/rehearsal.hpp"
 #include "host/io/scan_readers.hpp"
 #include "host/preprocess.hpp"
 #include "vdvr/error.hpp"
@@ -61,7 +62,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
   if (options.angles_file && !raster)
     throw InputError(path.string() +
                      ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
-  if (folder) return io::open_scan_folder(path);
+  if (folder) return io::open_scan_folder(path, options.max_memory_bytes);
   if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
   if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
   if (is_hdf5(path)) return io::open_hdf5_scan(path);
@@ -74,7 +75,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
     if (path.filename() != "scan.json")
       throw FileError(path.string() + ": a scan's description is named scan.json");
     folder = true;
-    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".");
+    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes);
   }
   throw FileError(path.string() +
                   ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "
@@ -185,6 +186,17 @@ std::string hash_of(const io::RawScan& raw, bool folder) {
   return sha256_of_text(text);
 }
 
+// Length and time of last change: what tells that somebody wrote into a file while it was read.
+std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps_of(const io::RawScan& raw) {
+  std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps;
+  for (const auto& file : raw.files) {
+    std::error_code gone;
+    const std::uintmax_t bytes = fs::file_size(file.second, gone);
+    stamps.emplace_back(bytes, fs::last_write_time(file.second, gone));
+  }
+  return stamps;
+}
+
 std::string name_of(const fs::path& path, bool folder) {
   fs::path whole = fs::absolute(path).lexically_normal();
   if (folder && whole.filename() == "scan.json") whole = whole.parent_path();
@@ -192,7 +204,8 @@ std::string name_of(const fs::path& path, bool folder) {
   return whole.filename().string();
 }
 
-void choose_center(const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan) {
+void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
+                   ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
   InputReport& r = scan.report;
   if (options.center) {
@@ -217,14 +230,46 @@ void choose_center(const io::RawScan& raw, const ScanOptions& options, Projectio
   }
   const double last = static_cast<double>(g.columns) - 0.5;
   if (!(g.center >= -0.5 && g.center <= last)) {
-    const std::string text =
-        fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}", r.name, g.center, last);
+    const std::string text = fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}",
+                                         path.string(), g.center, last);
     if (options.center) throw InputError(text);
     throw FileError(text);
   }
 }
 
+// A description that may name an HDF5 file: by its member, or by a letter of it written as \\u0068.
+bool may_name_hdf5(const fs::path& description) {
+  std::error_code error;
+  if (!fs::is_regular_file(description, error)) return false;
+  constexpr std::uintmax_t largest = 16u << 20;  // the reader refuses a larger one
+  std::string text(std::min(fs::file_size(description, error), largest), '\0');
+  std::ifstream file(description, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text.find("hdf5") != std::string::npos || text.find('\\') != std::string::npos;
+}
+
+bool holds_hdf5(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return may_name_hdf5(path / "scan.json");
+  if (!fs::is_regular_file(path, error)) return false;
+  return is_hdf5(path) || (path.filename() == "scan.json" && may_name_hdf5(path));
+}
+
+// Everything that comes from the files, and nothing kept.
+void read_frames(const fs::path& path, const ScanOptions& options) {
+  bool folder = false;
+  const io::RawScan raw = open_scan(path, options, folder);
+  static_cast<void>(geometry_of(raw, path.string()));
+  require_room(raw, options, path.string());
+  const std::int64_t step = block_views(raw);
+  std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
+  for (const io::Frames* frames : {&raw.projections, &raw.flats, &raw.darks})
+    for (std::int64_t first = 0; first < frames->count; first += step)
+      frames->read(first, std::min(step, frames->count - first), block.data());
+}
+
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+  if (holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   const io::RawScan raw = open_scan(path, options, folder);
   ProjectionSet scan;
@@ -233,8 +278,14 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.report.notes = raw.notes;
   scan.geometry = geometry_of(raw, path.string());
   require_room(raw, options, path.string());
+  const auto before = stamps_of(raw);
   read_samples(raw, scan, progress);
   scan.report.sha256 = hash_of(raw, folder);
+  if (const auto after = stamps_of(raw); after != before) {
+    const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();
+    throw FileError(fmt::format("{}: was changed while it was read; start again once it is whole",
+                                raw.files[static_cast<std::size_t>(changed)].second.string()));
+  }
   if (scan.report.dead_pixels > 0)
     scan.report.notes.push_back(
         fmt::format("{} of {} samples were dead and got the median of their neighbours",
@@ -242,7 +293,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
-  choose_center(raw, options, scan);
+  choose_center(path, raw, options, scan);
   return scan;
 }
 

@@ -16,6 +16,7 @@
 
 #include "host/io/atomic_file.hpp"
 #include "host/io/hdf5_file.hpp"
+#include "host/io/rehearsal.hpp"
 #include "host/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
@@ -255,8 +256,9 @@ constexpr const char* kTotals = "/brick_total";
 
 void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
   const Index3 b = v.bricks();
-  if (const auto p = size_problem(kTotals, totals.size(), v.level.size()))
-    throw InputError(fmt::format("not written: {}: {}", p->where, p->what));
+  if (totals.size() != v.level.size())
+    throw InputError(fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(),
+                                 v.level.size()));
   file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
 }
 
@@ -352,6 +354,28 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
   add(hash, std::span<const std::int64_t>(counts));
 }
 
+VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  const h5::Reader file(path);
+  VdvrFile result;
+  result.file_bytes = file.file_bytes();
+  result.format_version = read_version(file);
+  result.generator = file.text_attribute("/", "generator");
+  read_grid(file, result.volume);
+  const Contents contents = open_contents(file, result.volume);
+  read_step(file, contents, result.volume);
+  check_memory(file, path.string(), contents, max_memory_bytes);
+  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
+  result.certificate = read_certificate(path.string(), result.certificate_json);
+  try {
+    read_volume_data(file, contents, result.volume);
+    read_totals(file, result.volume, result.certificate);
+  } catch (const std::bad_alloc&) {
+    throw ResourceError(
+        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string content_sha256(const MixedVolume& v) {
@@ -409,32 +433,20 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
 }
 
 VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  const h5::Reader file(path);
-  VdvrFile result;
-  result.file_bytes = file.file_bytes();
-  result.format_version = read_version(file);
-  result.generator = file.text_attribute("/", "generator");
-  read_grid(file, result.volume);
-  const Contents contents = open_contents(file, result.volume);
-  read_step(file, contents, result.volume);
-  check_memory(file, path.string(), contents, max_memory_bytes);
-  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
-  result.certificate = read_certificate(path.string(), result.certificate_json);
-  try {
-    read_volume_data(file, contents, result.volume);
-    read_totals(file, result.volume, result.certificate);
-  } catch (const std::bad_alloc&) {
-    throw ResourceError(
-        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
-  }
-  return result;
+  if (io::metadata_unchecked(path))
+    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+  return read_whole(path, max_memory_bytes);
 }
 
 bool is_vdvr(const std::filesystem::path& path) {
   const h5::Silence silence;
-  try {
+  const auto says_so = [&] {
     const h5::Reader file(path);
     return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
+  };
+  try {
+    if (io::metadata_unchecked(path)) io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
+    return says_so();
   } catch (const Error&) {
     return false;
   }

@@ -9,6 +9,7 @@
 
 #include "host/io/hdf5.hpp"
 #include "host/io/limits.hpp"
+#include "host/io/rehearsal.hpp"
 #include "host/io/scan_readers.hpp"
 #include "host/io/tiff.hpp"
 #include "vdvr/error.hpp"
@@ -131,7 +132,7 @@ Volume read_tiff_folder(const fs::path& folder, std::uint64_t max_memory_bytes) 
   const auto files = tiff_files(folder);
   Volume volume;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const io::TiffImage image = io::read_tiff(files[i]);
+    const io::TiffImage image = io::read_tiff(files[i], max_memory_bytes);
     if (i == 0)
       volume =
           empty_volume(folder.string(), {image.columns, image.rows, static_cast<std::int64_t>(files.size())},
@@ -146,7 +147,7 @@ Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
   Volume volume;
   io::TiffStack stack;
   io::read_tiff_stack(
-      path, [&](const io::TiffStack& s) { stack = s; },
+      path, max_memory_bytes, [&](const io::TiffStack& s) { stack = s; },
       [&](std::int64_t index, const io::TiffImage& image) {
         if (index == 0) {
           volume = empty_volume(path.string(), {image.columns, image.rows, stack.images}, max_memory_bytes);
@@ -155,6 +156,33 @@ Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
         check_slice(fmt::format("{}, image {}", path.string(), index), volume.grid, image);
         append_samples(path.string(), volume, image.samples);
       });
+  return volume;
+}
+
+Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
+  const io::Hdf5File file = io::Hdf5File::open(path);
+  const io::Hdf5Dataset data = file.dataset(dataset);
+  const auto& shape = data.shape();
+  if (shape.size() != 3)
+    throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name(), shape.size()));
+  Volume volume = empty_volume(data.name(), {shape[2], shape[1], shape[0]}, max_memory_bytes);
+  read_hdf5_grid(file, dataset, data.name(), volume.grid);
+  const std::array<std::int64_t, 2> plane{shape[1], shape[2]};
+  const std::uint64_t plane_bytes = io::checked_bytes(plane, sizeof(double), data.name());
+  // Slabs, so that a compressed chunk many slices deep is not inflated once a slice.
+  const auto depth =
+      std::clamp<std::int64_t>(static_cast<std::int64_t>(kSlabBytes / plane_bytes), 1, shape[0]);
+  const std::array<std::int64_t, 3> slab_shape{depth, shape[1], shape[2]};
+  const std::uint64_t bytes = io::checked_bytes(slab_shape, sizeof(double), data.name());
+  io::require_memory(bytes, max_memory_bytes, data.name());
+  std::vector<double> slab(bytes / sizeof(double));
+  for (std::int64_t z = 0; z < shape[0]; z += depth) {
+    const std::array<std::int64_t, 3> start{z, 0, 0},
+        count{std::min(depth, shape[0] - z), shape[1], shape[2]};
+    slab.resize(static_cast<std::size_t>(count[0] * count[1] * count[2]));
+    data.read(start, count, slab.data());
+    append_samples(data.name(), volume, slab);
+  }
   return volume;
 }
 
@@ -184,30 +212,9 @@ bool is_tiff_folder(const fs::path& path) {
 }
 
 Volume read_hdf5_volume(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
-  const io::Hdf5File file = io::Hdf5File::open(path);
-  const io::Hdf5Dataset data = file.dataset(dataset);
-  const auto& shape = data.shape();
-  if (shape.size() != 3)
-    throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name(), shape.size()));
-  Volume volume = empty_volume(data.name(), {shape[2], shape[1], shape[0]}, max_memory_bytes);
-  read_hdf5_grid(file, dataset, data.name(), volume.grid);
-  const std::array<std::int64_t, 2> plane{shape[1], shape[2]};
-  const std::uint64_t plane_bytes = io::checked_bytes(plane, sizeof(double), data.name());
-  // Slabs, so that a compressed chunk many slices deep is not inflated once a slice.
-  const auto depth =
-      std::clamp<std::int64_t>(static_cast<std::int64_t>(kSlabBytes / plane_bytes), 1, shape[0]);
-  const std::array<std::int64_t, 3> slab_shape{depth, shape[1], shape[2]};
-  const std::uint64_t bytes = io::checked_bytes(slab_shape, sizeof(double), data.name());
-  io::require_memory(bytes, max_memory_bytes, data.name());
-  std::vector<double> slab(bytes / sizeof(double));
-  for (std::int64_t z = 0; z < shape[0]; z += depth) {
-    const std::array<std::int64_t, 3> start{z, 0, 0},
-        count{std::min(depth, shape[0] - z), shape[1], shape[2]};
-    slab.resize(static_cast<std::size_t>(count[0] * count[1] * count[2]));
-    data.read(start, count, slab.data());
-    append_samples(data.name(), volume, slab);
-  }
-  return volume;
+  io::rehearse(path, max_memory_bytes,
+               [&] { static_cast<void>(read_hdf5_dataset(path, dataset, max_memory_bytes)); });
+  return read_hdf5_dataset(path, dataset, max_memory_bytes);
 }
 
 Volume read_tiff_volume(const fs::path& path, std::uint64_t max_memory_bytes) {

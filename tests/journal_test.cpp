@@ -114,6 +114,14 @@ BOOST_AUTO_TEST_CASE(flipped_bit_anywhere_ends_the_journal_there) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(zeros_behind_the_last_record_are_no_records) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a.journal";
+  write_journal(path);
+  overwrite(path, bytes_of(path) + std::string(4096, '\0'));
+  BOOST_TEST((resume(path) == kRecords));
+}
+
 BOOST_AUTO_TEST_CASE(records_in_another_order_are_not_taken) {
   const TemporaryFolder folder;
   const auto path = folder / "o.journal";

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <utility>
 
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/progress.hpp"
 #include "host/io/atomic_file.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -54,10 +54,10 @@ std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions
   auto journal = std::make_unique<Journal>(journal_path(output), resume);
   for (const auto& file : outputs) io::remove_leftovers(file);
   if (!common.quiet && resume != journal->found())
-    fmt::print(stderr, "vdvr {}: {} {}\n", args.command(), journal->path().string(),
-               resume
-                   ? "does not exist: nothing to resume, starting afresh"
-                   : "is of an unfinished build, which --resume would have continued: it will be replaced");
+    say(fmt::format(
+        "vdvr {}: {} {}\n", args.command(), journal->path().string(),
+        resume ? "does not exist: nothing to resume, starting afresh"
+               : "is of an unfinished build, which --resume would have continued: it will be replaced"));
   return journal;
 }
 
@@ -101,15 +101,15 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
 
 int certificate_exit_code(const char* command, const Certificate& certificate) {
   if (certificate.comparison) {
-    fmt::print(stderr, "vdvr {}: a volume for comparison: nothing is certified\n", command);
+    say(fmt::format("vdvr {}: a volume for comparison: nothing is certified\n", command));
     return 1;
   }
   if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
-  fmt::print(stderr,
-             "vdvr {}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
-             "render with "
-             "--sampler buffer, or ask for a larger epsilon\n",
-             command);
+  say(fmt::format(
+      "vdvr {}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
+      "render with "
+      "--sampler buffer, or ask for a larger epsilon\n",
+      command));
   return 1;
 }
 

@@ -55,7 +55,7 @@ std::string as_message(const Error& error) {
 }
 
 int fail(const std::string& who, const std::string& message, int code) {
-  fmt::print(stderr, "{}: {}\n", who, message);
+  say(fmt::format("{}: {}\n", who, message));
   return code;
 }
 

@@ -31,6 +31,12 @@ void catch_signals() {
   action.sa_flags = SA_RESTART;  // reads and writes go on; the next report stops the work
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+void say(const std::string& text) {
+  std::fputs(text.c_str(), stderr);
+  std::fflush(stderr);
 }
 
 void throw_if_interrupted() {
@@ -46,7 +52,7 @@ Progress ProgressLine::callback() {
 
 void ProgressLine::clear() {
   const std::scoped_lock lock(mutex_);
-  if (drawn_) fmt::print(stderr, "\r\033[K");
+  if (drawn_) say("\r\033[K");
   drawn_ = false;
 }
 
@@ -75,7 +81,7 @@ void ProgressLine::report(const std::string& stage, double fraction) {
   if (terminal_) {
     draw(stage, std::clamp(fraction, 0.0, 1.0), now);
   } else if (is_new) {
-    fmt::print(stderr, "vdvr {}: {}\n", command_, stage);
+    say(fmt::format("vdvr {}: {}\n", command_, stage));
   }
 }
 
@@ -90,9 +96,8 @@ void ProgressLine::draw(const std::string& stage, double fraction, Clock::time_p
     rate = fmt::format("  {:.3g} %/s  {} left", 100 * fraction / elapsed,
                        time_text(elapsed * (1 - fraction) / fraction));
   }
-  fmt::print(stderr, "\r\033[K{} {:<14} [{}{}] {:3.0f} %{}", command_, stage, std::string(full, '#'),
-             std::string(width - full, '.'), 100 * fraction, rate);
-  std::fflush(stderr);
+  say(fmt::format("\r\033[K{} {:<14} [{}{}] {:3.0f} %{}", command_, stage, std::string(full, '#'),
+                  std::string(width - full, '.'), 100 * fraction, rate));
   drawn_ = true;
   drawn_at_ = now;
 }

@@ -11,8 +11,11 @@
 
 namespace vdvr::cli {
 
-/// Installs the handlers of SIGINT and SIGTERM, which only take note; see throw_if_interrupted.
+/// Installs the handlers of SIGINT and SIGTERM, which only take note; see throw_if_interrupted. A pipe that
+/// nobody reads any more is a failing write, not the end of the process.
 void catch_signals();
+/// Writes to stderr. That nobody reads it is no reason to stop.
+void say(const std::string& text);
 /// Throws Interrupted (130 or 143) once a signal has come. Called by every progress report and before every
 /// output.
 void throw_if_interrupted();

@@ -25,7 +25,8 @@ void sync_path(const std::filesystem::path& path, int flags) {
   const int failed = ::fsync(fd);
   const int why = errno;
   ::close(fd);
-  if (failed != 0 && why == ENOSPC) throw ResourceError(fmt::format("{}: disk full", path.string()));
+  if (failed != 0 && (why == ENOSPC || why == EDQUOT || why == EIO))
+    throw ResourceError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(why)));
 }
 
 }  // namespace

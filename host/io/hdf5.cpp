@@ -11,6 +11,13 @@
 namespace vdvr::io {
 namespace {
 
+// After a damaged or half-written file HDF5 1.10 keeps objects that nobody holds a handle to; its exit
+// handler tries a hundred times to close them, prints "infinite loop closing library", or crashes. Every
+// handle here is closed by its owner, so the handler has nothing to do. Before main: only before HDF5's first
+// use does the call have an effect. The same stands in hdf5_file.cpp, since a program may link one without
+// the other.
+[[maybe_unused]] const herr_t without_exit_handler = H5dont_atexit();
+
 // Silences HDF5's printing while it lives: the setting is global to the process and belongs to the host
 // program.
 class Quiet {
@@ -51,7 +58,13 @@ Hdf5Handle no_external_links() {
   return list;
 }
 
-std::vector<std::string> read_strings(hid_t object, hid_t type, hid_t space, bool attribute) {
+// What is there but cannot be read is damage, not absence: `what` names it.
+[[noreturn]] void refuse_text(const std::string& what) {
+  throw FileError(fmt::format("{}: cannot be read as text, damaged{}", what, last_error()));
+}
+
+std::vector<std::string> read_strings(hid_t object, hid_t type, hid_t space, bool attribute,
+                                      const std::string& what) {
   const hssize_t n = H5Sget_simple_extent_npoints(space);
   constexpr hssize_t most = 4096;  // names and units; a list longer than that is not one
   if (n <= 0 || n > most) return {};
@@ -64,7 +77,7 @@ std::vector<std::string> read_strings(hid_t object, hid_t type, hid_t space, boo
     H5Tset_cset(memory.id(), H5Tget_cset(type));
     const herr_t rc = attribute ? H5Aread(object, memory.id(), text.data())
                                 : H5Dread(object, memory.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data());
-    if (rc < 0) return {};
+    if (rc < 0) refuse_text(what);
     for (const char* t : text) strings.emplace_back(t ? t : "");
     H5Dvlen_reclaim(memory.id(), space, H5P_DEFAULT, text.data());
     return strings;
@@ -75,7 +88,7 @@ std::vector<std::string> read_strings(hid_t object, hid_t type, hid_t space, boo
   std::vector<char> text(size * count);
   const herr_t rc = attribute ? H5Aread(object, type, text.data())
                               : H5Dread(object, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data());
-  if (rc < 0) return {};
+  if (rc < 0) refuse_text(what);
   for (std::size_t i = 0; i < count; ++i) {
     std::string one(text.data() + i * size, size);
     one.erase(std::min(one.find('\0'), one.size()));
@@ -225,7 +238,7 @@ std::optional<std::string> Hdf5File::text(const std::string& object) const {
   if (!handle.valid() || H5Iget_type(handle.id()) != H5I_DATASET) return std::nullopt;
   const Hdf5Handle type(H5Dget_type(handle.id()), H5Tclose), space(H5Dget_space(handle.id()), H5Sclose);
   if (H5Tget_class(type.id()) != H5T_STRING) return std::nullopt;
-  const auto strings = read_strings(handle.id(), type.id(), space.id(), false);
+  const auto strings = read_strings(handle.id(), type.id(), space.id(), false, named(object));
   if (strings.empty()) return std::nullopt;
   return strings.front();
 }
@@ -239,7 +252,8 @@ std::optional<std::vector<std::string>> Hdf5File::text_attribute(const std::stri
   if (!attribute.valid()) return std::nullopt;
   const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose), space(H5Aget_space(attribute.id()), H5Sclose);
   if (H5Tget_class(type.id()) != H5T_STRING) return std::nullopt;
-  return read_strings(attribute.id(), type.id(), space.id(), true);
+  return read_strings(attribute.id(), type.id(), space.id(), true,
+                      fmt::format("{}: attribute '{}'", named(object), name));
 }
 
 std::optional<double> Hdf5File::number_attribute(const std::string& object, const std::string& name) const {
@@ -304,8 +318,11 @@ void Hdf5File::write(const std::string& object, std::span<const std::int64_t> sh
   const Hdf5Handle data(H5Dcreate2(file_.id(), object.c_str(), H5T_IEEE_F32LE, space.id(), H5P_DEFAULT,
                                    creation.id(), H5P_DEFAULT),
                         H5Dclose);
-  if (!data.valid() || H5Dwrite(data.id(), H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
-    throw ResourceError(fmt::format("{}: cannot be written{}", named(object), last_error()));
+  // Chunks wait in a cache until the dataset is closed, where a full disk would go unnoticed.
+  if (!data.valid() || H5Dwrite(data.id(), H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0 ||
+      H5Dflush(data.id()) < 0)
+    throw ResourceError(
+        fmt::format("{}: cannot be written{}; is the disk full?", named(object), last_error()));
 }
 
 void Hdf5File::write(const std::string& object, std::span<const double> values) {
@@ -319,8 +336,10 @@ void Hdf5File::write(const std::string& object, std::span<const double> values) 
                                    creation.id(), H5P_DEFAULT),
                         H5Dclose);
   if (!data.valid() ||
-      H5Dwrite(data.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
-    throw ResourceError(fmt::format("{}: cannot be written{}", named(object), last_error()));
+      H5Dwrite(data.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0 ||
+      H5Dflush(data.id()) < 0)
+    throw ResourceError(
+        fmt::format("{}: cannot be written{}; is the disk full?", named(object), last_error()));
 }
 
 void Hdf5File::write_attribute(const std::string& object, const std::string& name, const std::string& text) {

@@ -240,7 +240,9 @@ void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t s
   const Handle dataset(
       H5Dcreate2(file_.get(), path.c_str(), stored, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
       H5Dclose);
-  if (!dataset || H5Dwrite(dataset.get(), given, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
+  // Chunks wait in a cache until the dataset is closed, where a full disk would go unnoticed.
+  if (!dataset || H5Dwrite(dataset.get(), given, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0 ||
+      H5Dflush(dataset.get()) < 0)
     fail(fmt::format("{} cannot be written", path));
 }
 

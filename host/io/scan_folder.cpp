@@ -137,8 +137,8 @@ class Description {
 };
 
 // TIFF files as frames, all of one size.
-Frames tiff_frames(const fs::path& folder, const std::vector<std::string>& names, std::int64_t rows,
-                   std::int64_t columns) {
+Frames tiff_frames(const fs::path& folder, const std::vector<std::string>& names, const RawScan& scan) {
+  const std::int64_t rows = scan.rows, columns = scan.columns;
   Frames frames;
   frames.count = static_cast<std::int64_t>(names.size());
   const auto list = std::make_shared<const std::vector<std::string>>(names);
@@ -171,7 +171,7 @@ Frames listed_frames(const Description& about, const char* key, RawScan& scan) {
         key));
   const auto names = about.matches(key);
   for (const auto& name : names) use_file(scan, about.folder(), name);
-  return tiff_frames(about.folder(), names, scan.rows, scan.columns);
+  return tiff_frames(about.folder(), names, scan);
 }
 
 // The angles: a file of numbers or a list, cut by angle_range.
@@ -190,14 +190,15 @@ std::vector<double> listed_angles(const Description& about, RawScan& scan) {
   return {angles.begin() + first, angles.begin() + end};
 }
 
-RawScan open_tiffs(const Description& about, std::vector<std::string>& names) {
+RawScan open_tiffs(const Description& about, std::uint64_t max_memory_bytes,
+                   std::vector<std::string>& names) {
   RawScan scan;
   names = about.matches("projections");
-  const TiffImage first = read_tiff(about.folder() / names.front());
+  const TiffImage first = read_tiff(about.folder() / names.front(), max_memory_bytes);
   scan.rows = first.rows;
   scan.columns = first.columns;
   scan.integer = first.is_integer;
-  scan.projections = tiff_frames(about.folder(), names, scan.rows, scan.columns);
+  scan.projections = tiff_frames(about.folder(), names, scan);
   scan.counts = true;
   if (about.has("description")) {
     if (about.text("description") != "line integrals")
@@ -260,7 +261,7 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a < b;  // equal but for leading zeros
 }
 
-RawScan open_scan_folder(const fs::path& folder) {
+RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes) {
   const Description about(folder);
   if (about.has("projections") == about.has("hdf5")) about.fail("needs one of 'projections' and 'hdf5'");
   RawScan scan;
@@ -274,7 +275,7 @@ RawScan open_scan_folder(const fs::path& folder) {
     scan.files.clear();
     use_file(scan, folder, name);
   } else {
-    scan = open_tiffs(about, names);
+    scan = open_tiffs(about, max_memory_bytes, names);
   }
   scan.format = "scan.json";
   use_file(scan, folder, "scan.json");

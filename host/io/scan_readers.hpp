@@ -12,8 +12,9 @@ namespace vdvr::io {
 /// Data Exchange (/exchange/data) or NXtomo. host/io/hdf5_scan.cpp. Throws FileError.
 RawScan open_hdf5_scan(const std::filesystem::path& path);
 
-/// A folder's scan.json. host/io/scan_folder.cpp. Throws FileError.
-RawScan open_scan_folder(const std::filesystem::path& folder);
+/// A folder's scan.json. The first frame is read to know its size, within `max_memory_bytes` (0: no limit).
+/// host/io/scan_folder.cpp. Throws FileError, ResourceError.
+RawScan open_scan_folder(const std::filesystem::path& folder, std::uint64_t max_memory_bytes);
 
 /// A MetaImage or NRRD stack [angle][v][u] of line integrals. host/io/raster_scan.cpp. Throws FileError.
 RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file);

@@ -33,8 +33,8 @@ struct Close {
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& path, bool several = false)
-      : path_(path.string()), several_(several) {
+  Reader(const std::filesystem::path& path, std::uint64_t max_memory_bytes, bool several = false)
+      : path_(path.string()), limit_(max_memory_bytes), several_(several) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) throw FileError(path_ + ": no such file");
     file_ = path_;
@@ -44,6 +44,10 @@ class Reader {
                                                                                    &TIFFOpenOptionsFree);
     TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_message, &message_);
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), ignore_message, nullptr);
+    // libtiff itself holds tables and packed strips, none longer than the file but for its own small buffers;
+    // samples go into memory of ours, which read_header asks for.
+    constexpr std::uint64_t own_buffers = 64u << 20;
+    TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), static_cast<tmsize_t>(file_bytes_ + own_buffers));
     tiff_.reset(TIFFOpenExt(path.c_str(), "rm", options.get()));
     if (!tiff_) fail("cannot be opened as TIFF");
     read_header();
@@ -114,7 +118,7 @@ class Reader {
     const std::uint64_t ratio = tag(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE ? 1 : tightest;
     if (bytes / ratio > file_bytes_)
       fail(fmt::format("is truncated: {} samples in {} bytes", shape_text(shape), file_bytes_));
-    require_memory(checked_bytes(shape, sizeof(double), path_), 0, path_);
+    require_memory(checked_bytes(shape, sizeof(double), path_), limit_, path_);
   }
 
   template <typename T>
@@ -178,6 +182,7 @@ class Reader {
   }
 
   std::string path_, file_, message_;
+  std::uint64_t limit_ = 0;
   bool several_ = false;
   std::uintmax_t file_bytes_ = 0;
   std::unique_ptr<TIFF, Close> tiff_;
@@ -187,11 +192,14 @@ class Reader {
 
 }  // namespace
 
-TiffImage read_tiff(const std::filesystem::path& path) { return Reader(path).read(); }
+TiffImage read_tiff(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  return Reader(path, max_memory_bytes).read();
+}
 
-void read_tiff_stack(const std::filesystem::path& path, const std::function<void(const TiffStack&)>& begin,
+void read_tiff_stack(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                     const std::function<void(const TiffStack&)>& begin,
                      const std::function<void(std::int64_t, TiffImage)>& take) {
-  Reader reader(path, true);
+  Reader reader(path, max_memory_bytes, true);
   const TiffStack stack = reader.stack();
   begin(stack);
   for (std::int64_t i = 0; i < stack.images; ++i) {

@@ -19,7 +19,7 @@ struct TiffImage {
 
 /// Throws FileError: missing, not TIFF, truncated, several images, several samples per pixel, unsupported
 /// type.
-TiffImage read_tiff(const std::filesystem::path& path);
+TiffImage read_tiff(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
 /// What a file of several images says about itself.
 struct TiffStack {
@@ -29,7 +29,8 @@ struct TiffStack {
 };
 /// Hands out every image of a file in order. `begin` is called once, before the first. Throws FileError as
 /// read_tiff, also where images differ in size.
-void read_tiff_stack(const std::filesystem::path& path, const std::function<void(const TiffStack&)>& begin,
+void read_tiff_stack(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                     const std::function<void(const TiffStack&)>& begin,
                      const std::function<void(std::int64_t index, TiffImage image)>& take);
 
 }  // namespace vdvr::io

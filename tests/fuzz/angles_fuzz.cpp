@@ -1,0 +1,27 @@
+// The list of angles beside a stack.
+#include "tests/fuzz/target.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "vdvr/read_scan.hpp"
+
+namespace vdvr::fuzz {
+namespace {
+
+std::vector<std::string> seeds(const std::filesystem::path& folder) {
+  std::ofstream(folder / "stack.mha")
+      << "NDims = 3\nBinaryDataByteOrderMSB = False\nDimSize = 3 1 4\nElementType = MET_UCHAR\n"
+         "ElementDataFile = LOCAL\nabcdefghijkl";
+  return {"# degrees\n0 45\n90, 135\n", "0\n4.5e1\n-90\n+135.0 # the last\n"};
+}
+
+void read(const std::filesystem::path& file) {
+  ScanOptions options;
+  options.max_memory_bytes = memory_limit;
+  options.angles_file = file;
+  static_cast<void>(read_scan(file.parent_path() / "stack.mha", options));
+}
+
+}  // namespace
+
+const Target fuzz_target{"angles.txt", true, seeds, read};
+
+}  // namespace vdvr::fuzz

@@ -1,0 +1,42 @@
+// Data Exchange in HDF5: as others write it, compressed, and as we write it.
+#include "tests/fuzz/seeds.hpp"
+#include "tests/fuzz/target.hpp"
+#include "tests/support/scan_files.hpp"
+
+namespace vdvr::fuzz {
+namespace {
+
+std::vector<std::string> seeds(const std::filesystem::path& folder) {
+  const auto path = folder / "seed.h5", ours = folder / "ours.h5";
+  support::write_exchange(path, {});
+  std::vector<std::string> all{support::bytes_of(path), in_layout(path, true)};
+  write_data_exchange(ours, read_scan(path));
+  all.push_back(support::bytes_of(ours));
+  {
+    support::Hdf5Writer file(path);
+    file.group("/exchange");
+    write_compressed(file.id(), "/exchange/data", {support::K, support::V, support::U},
+                     support::raw_counts());
+    file.attribute("/exchange/data", "axes", "theta:y:x");
+    file.dataset("/exchange/theta", {support::K}, {0, 45, 90, 135}, H5T_IEEE_F64LE);
+    file.attribute("/exchange/theta", "units", "degrees");
+    write_compressed(file.id(), "/exchange/data_white", {2, support::V, support::U},
+                     std::vector<double>(2 * support::V * support::U, 10100));
+    write_compressed(file.id(), "/exchange/data_dark", {2, support::V, support::U},
+                     std::vector<double>(2 * support::V * support::U, 100));
+  }
+  all.push_back(support::bytes_of(path));
+  return all;
+}
+
+void read(const std::filesystem::path& file) {
+  ScanOptions options;
+  options.max_memory_bytes = memory_limit;
+  static_cast<void>(read_scan(file, options));
+}
+
+}  // namespace
+
+const Target fuzz_target{"scan.h5", false, seeds, read};
+
+}  // namespace vdvr::fuzz

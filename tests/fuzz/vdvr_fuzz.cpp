@@ -1,0 +1,38 @@
+// The certified volume: as written, with integer samples, and rewritten in the old HDF5 layout, where a
+// damaged byte of metadata meets no checksum. Read as the commands do: the content hash is compared.
+#include "tests/fuzz/seeds.hpp"
+#include "tests/fuzz/target.hpp"
+#include "tests/support/certificates.hpp"
+#include "tests/support/mixed_volumes.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/vdvr_file.hpp"
+
+namespace vdvr::fuzz {
+namespace {
+
+std::vector<std::string> seeds(const std::filesystem::path& folder) {
+  const auto path = folder / "seed.vdvr";
+  const MixedVolume floats = support::random_mixed({{5, 4, 3}, {0, 1, 2}, {1, 1, 1}, "mm"}, 2, 4,
+                                                   {{0, 0, 0}, {1, 1, 1}, {0, 2, 1}}, 5);
+  std::vector<std::string> all;
+  for (const MixedVolume& v :
+       {floats, support::in_types(floats, {SampleType::u16, SampleType::u8, SampleType::u16})}) {
+    write_vdvr(path, v, support::full_certificate());
+    all.push_back(support::bytes_of(path));
+    all.push_back(in_layout(path, false));
+  }
+  return all;
+}
+
+void read(const std::filesystem::path& file) {
+  if (!is_vdvr(file)) throw FileError(file.string() + ": is no certified volume");
+  const VdvrFile read = read_vdvr(file, memory_limit);
+  if (content_sha256(read.volume) != read.certificate.content_sha256)
+    throw MismatchError(file.string() + ": its content is not what its certificate was made for");
+}
+
+}  // namespace
+
+const Target fuzz_target{"volume.vdvr", false, seeds, read};
+
+}  // namespace vdvr::fuzz
