@@ -14,8 +14,8 @@ struct ErrorMeasure {
   /// paper registers volumes for its Fig. 3: a wrong offset or gain does not count.
   double rms_normalised = 0;
   double max = 0;
-  double p99 = 0;           ///< 99 of 100 values err by no more
-  double mean_error = 0;    ///< mean of value - truth
+  double p99 = 0;              ///< 99 of 100 values err by no more
+  double mean_error = 0;       ///< mean of value - truth
   double deviation_ratio = 1;  ///< standard deviation of the values over that of the truth
 };
 

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kWidth = 760, kHeight = 430, kLeft = 76, kRight = 190, kTop = 40, kBottom = 54;
 // Apart in lightness as well as in hue.
-constexpr std::array<const char*, 6> kColours{"#0a4f9e", "#c8102e", "#000000", "#d98200", "#4c8c2b", "#7b4fa3"};
+constexpr std::array<const char*, 6> kColours{"#0a4f9e", "#c8102e", "#000000",
+                                              "#d98200", "#4c8c2b", "#7b4fa3"};
 
 struct Axis {
   double low = 0, high = 1, first = 0, length = 1;  ///< first: where low lies on the page
@@ -42,7 +43,8 @@ std::vector<double> marks_of(const Axis& axis) {
     return marks;
   }
   const double step = step_for(axis.high - axis.low);
-  for (double k = std::ceil(axis.low / step); k * step <= axis.high + 1e-9 * step; ++k) marks.push_back(k * step);
+  for (double k = std::ceil(axis.low / step); k * step <= axis.high + 1e-9 * step; ++k)
+    marks.push_back(k * step);
   return marks;
 }
 
@@ -76,8 +78,8 @@ std::array<Axis, 2> axes_for(const LinePlot& plot) {
 }
 
 std::string line(double x0, double y0, double x1, double y1, const char* colour) {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\"/>\n", x0, y0,
-                     x1, y1, colour);
+  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\"/>\n", x0,
+                     y0, x1, y1, colour);
 }
 std::string label(double x, double y, const char* anchor, const std::string& text) {
   return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor,
@@ -97,8 +99,9 @@ std::string frame_svg(const LinePlot& plot, const Axis& x, const Axis& y) {
   }
   out += line(kLeft, bottom, right, bottom, "#222") + line(kLeft, kTop, kLeft, bottom, "#222");
   out += label((kLeft + right) / 2, kHeight - 12, "middle", plot.x_label);
-  out += fmt::format("<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                     (kTop + bottom) / 2, escaped(plot.y_label));
+  out +=
+      fmt::format("<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                  (kTop + bottom) / 2, escaped(plot.y_label));
   return out + fmt::format("<text x=\"{:.1f}\" y=\"22\" font-weight=\"bold\">{}</text>\n", kLeft,
                            escaped(plot.title));
 }
@@ -113,15 +116,18 @@ std::string curve_svg(const LinePlot& plot, std::size_t index, const Axis& x, co
     path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", x.at(p[0]), y.at(p[1]));
     if (plot.marks)
       dots += fmt::format(
-          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.2\" fill=\"{}\"><title>{}: {:.6g}, {:.6g}</title></circle>\n",
+          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.2\" fill=\"{}\"><title>{}: {:.6g}, "
+          "{:.6g}</title></circle>\n",
           x.at(p[0]), y.at(p[1]), colour, escaped(curve.label), p[0], p[1]);
   }
   const double key = kTop + 12 + 22 * static_cast<double>(index), left = kWidth - kRight + 14;
-  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n", path, colour, dash) +
+  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n", path, colour,
+                     dash) +
          dots +
-         fmt::format("<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{2:.1f}\" y2=\"{1:.1f}\" stroke=\"{3}\" "
-                     "stroke-width=\"2\"{4}/>\n",
-                     left, key, left + 24, colour, dash) +
+         fmt::format(
+             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{2:.1f}\" y2=\"{1:.1f}\" stroke=\"{3}\" "
+             "stroke-width=\"2\"{4}/>\n",
+             left, key, left + 24, colour, dash) +
          label(left + 30, key + 4, "start", curve.label);
 }
 

@@ -11,12 +11,23 @@ namespace vdvr {
 std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\'': out += "&#39;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
     }
   return out;
 }
@@ -65,10 +76,11 @@ std::string table_html(const PageTable& table) {
 }
 
 std::string picture_html(const PagePicture& picture) {
-  return fmt::format("<figure><img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">\n"
-                     "<figcaption>{}</figcaption></figure>\n",
-                     picture.image.width, picture.image.height, escaped(picture.name),
-                     base64(encode_png(picture.name, picture.image)), escaped(picture.caption));
+  return fmt::format(
+      "<figure><img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">\n"
+      "<figcaption>{}</figcaption></figure>\n",
+      picture.image.width, picture.image.height, escaped(picture.name),
+      base64(encode_png(picture.name, picture.image)), escaped(picture.caption));
 }
 
 std::string section_html(const PageSection& section) {

@@ -21,6 +21,7 @@ struct PagePicture {
   Image image;
 };
 struct PagePlot {
+  std::string name;  ///< of the SVG file, without its extension
   std::string caption;
   std::string svg;
 };

@@ -26,9 +26,12 @@ ProjectionError projection_error(Device& device, int angles, const Index3& sampl
 
 const char* text_of(Settings settings) {
   switch (settings) {
-    case Settings::paper_open: return "paper, closing none";
-    case Settings::paper: return "paper";
-    case Settings::ours: break;
+    case Settings::paper_open:
+      return "paper, closing none";
+    case Settings::paper:
+      return "paper";
+    case Settings::ours:
+      break;
   }
   return "ours";
 }

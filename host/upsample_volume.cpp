@@ -47,13 +47,13 @@ std::vector<float> along_axis(const std::vector<float>& in, const std::vector<do
 Volume upsample_volume(const Volume& volume, const Index3& cells, const Progress& progress) {
   const Grid& grid = volume.grid;
   if (static_cast<std::int64_t>(volume.samples.size()) != grid.sample_count())
-    throw InputError(fmt::format("{} samples do not fill a grid of {}", volume.samples.size(),
-                                 grid.sample_count()));
+    throw InputError(
+        fmt::format("{} samples do not fill a grid of {}", volume.samples.size(), grid.sample_count()));
   Volume out{grid, {}};
   for (std::size_t a = 0; a < 3; ++a) {
     if (cells[a] < 1 || cells[a] > (1 << 16))
-      throw InputError(fmt::format("a volume cannot be upsampled to {} x {} x {} cells", cells[0], cells[1],
-                                   cells[2]));
+      throw InputError(
+          fmt::format("a volume cannot be upsampled to {} x {} x {} cells", cells[0], cells[1], cells[2]));
     out.grid.cells[a] = cells[a];
     out.grid.spacing[a] =
         grid.spacing[a] * static_cast<double>(grid.cells[a]) / static_cast<double>(cells[a]);
@@ -62,8 +62,8 @@ Volume upsample_volume(const Volume& volume, const Index3& cells, const Progress
   // The slowest axis last: the rows that are combined are then whole, and the small volume goes first.
   out.samples = along_axis(volume.samples, axis_matrix(grid.cells[0], cells[0]), from[2] * from[1], from[0],
                            to[0], 1, progress);
-  out.samples = along_axis(out.samples, axis_matrix(grid.cells[1], cells[1]), from[2], from[1], to[1], to[0],
-                           progress);
+  out.samples =
+      along_axis(out.samples, axis_matrix(grid.cells[1], cells[1]), from[2], from[1], to[1], to[0], progress);
   out.samples = along_axis(out.samples, axis_matrix(grid.cells[2], cells[2]), 1, from[2], to[2],
                            to[1] * to[0], progress);
   return out;
