@@ -47,7 +47,7 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
   BuildOptions build_options;
   plan_settings.foresee = false;
   build_options.window = options.window;
-  if (ours && options.absolute) {
+  if (options.absolute) {
     c.tolerance.absolute = options.epsilon;
   } else {
     c.tolerance.relative = options.epsilon;

@@ -41,8 +41,8 @@ struct Case {
 struct CaseOptions {
   Settings settings = Settings::ours;
   double epsilon = 0.03;
-  /// Ours: of the reference range, as `--epsilon` is, or in density units. The paper's settings are always
-  /// of the field's maximum.
+  /// In density units; otherwise of the reference range, as `--epsilon` is, or in the paper's settings of
+  /// the field's maximum.
   bool absolute = false;
   std::optional<std::pair<double, double>> window;
 };

@@ -29,7 +29,7 @@ LobbCase measure_case(PaperRun& run, const Lobb& lobb, Settings settings, double
   paper::CaseOptions options;
   options.settings = settings;
   options.epsilon = epsilon;
-  options.absolute = true;
+  options.absolute = settings == Settings::ours;
   LobbCase c;
   c.made = paper::build_case(run.device, lobb.test.scan, lobb.test.grid, options, run.progress);
   const std::vector<float> stored = paper::stored_on(c.made.volume, lobb.lattice, run.progress);
