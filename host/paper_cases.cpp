@@ -26,6 +26,8 @@ ProjectionError projection_error(Device& device, int angles, const Index3& sampl
 
 const char* text_of(Settings settings) {
   switch (settings) {
+    case Settings::paper_cells:
+      return "paper, cell by cell";
     case Settings::paper_open:
       return "paper, closing none";
     case Settings::paper:
@@ -60,6 +62,7 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
     plan_settings.terms = "grid";
     build_options.closing = options.settings == Settings::paper ? Closing::paper : Closing::none;
     build_options.storage = StorageChoice::f32;
+    if (options.settings == Settings::paper_cells) build_options.granularity = plan_settings.granularity = 1;
   }
   const auto start = Clock::now();
   const Plan plan = make_plan(device, scan, grid, {}, rates, c.tolerance, plan_settings, progress);

@@ -25,9 +25,10 @@ struct ProjectionError {
 ProjectionError projection_error(Device& device, int angles, const Index3& samples,
                                  const Progress& progress = {});
 
-/// `paper_open`: the paper's settings before its closing (closing none); `paper`: with it; `ours`: certified,
-/// the defaults.
-enum class Settings { paper_open, paper, ours };
+/// `paper_cells`: the paper's settings before its closing, refined cell by cell (granularity 1), as its Figs.
+/// 7 to 9 show refinement; `paper_open`: before its closing, in bricks of 4 cells as its section 5 stores
+/// them; `paper`: with it; `ours`: certified, the defaults.
+enum class Settings { paper_cells, paper_open, paper, ours };
 const char* text_of(Settings settings);
 
 struct Case {

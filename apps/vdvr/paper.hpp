@@ -16,6 +16,15 @@
 
 namespace vdvr::cli {
 
+/// Frames per second of one method on one object.
+struct SpeedRow {
+  std::string object, method;
+  std::uint64_t bytes = 0;  ///< on the device
+  paper::Speed speed;
+  double times_d2vr = 1;  ///< D2VR's seconds a frame over this method's
+  std::optional<ErrorMeasure> function;
+};
+
 struct PaperRun {
   Device& device;
   Progress progress;
@@ -23,6 +32,7 @@ struct PaperRun {
   std::optional<std::filesystem::path> head;  ///< --head
   Page page{};
   Json json = Json::object();  ///< by figure and table
+  std::vector<SpeedRow> speeds{};
 
   [[nodiscard]] int frames() const { return quick ? 2 : 8; }
 };
@@ -54,8 +64,11 @@ void add_thresholds(PaperRun& run, const Lobb& lobb);
 void add_error_maps(PaperRun& run, const Lobb& lobb);
 void add_equal_samples(PaperRun& run, const Lobb& lobb);
 void add_lobb_pictures(PaperRun& run, const Lobb& lobb);
-/// Frames per second of all methods, in one run.
-void add_speeds(PaperRun& run, const Lobb& lobb);
+/// Frames per second of all methods on one object, in turn; rows for add_speeds.
+void measure_speeds(PaperRun& run, const std::string& object, const paper::TestScan& test,
+                    const paper::Case& made, const MixedVolume& uniform, const TransferFunction& transfer);
+void measure_lobb_speeds(PaperRun& run, const Lobb& lobb);
+void add_speeds(PaperRun& run);
 
 /// Fig. 10 and, where it was built, a row for Table 1.
 void add_tumours(PaperRun& run);
