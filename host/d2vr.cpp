@@ -302,7 +302,6 @@ void check_dvr(const RenderOptions& o) {
   if (o.classification != Classification::post)
     refuse("--classification preintegrated does not apply to --method d2vr");
   if (o.step_mode != StepMode::fixed) refuse("--step-mode level does not apply to --method d2vr");
-  if (o.gradient != GradientKind::central) refuse("--gradient analytic does not apply to --method d2vr");
   if (o.sampler == SamplerKind::image3d) refuse("--sampler image3d does not apply to --method d2vr");
 }
 

@@ -83,7 +83,7 @@ BOOST_AUTO_TEST_CASE(cells_for_samples_come_as_near_as_proportions_allow) {
   BOOST_TEST((cells_for_samples({64, 64, 64}, 65.0 * 65 * 65) == Index3{64, 64, 64}));
   BOOST_TEST((cells_for_samples({64, 64, 64}, 129.0 * 129 * 129) == Index3{128, 128, 128}));
   const Index3 c = cells_for_samples({128, 128, 256}, 1e7);
-  BOOST_TEST(c[2] == 2 * c[0]);
+  BOOST_TEST(std::abs(c[2] - 2 * c[0]) <= 1);  // each axis is rounded by itself
 }
 
 BOOST_AUTO_TEST_CASE(sizes_that_mean_nothing_are_refused) {
