@@ -201,14 +201,17 @@ void add_error_maps(PaperRun& run, const Lobb& lobb) {
       "measured against; here both: the function, and F, the field that the projections define. Only what is "
       "stored or interpolated errs against F; "
       "against the function the projections' own limits (74 views, band limit) come on top."};
+  // The unit of the paper's tolerance.
+  const LobbCase* of_maximum = lobb.find(Settings::paper, 0.03);
+  const double maximum = of_maximum ? of_maximum->made.certificate.epsilon_abs / 0.03 : 1;
   std::vector<FieldPanel> against_function, against_field;
-  PageTable table{
-      "figure-12",
-      "Largest error, % of the range",
-      {"method", "paper", "slice, against F", "slice, against the function",
-       "slice, 99th percentile against F", "interior, against F", "interior, against the function",
-       "interior RMS against F", "interior RMS against the function"},
-      {}};
+  PageTable table{"figure-12",
+                  "Largest error, % of the range unless another unit stands there",
+                  {"method", "paper", "slice, against F", "slice, against the function",
+                   "slice, against F, % of F's maximum", "slice, against the function, % of F's maximum",
+                   "interior, against F", "interior, against the function", "interior RMS against F",
+                   "interior RMS against the function"},
+                  {}};
   Json list = Json::array();
   for (auto& s : shown) {
     s.values = first_plane(std::move(s.values));
@@ -219,10 +222,12 @@ void add_error_maps(PaperRun& run, const Lobb& lobb) {
                        volume_field = measure_error(s.volume, lobb.field),
                        volume_function = measure_error(s.volume, lobb.function);
     table.rows.push_back({s.name, s.said, percent(slice_field.max), percent(slice_function.max),
-                          percent(slice_field.p99), percent(volume_field.max), percent(volume_function.max),
-                          percent(volume_field.rms), percent(volume_function.rms)});
+                          percent(slice_field.max / maximum), percent(slice_function.max / maximum),
+                          percent(volume_field.max), percent(volume_function.max), percent(volume_field.rms),
+                          percent(volume_function.rms)});
     list.push_back(
         {{"method", s.name},
+         {"maximum", maximum},
          {"slice", {{"to_field", measure_json(slice_field)}, {"to_function", measure_json(slice_function)}}},
          {"interior",
           {{"to_field", measure_json(volume_field)}, {"to_function", measure_json(volume_function)}}}});
@@ -235,6 +240,11 @@ void add_error_maps(PaperRun& run, const Lobb& lobb) {
       {"figure-12-field", "Fig. 12. |value - F|, % of the range.",
        field_panels(against_field, scale, PanelColours::heat, "|value - F| on z = 0, % of the range")});
   section.tables.push_back(std::move(table));
+  section.remarks = {fmt::format(
+      "The paper's tolerances are of the field's maximum, {:.4g} here, because the band limit overshoots the "
+      "function's 1: in that unit its settings stay below 3 % against F and uniform "
+      "DVR errs by its 4 %. Against the function no volume can err less than F does.",
+      maximum)};
   run.json["figure_12"] = list;
   run.page.sections.push_back(std::move(section));
 }
