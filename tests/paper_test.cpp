@@ -160,13 +160,17 @@ BOOST_AUTO_TEST_CASE(storage_in_the_papers_settings_is_that_recorded) {
 
 BOOST_AUTO_TEST_CASE(the_papers_numbers_are_met_where_they_were) {
   // The verdict of a claim is part of what is recorded; speeds depend on the machine.
-  const json &now = report_made().numbers.at("claims"), &then = recorded().at("claims");
-  BOOST_TEST_REQUIRE(now.size() == then.size());
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    const std::string claim = now[i].at("paper");
-    if (claim.find("slower") != std::string::npos) continue;
-    BOOST_TEST(now[i].at("verdict") == then[i].at("verdict"), claim << ": " << now[i].at("found"));
-  }
+  std::size_t compared = 0;
+  for (const auto& now : report_made().numbers.at("claims"))
+    for (const auto& then : recorded().at("claims")) {
+      const std::string claim = now.at("paper");
+      if (then.at("paper") != claim || then.at("where") != now.at("where") ||
+          claim.find("slower") != std::string::npos)
+        continue;
+      BOOST_TEST(now.at("verdict") == then.at("verdict"), claim << ": " << now.at("found"));
+      ++compared;
+    }
+  BOOST_TEST(compared >= 20);
 }
 
 BOOST_AUTO_TEST_CASE(the_report_is_complete_and_stands_alone) {

@@ -96,7 +96,7 @@ int bench_paper(Arguments& args) {
   Device device = open_device(common);
   ProgressLine line(args.command(), common.quiet);
   const auto start = std::chrono::steady_clock::now();
-  PaperRun run{device, line.callback(), args.has("quick"), head};
+  PaperRun run{device, line.callback(), args.has("quick"), head, common.max_memory};
   const DeviceInfo& info = device.info();
   const std::string command = fmt::format("vdvr bench paper{}{}", run.quick ? " --quick" : "",
                                           head ? " --head " + head->filename().string() : "");

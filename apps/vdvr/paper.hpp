@@ -30,6 +30,7 @@ struct PaperRun {
   Progress progress;
   bool quick = false;
   std::optional<std::filesystem::path> head;  ///< --head
+  std::uint64_t max_memory = 0;               ///< --max-memory; 0: no limit
   Page page{};
   Json json = Json::object();  ///< by figure and table
   std::vector<SpeedRow> speeds{};

@@ -284,9 +284,9 @@ void add_head_thresholds(PaperRun& run, const paper::TestScan& test, const paper
 
 void add_head(PaperRun& run) {
   report(run.progress, "head", 0);
-  const Volume volume = read_volume(*run.head);
+  const Volume volume = read_volume(*run.head, run.max_memory);
   {
-    const paper::TestScan test = paper::carp_sized_scan(volume, 0, run.progress);
+    const paper::TestScan test = paper::carp_sized_scan(volume, run.max_memory, run.progress);
     const paper::Case ours = build_settings(run, test, Settings::ours, 0.03, std::nullopt),
                       theirs = build_settings(run, test, Settings::paper, 0.03, std::nullopt);
     keep_row(run, "head at carp size", theirs, kCarpPublished);
