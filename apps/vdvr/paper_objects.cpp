@@ -168,7 +168,7 @@ std::vector<HeadView> head_views(const Grid& grid) {
     c.view_angle_deg = whole.view_angle_deg / 3.5;
     return c;
   };
-  return {{"whole", whole}, {"face", aimed(0.08, 0.3, 0.12)}, {"teeth", aimed(0.02, 0.3, 0.38)}};
+  return {{"whole", whole}, {"eye", aimed(0.08, 0.3, 0.12)}, {"nose", aimed(0.02, 0.3, 0.3)}};
 }
 
 void add_head_figure(PaperRun& run, const paper::TestScan& test, const paper::Case& mixed) {

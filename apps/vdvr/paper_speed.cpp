@@ -25,6 +25,7 @@ void measure_speeds(PaperRun& run, const std::string& object, const paper::TestS
   time("uniform DVR", base.bytes(), many,
        [&](const RenderOptions& o) { return raycast(run.device, base, o); });
   std::optional<double> d2vr;
+  const GradientKind usual = view.gradient;
   for (const GradientKind gradient : {GradientKind::central, GradientKind::analytic}) {
     const D2vrField field(run.device, test.scan, {}, run.progress);
     const D2vrScene scene(run.device, field, test.grid, run.progress);
@@ -33,7 +34,7 @@ void measure_speeds(PaperRun& run, const std::string& object, const paper::TestS
          few, [&](const RenderOptions& o) { return raycast(run.device, scene, o); });
     if (!d2vr) d2vr = rows.back().speed.seconds_median;
   }
-  view.gradient = GradientKind::central;
+  view.gradient = usual;
   // Once more, so that a change of the machine's load shows.
   time("VDVR (ours), again", mixed.bytes(), many, draw_mixed);
   for (auto& row : rows) row.times_d2vr = *d2vr / row.speed.seconds_median;
