@@ -161,6 +161,7 @@ opencl::Defines defines_for(const RenderOptions& o, const RaycastTuning& tuning,
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
           {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
+          {"VDVR_D2VR_DERIVATIVE", o.gradient == GradientKind::analytic ? "1" : "0"},
           {"VDVR_LANES", std::to_string(lanes)}};
 }
 
@@ -293,7 +294,7 @@ void check_dvr(const RenderOptions& o) {
   const auto refuse = [](const char* what) {
     throw InputError(
         fmt::format("{}; D2VR, which has projections instead of a volume, draws --mode dvr with "
-                    "--classification post, --step-mode fixed and --gradient central: build the "
+                    "--classification post and --step-mode fixed: build the "
                     "volume first, or render with --method vdvr or dvr",
                     what));
   };
@@ -301,8 +302,8 @@ void check_dvr(const RenderOptions& o) {
   if (o.classification != Classification::post)
     refuse("--classification preintegrated does not apply to --method d2vr");
   if (o.step_mode != StepMode::fixed) refuse("--step-mode level does not apply to --method d2vr");
-  if (o.gradient != GradientKind::central && o.gradient != GradientKind::automatic)
-    refuse("--gradient stored and analytic do not apply to --method d2vr");
+  if (o.gradient == GradientKind::stored)
+    refuse("--gradient stored does not apply to --method d2vr, which has no stored samples");
   if (o.sampler == SamplerKind::image3d) refuse("--sampler image3d does not apply to --method d2vr");
 }
 

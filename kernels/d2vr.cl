@@ -7,6 +7,10 @@
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
+// 1: gradients are the derivative of the bilinear sum, 0: central differences over one base cell.
+#ifndef VDVR_D2VR_DERIVATIVE
+#define VDVR_D2VR_DERIVATIVE 0
+#endif
 // Of mixed_sampler.h only the grid and its dialect are needed; it must be told some sample type.
 #define VDVR_SAMPLE_TYPES 1
 

@@ -145,17 +145,17 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
       vload16(0, addend + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
   float16 below = (px + py + pz) * 0.125f + t_constant + bound,
           above = -(mx + my + mz) * 0.125f + t_constant + bound;
+  const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  int16 out = k > nz - 2;
   if (windowed) {
     float16 low = vload16(0, at), high = low;
     CORNERS(RANGE)
     // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
-    const int16 out = (low - below > window_high) | (high + above < window_low);
-    above = select(above, (float16)(UNTESTED), out);
-    below = select(below, (float16)(UNTESTED), out);
+    out |= (low - below > window_high) | (high + above < window_low);
   }
-  const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  above = select(above * counted, (float16)(UNTESTED), k > nz - 2);
-  below = select(below * counted, (float16)(UNTESTED), k > nz - 2);
+  // In this order: what is not counted must not make UNTESTED a tested 0.
+  above = select(above * counted, (float16)(UNTESTED), out);
+  below = select(below * counted, (float16)(UNTESTED), out);
   const size_t column = (((size_t)block * ny + y) * nx + x) * stride;
   vstore16(above, 0, cells_above + column + z + 1);
   vstore16(below, 0, cells_below + column + z + 1);

@@ -293,6 +293,51 @@ BOOST_AUTO_TEST_CASE(normals_are_central_differences_of_the_field) {
   BOOST_TEST(worst <= 1.0);
 }
 
+BOOST_AUTO_TEST_CASE(analytic_normals_are_the_derivative_of_the_sum) {
+  const ProjectionSet scan = soft_scan();
+  const D2vrField field(device(), scan, {});
+  const Grid grid = box(22, 1);
+  RenderOptions o = options_for(grid);
+  o.output = RenderOutput::normal;
+  o.gradient = GradientKind::analytic;
+  o.transfer.points.back().opacity = 0.9;
+  const FloatPicture picture = raycast_float(device(), D2vrScene(device(), field, grid), o);
+  const reference::BilinearViews q = views_of(scan);
+  const double eye = std::sqrt(reference::dot(o.camera.position, o.camera.position));
+  // As above: how far the point may lie aside, and the rounding of its columns and rows.
+  const double aside = 2 * 16 * u * 2 * eye * std::sqrt(3.0) + 12 * u * 3 * q.geometry.center;
+  const double filtered = filter_error(scan);
+  int seen = 0, kinks = 0;
+  double worst = 0, widest = 0;
+  for (std::int64_t i = 0; i < o.width * o.height; ++i) {
+    const cl_float4& pixel = picture.pixels[at(i)];
+    if (!std::isfinite(pixel.s[3])) continue;
+    const reference::Ray ray = reference::pixel_ray(o.camera, o.width, o.height, i % o.width, i / o.width);
+    const auto g = reference::bilinear_gradient(q, reference::along(ray, static_cast<double>(pixel.s[3])));
+    // Where a column or row may be passed by rounding alone the derivative is not one number.
+    if (g.nearest <= aside) {
+      ++kinks;
+      continue;
+    }
+    double error = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+      error +=
+          tolerance::fp32_sum(q.geometry.views() + 8, g.magnitude[a]) + g.mixed[a] * aside + 2 * filtered;
+    const double length = std::sqrt(reference::dot(g.value, g.value)), bound = 2 * error / length + 8 * u;
+    double difference = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+      difference = std::max(difference, std::abs(static_cast<double>(pixel.s[a]) + g.value[a] / length));
+    widest = std::max(widest, bound);
+    if (!(difference / bound <= worst)) worst = std::isnan(difference / bound) ? 1e300 : difference / bound;
+    ++seen;
+  }
+  BOOST_TEST_MESSAGE(seen << " normals, " << kinks << " at kinks, largest error over bound " << worst
+                          << ", bound at most " << widest);
+  BOOST_TEST(seen > 100);
+  BOOST_TEST(widest < 0.05);
+  BOOST_TEST(worst <= 1.0);
+}
+
 BOOST_AUTO_TEST_CASE(lanes_and_groups_change_no_bit) {
   const D2vrField field(device(), soft_scan(), {});
   const D2vrScene scene(device(), field, box(22, 1));
@@ -349,7 +394,6 @@ BOOST_AUTO_TEST_CASE(what_needs_a_stored_volume_is_refused) {
   refused([](RenderOptions& o) { o.mode = RenderMode::slice; });
   refused([](RenderOptions& o) { o.classification = Classification::preintegrated; });
   refused([](RenderOptions& o) { o.step_mode = StepMode::level; });
-  refused([](RenderOptions& o) { o.gradient = GradientKind::analytic; });
   refused([](RenderOptions& o) { o.sampler = SamplerKind::image3d; });
   refused([](RenderOptions& o) { o.width = 0; });
   BOOST_CHECK_THROW(D2vrField(device(), soft_scan(), {{}, 3}), InputError);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "apps/vdvr/bench_paper.hpp"
 #include "apps/vdvr/bench_tune.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
@@ -302,15 +303,16 @@ int bench_command(Arguments& args) {
   if (name == "render") return bench_render(args);
   if (name == "bounds") return bench_bounds(args);
   if (name == "tune") return bench_tune(args);
+  if (name == "paper") return bench_paper(args);
   if (!name.empty())
-    throw InputError(
-        fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
+    throw InputError(fmt::format(
+        "'{}' is not a case of this version; there are fbp, build, render, bounds, tune, paper", name));
   args.group(
           "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N] | bounds IN | "
-          "tune; each has its own --help")
+          "tune | paper -o DIR; each has its own --help")
       .flag("help,h", "this text");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, build, render, bounds or tune");
+  throw InputError("name a case: fbp, build, render, bounds, tune or paper");
 }
 
 }  // namespace vdvr::cli

@@ -133,19 +133,17 @@ Json spectrum_json(const Spectrum& s) {
   return {{"coefficients", s.size}, {"largest_amplitude", most}, {"reference", s.reference}, {"sums", sums}};
 }
 
-/// Writes pictures as they come and notes what they show.
+/// Collects pictures as they come.
 class Album {
  public:
-  Album(OutputFolder& folder, const Progress& progress) : folder_(folder), progress_(progress) {}
-  void add(const std::string& name, const std::string& shows, const Image& image) {
-    report(progress_, "pictures", static_cast<double>(files.size()) / 8);
-    write_png(folder_.file(name), image);
-    files[name] = shows;
+  explicit Album(const Progress& progress) : progress_(progress) {}
+  void add(const std::string& name, const std::string& shows, Image image) {
+    report(progress_, "pictures", static_cast<double>(pictures.size()) / 8);
+    pictures.push_back({name, shows, std::move(image)});
   }
-  Json files = Json::object();
+  std::vector<PlanPicture> pictures;
 
  private:
-  OutputFolder& folder_;
   const Progress& progress_;
 };
 
@@ -278,8 +276,8 @@ std::vector<std::string> plan_picture_names() {
           "pictures.json"};
 }
 
-Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSet& scan, const Plan& plan,
-                        const Progress& progress) {
+PlanPictures plan_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
+                           const Progress& progress) {
   const FilteredView view = strongest_view(device, scan, plan.field, progress);
   const std::int64_t middle = view.rows / 2;
   const auto row_begin = view.samples.begin() + middle * view.columns;
@@ -290,8 +288,7 @@ Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSe
   const Spectrum volume =
       make_spectrum(device, plan.base.samples, plan.base.grid.samples(), plan.reference_range, progress);
 
-  folder.begin();
-  Album album(folder, progress);
+  Album album(progress);
   draw_row(device, album, row, fmt::format("row {} of filtered view {}", middle, view.view));
   draw_projection(device, album, projection, fmt::format("filtered view {}", view.view));
   draw_volume(device, album, volume);
@@ -300,8 +297,10 @@ Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSe
     for (const int rate : kRates) list.push_back({{"rate", rate}, {"value", worst_corner(axes, rate)}});
     return list;
   };
+  Json files = Json::object();
+  for (const auto& p : album.pictures) files[p.file] = p.shows;
   Json json = {
-      {"files", album.files},
+      {"files", files},
       {"view",
        {{"index", view.view}, {"row", middle}, {"chosen", "the view with the most energy after filtering"}}},
       {"error_map",
@@ -313,8 +312,16 @@ Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSe
       {"volume", spectrum_json(volume)},
       {"volume_note",
        "the spectrum of the cut-out 1x volume under mirror extension, not of F: it decides nothing"}};
-  io::write_file(folder.file("pictures.json"), json.dump(2) + "\n");
-  return json;
+  return {std::move(album.pictures), json};
+}
+
+Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSet& scan, const Plan& plan,
+                        const Progress& progress) {
+  const PlanPictures made = plan_pictures(device, scan, plan, progress);
+  folder.begin();
+  for (const auto& p : made.pictures) write_png(folder.file(p.file), p.image);
+  io::write_file(folder.file("pictures.json"), made.json.dump(2) + "\n");
+  return made.json;
 }
 
 }  // namespace vdvr::cli

@@ -181,10 +181,10 @@ void check_d2vr(const Arguments& args, const RenderOptions& o) {
                     "--mode dvr; build the volume for the others",
                     args.text("mode")));
   if (o.classification != Classification::post || o.step_mode != StepMode::fixed ||
-      o.gradient != GradientKind::automatic || o.sampler == SamplerKind::image3d)
+      o.gradient == GradientKind::stored || o.sampler == SamplerKind::image3d)
     refuse(args, {"classification", "step-mode", "gradient", "sampler"},
-           "--method d2vr has no stored samples: it classifies after sampling, steps evenly, takes central "
-           "differences and reads buffers");
+           "--method d2vr has no stored samples: it classifies after sampling, steps evenly, takes gradients "
+           "where they are needed and reads buffers");
   refuse(args, {"unverified"}, "--method d2vr has no certificate");
 }
 

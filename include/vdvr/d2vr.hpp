@@ -78,8 +78,9 @@ class D2vrScene {
 };
 
 /// One picture, as `raycast` draws it of a volume on the scene's grid: mode dvr, every sample and six more
-/// where it is lit taken from the projections. Throws InputError for another mode, pre-integration, steps by
-/// level, analytic gradients and the image3d sampler, which need a stored volume. RenderResult::sampler is
+/// where it is lit taken from the projections; with GradientKind::analytic one more, the derivative of the
+/// bilinear sum instead of central differences. Throws InputError for another mode, pre-integration, steps by
+/// level and the image3d sampler, which need a stored volume. RenderResult::sampler is
 /// `buffer`.
 RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options);
 

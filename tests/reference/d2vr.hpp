@@ -68,4 +68,40 @@ inline BilinearSum bilinear_sum(const BilinearViews& q, const Vec3& p) {
   return out;
 }
 
+/// The derivative of that sum with respect to x, y and z.
+struct BilinearGradient {
+  Vec3 value{0, 0, 0};
+  Vec3 magnitude{0, 0, 0};  ///< sums of |terms|
+  Vec3 mixed{0, 0, 0};      ///< sums of |changes| over a position of one column and one row
+  double nearest = 1;       ///< how near the point comes to a kink, stored columns or rows
+};
+
+inline BilinearGradient bilinear_gradient(const BilinearViews& q, const Vec3& p) {
+  const ParallelGeometry& g = q.geometry;
+  BilinearGradient out;
+  const double row = (p[2] / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1)) * q.rate;
+  const auto v = static_cast<std::int64_t>(std::floor(row));
+  const double b = row - static_cast<double>(v);
+  out.nearest = std::min(b, 1 - b);
+  for (std::int64_t k = 0; k < g.views(); ++k) {
+    const double theta = g.theta_rad[static_cast<std::size_t>(k)];
+    const Vec3 step{std::cos(theta) / g.pitch_u * q.rate, std::sin(theta) / g.pitch_u * q.rate,
+                    q.rate / g.pitch_v};
+    const double column = p[0] * step[0] + p[1] * step[1] + (g.center - q.first_column) * q.rate;
+    const auto u = static_cast<std::int64_t>(std::floor(column));
+    const double a = column - static_cast<double>(u);
+    out.nearest = std::min({out.nearest, a, 1 - a});
+    const double low = q.at(k, u + 1, v) - q.at(k, u, v), high = q.at(k, u + 1, v + 1) - q.at(k, u, v + 1);
+    const double left = q.at(k, u, v + 1) - q.at(k, u, v), right = q.at(k, u + 1, v + 1) - q.at(k, u + 1, v);
+    const Vec3 terms{step[0] * ((1 - b) * low + b * high), step[1] * ((1 - b) * low + b * high),
+                     step[2] * ((1 - a) * left + a * right)};
+    for (std::size_t i = 0; i < 3; ++i) {
+      out.value[i] += terms[i];
+      out.magnitude[i] += std::abs(terms[i]);
+      out.mixed[i] += std::abs(step[i] * (high - low));
+    }
+  }
+  return out;
+}
+
 }  // namespace vdvr::reference
