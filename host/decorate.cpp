@@ -1,3 +1,4 @@
+#include "host/glm_vectors.hpp"
 #include "host/decorate.hpp"
 
 #include <fmt/format.h>
@@ -8,7 +9,6 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 #include <numeric>
 #include <optional>
 #include <sstream>
@@ -20,8 +20,6 @@ namespace {
 
 using Colour = std::array<std::uint8_t, 3>;
 constexpr Colour kInk{235, 235, 235}, kShadow{0, 0, 0}, kEdge{200, 205, 215};
-
-glm::dvec3 to_glm(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
 /// Small pictures have small letters.
 int text_scale(const Image& image) { return std::min(image.width, image.height) >= 400 ? 2 : 1; }
