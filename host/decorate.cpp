@@ -1,4 +1,3 @@
-#include "host/glm_vectors.hpp"
 #include "host/decorate.hpp"
 
 #include <fmt/format.h>
@@ -14,6 +13,7 @@
 #include <sstream>
 
 #include "host/bitmap_font.hpp"
+#include "host/glm_vectors.hpp"
 
 namespace vdvr {
 namespace {
