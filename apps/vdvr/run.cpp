@@ -39,7 +39,7 @@ auto timed(std::map<std::string, double>& seconds, const std::string& name, Step
 }
 
 std::vector<std::string> file_names() {
-  return {"volume.vdvr", "dvr.png",     "iso.png",   "slice-x.png",
+  return {"volume.vdvr", "dvr.png",     "bound.png", "iso.png",         "slice-x.png",
           "slice-y.png", "slice-z.png", "error.png", "certificate.json"};
 }
 
@@ -48,7 +48,7 @@ std::vector<std::string> file_names() {
 void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, const Progress& progress) {
   const MixedVolume& volume = out.built.volume;
   const Brightness bright = brightness_of(volume);
-  const ResidentVolume resident(device, volume);
+  ResidentVolume resident(device, volume);
   RenderOptions o;
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
@@ -73,6 +73,13 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     o.mode = RenderMode::dvr;
     o.step = 0.25;  // at a step of a cell surfaces in noise show the grain of the samples
     draw("dvr.png", "direct volume rendering, four samples a cell");
+    RenderOptions bound = o;
+    bound.output = RenderOutput::error;
+    bound.height -= kErrorCaption;
+    resident.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
+    write_png(folder.file("bound.png"),
+              bound_picture(raycast(device, resident, bound).values, out.built.certificate.epsilon_abs));
+    out.files.emplace_back("bound.png", "how far the samples behind each pixel of dvr.png can lie from F");
     o.mode = RenderMode::iso;
     draw("iso.png", fmt::format("iso-surface at {:.4g}", bright.threshold));
   }

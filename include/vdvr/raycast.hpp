@@ -120,8 +120,8 @@ struct RenderResult {
   /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field.
   /// Depth: that distance of iso, of dvr to the sample that brings the opacity to a half, of mip to the
   /// maximum. Normal: three channels, x, y, z of the unit vector towards lower density there. Error: the
-  /// largest bound of the samples that add to the pixel (of iso and mip: of the points that it shows),
-  /// infinite where one lies in a brick without.
+  /// largest bound of the samples that add at least 1/512 per base cell to the pixel (of iso and mip: of the
+  /// points that it shows), infinite where one lies in a brick without.
   FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks

@@ -12,7 +12,7 @@
 // often.
 #define LEAP_MARGIN 0.00390625f
 // A sample that adds less than this per length to the picture, half a step of 8 bits, is not worth six more
-// for shading.
+// for shading, and its bound does not count as seen.
 #define SHADED_WEIGHT 0.001953125f
 
 // Rays clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
@@ -215,7 +215,7 @@ RAY_INLINE void absorb(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const
   const float3 cells_per_length =
       (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
 #if VDVR_BOUNDS
-  raise_bound(grid, brick->at, weight > 0.0f, seen THE_BOUNDS);
+  raise_bound(grid, brick->at, weight > shaded_weight, seen THE_BOUNDS);
 #elif VDVR_GEOMETRY
   const I half_way = (seen->alpha < 0.5f) & (seen->alpha + weight >= 0.5f);
   if (ANY(half_way)) {

@@ -103,8 +103,9 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
         absorb(THE_FIELD, bricks, grid, &p, &ray, &around, &sampled, at, middle,
                colour_between(table, &p, front, back), weight, (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
 #if VDVR_BOUNDS
-        raise_bound(grid, before_at, weight > 0.0f, &seen THE_BOUNDS);
-        raise_bound(grid, brick_at(grid, c), weight > 0.0f, &seen THE_BOUNDS);
+        const I counts = weight > SHADED_WEIGHT * p.step;
+        raise_bound(grid, before_at, counts, &seen THE_BOUNDS);
+        raise_bound(grid, brick_at(grid, c), counts, &seen THE_BOUNDS);
 #endif
       }
     }
