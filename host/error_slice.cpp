@@ -67,7 +67,7 @@ PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o) {
   const double pixel =
       std::max(length(a.across) / static_cast<double>(wide), length(a.down) / static_cast<double>(high));
   const auto count = [&](std::size_t k) {
-    return std::max<std::int64_t>(2, static_cast<std::int64_t>(length(k) / pixel + 0.5));
+    return std::max<std::int64_t>(2, std::llround(length(k) / pixel));
   };
   PixelGrid p;
   p.width = std::min(wide, count(a.across));
@@ -94,7 +94,7 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 void draw_caption(Image& image, double epsilon, const std::string& text) {
   const std::string low = "0", high = fmt::format("epsilon {}", number(epsilon));
   const std::int64_t top = image.height - kCaption + kMargin;
-  const std::int64_t left = kMargin + 2 * kFontAdvance;
+  const std::int64_t left = kMargin + std::int64_t{2} * kFontAdvance;
   const std::int64_t right =
       image.width - kMargin - static_cast<std::int64_t>(high.size() + 1) * kFontAdvance;
   draw_text(image, kMargin, top + 1, low, 1, kInk);

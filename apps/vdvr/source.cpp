@@ -39,7 +39,7 @@ void add_projection_options(Arguments& args) {
 }
 
 std::string method_option(const Arguments& args) {
-  const std::string method = args.choice("method", render_methods(), "vdvr");
+  std::string method = args.choice("method", render_methods(), "vdvr");
   if (method != "d2vr") refuse(args, kProjectionOptions, "applies to --method d2vr");
   return method;
 }
