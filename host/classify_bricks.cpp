@@ -82,8 +82,7 @@ ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks
       refuse_(std::move(refuse)) {}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
-  return coarse_slack_[brick] >= 0 &&
-         static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
+  return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
 }
 
 void ClassifyBricks::classify(const DeviceField& base, double tolerance,

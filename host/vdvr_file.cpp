@@ -257,8 +257,8 @@ constexpr const char* kTotals = "/brick_total";
 void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
   const Index3 b = v.bricks();
   if (totals.size() != v.level.size())
-    throw InputError(fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(),
-                                 v.level.size()));
+    throw InputError(
+        fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(), v.level.size()));
   file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
 }
 

@@ -68,9 +68,10 @@ __kernel void level_error(volatile __global int* error, __global const uchar* wa
     for (int bx = bx0; bx <= bx1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
 }
 
-// How far linear interpolation along one axis alone errs in the middles of its cells, for every level below the
-// gold rate: the largest of interpolant - gold and of gold - interpolant. errors[block][brick z][brick y][brick x][axis x, y, z][level][sign], starting at 0. A node that is no
-// sample of the finest level is the middle of a cell of exactly one level.
+// How far linear interpolation along one axis alone errs in the middles of its cells, for every level below
+// the gold rate: the largest of interpolant - gold and of gold - interpolant. errors[block][brick z][brick
+// y][brick x][axis x, y, z][level][sign], starting at 0. A node that is no sample of the finest level is the
+// middle of a cell of exactly one level.
 inline void raise_pair(volatile __global int* to, float plus, float minus) {
   if (plus > 0.0f && as_int(plus) > to[0]) atomic_max(to, as_int(plus));
   if (minus > 0.0f && as_int(minus) > to[1]) atomic_max(to + 1, as_int(minus));
@@ -116,10 +117,10 @@ __kernel void axis_errors(volatile __global int* errors, __global const uchar* w
     const int16 node = z + lane, outside = node >= last;
     __global const float* c = column + z;
     const float16 centre = vload16(0, c);
-    const float16 ex =
-                      select(0.5f * (vload16(0, c - step_x) + vload16(0, c + step_x)) - centre, none, outside),
-                  ey =
-                      select(0.5f * (vload16(0, c - step_y) + vload16(0, c + step_y)) - centre, none, outside);
+    const float16 ex = select(0.5f * (vload16(0, c - step_x) + vload16(0, c + step_x)) - centre, none,
+                              outside),
+                  ey = select(0.5f * (vload16(0, c - step_y) + vload16(0, c + step_y)) - centre, none,
+                              outside);
     plus_x = fmax(plus_x, ex);
     minus_x = fmax(minus_x, -ex);
     plus_y = fmax(plus_y, ey);
@@ -136,9 +137,9 @@ __kernel void axis_errors(volatile __global int* errors, __global const uchar* w
     for (int bx = bx0; bx <= bx1; ++bx) {
       volatile __global int* out = errors + ((layer + by) * bricks_x + bx) * 6 * levels;
       if (level_x < levels) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
-      if (level_y < levels) 
+      if (level_y < levels)
         raise_pair(out + 2 * (levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));
-      for (int l = 0; l < levels; ++l) 
+      for (int l = 0; l < levels; ++l)
         raise_pair(out + 2 * (2 * levels + l), largest_of_16(plus_z[l]), largest_of_16(minus_z[l]));
     }
 }
@@ -166,6 +167,7 @@ __kernel void extract_tiles(__global float* out, __global const float* lattice, 
   const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
   const bool keep =
       margin[((size_t)r.block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo] >= kept;
-  const size_t column = ((size_t)r.block * l.cy + y / l.spacing_y + l.reach_y) * l.cx + x / l.spacing_x + l.reach_x;
+  const size_t column =
+      ((size_t)r.block * l.cy + y / l.spacing_y + l.reach_y) * l.cx + x / l.spacing_x + l.reach_x;
   out[r.offset + i] = keep ? lattice[column * l.cz + z / l.spacing_z + l.reach_z] : 0.0f;
 }

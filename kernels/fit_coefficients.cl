@@ -92,7 +92,8 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
   float16 smallest = (float16)(INFINITY), largest = (float16)(-INFINITY);
   for (int dy = -(l.spacing_y / 2); dy <= l.spacing_y / 2; ++dy)
     for (int dx = -(l.spacing_x / 2); dx <= l.spacing_x / 2; ++dx) {
-      const int gx = (x - l.reach_x) * l.spacing_x + halo + dx, gy = (y - l.reach_y) * l.spacing_y + halo + dy;
+      const int gx = (x - l.reach_x) * l.spacing_x + halo + dx,
+                gy = (y - l.reach_y) * l.spacing_y + halo + dy;
       const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * (nx + 2 * halo) + gx;
       if (margin[column] < lowest) continue;
       const float16 e = vload16(0, errors + column * gold_stride + z);
@@ -105,8 +106,8 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
 
 // One step of the fit. Gold nodes outside [z_first, z_last] do not count. The rim of the lattice stays.
 __kernel void shift_lattice(__global float* lattice, __global const float* low, __global const float* high,
-                            __global const uchar* needed, VdvrLattice l, int halo, int gold_stride, int blocks,
-                            int z_first, int z_last, float share) {
+                            __global const uchar* needed, VdvrLattice l, int halo, int gold_stride,
+                            int blocks, int z_first, int z_last, float share) {
   const int k = (int)get_global_id(0), x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
   if (k < 1 || x < 1 || y < 1 || k >= l.cz - 1 || x >= l.cx - 1 || y >= l.cy - 1 || block >= blocks) return;

@@ -95,9 +95,9 @@ RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
 }
 
 #if VDVR_D2VR_DERIVATIVE
-// Density per length along the world axes: the derivative of the sum itself, view by view that of its bilinear
-// footprint. One pass over the views instead of six; it jumps where a column or row is passed. 0 where a view
-// misses the point.
+// Density per length along the world axes: the derivative of the sum itself, view by view that of its
+// bilinear footprint. One pass over the views instead of six; it jumps where a column or row is passed. 0
+// where a view misses the point.
 RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,
                           float3 cells_per_length, I needed) {
   const V row = detector.first_row + detector.rows_per_cell * c.z;
@@ -123,7 +123,8 @@ RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, cons
     d.z += (1.0f - u.fraction) * (s01 - s00) + u.fraction * (s11 - s10);
   }
   d.z = within * (detector.rows_per_cell * d.z);
-  return v3(PICK(outside, (V)(0.0f), d.x * cells_per_length.x), PICK(outside, (V)(0.0f), d.y * cells_per_length.y),
+  return v3(PICK(outside, (V)(0.0f), d.x * cells_per_length.x),
+            PICK(outside, (V)(0.0f), d.y * cells_per_length.y),
             PICK(outside, (V)(0.0f), d.z * cells_per_length.z));
 }
 #else
