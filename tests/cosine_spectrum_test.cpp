@@ -5,6 +5,7 @@
 #include <random>
 
 #include "tests/reference/cosine_series.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/error.hpp"
@@ -13,10 +14,7 @@ using namespace vdvr;
 
 namespace {
 
-Device& device() {
-  static Device one;
-  return one;
-}
+using support::device;
 
 // Axis by axis with the direct sums of the reference.
 std::vector<double> direct(const std::vector<float>& values, const Index3& n) {

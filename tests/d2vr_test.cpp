@@ -12,6 +12,7 @@
 #include "tests/reference/d2vr.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/reference/raycast.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
@@ -24,10 +25,7 @@ namespace {
 
 constexpr double u = tolerance::unit_roundoff;
 
-Device& device() {
-  static Device d;
-  return d;
-}
+using support::device;
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 

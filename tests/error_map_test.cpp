@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/reference/wave_error.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
@@ -39,10 +40,7 @@ std::vector<std::vector<double>> random_frequencies(int count, int rate, unsigne
 
 double product(const std::vector<double>& kappa) { return 1 - centre_error(kappa); }
 
-Device& device() {
-  static Device one;
-  return one;
-}
+using support::device;
 
 }  // namespace
 

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "host/paper_cases.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 
@@ -21,10 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Device& device() {
-  static Device d;
-  return d;
-}
+using support::device;
 
 std::string contents(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

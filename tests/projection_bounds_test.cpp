@@ -9,6 +9,7 @@
 #include "host/gold_stream.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/exact_field.hpp"
@@ -82,10 +83,7 @@ struct Chain {
     measure_filter_error(filtered, scan, {});
     sups = field_sups(state(), upsampler, filtered);
   }
-  static opencl::State& state() {
-    static Device device;
-    return device.state();
-  }
+  static opencl::State& state() { return support::device().state(); }
   ProjectionSet scan;
   ExactField exact;
   FilteredScan filtered;

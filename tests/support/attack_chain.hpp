@@ -9,15 +9,12 @@
 #include <vector>
 
 #include "host/gold_stream.hpp"
-#include "vdvr/device.hpp"
+#include "tests/support/device.hpp"
 #include "vdvr/exact_field.hpp"
 
 namespace vdvr::attacks {
 
-inline Device& device() {
-  static Device one;
-  return one;
-}
+using support::device;
 
 struct Rates {
   int upsampling;

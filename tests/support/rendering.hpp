@@ -1,6 +1,7 @@
 // What the tests of the ray-caster share.
 #pragma once
 
+#include "tests/support/device.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/raycast.hpp"
@@ -8,11 +9,6 @@
 namespace vdvr::support {
 
 inline constexpr double u = tolerance::unit_roundoff;
-
-inline Device& device() {
-  static Device d;
-  return d;
-}
 
 /// Levels that differ across every face, edge and corner of bricks somewhere; z rises to 1, x to 2, y to 3.
 inline LevelTriple scattered_levels(const Index3& b) {
