@@ -22,6 +22,9 @@ int sample_types(const MixedVolume& volume);
 
 VdvrGrid sampler_grid(const MixedVolume& volume);
 
+/// Index x, y, z of a brick's first sample in the base.
+Index3 first_base_sample(const MixedVolume& volume, const Index3& brick);
+
 /// Where a brick of a level above 0 has its samples.
 struct StoredTile {
   TileKind kind;
@@ -74,6 +77,12 @@ class BrickSamples {
   [[nodiscard]] std::array<int, 3> level() const {
     return {static_cast<int>(record_.level_x), static_cast<int>(record_.level_y),
             static_cast<int>(record_.level_z)};
+  }
+  /// log2 of samples per cell of the grid along x, y, z: negative where it has several cells to a sample.
+  [[nodiscard]] std::array<int, 3> per_cell() const {
+    return {static_cast<int>(record_.level_x) - grid_.coarse_x,
+            static_cast<int>(record_.level_y) - grid_.coarse_y,
+            static_cast<int>(record_.level_z) - grid_.coarse_z};
   }
   /// Number of the last sample along x, y, z that lies in the grid.
   [[nodiscard]] const Index3& end() const { return end_; }

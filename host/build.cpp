@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 
 #include "host/build_journal.hpp"
+#include "host/choose_coarsening.hpp"
 #include "host/classify_bricks.hpp"
 #include "host/close_boundaries.hpp"
 #include "host/gold_stream.hpp"
@@ -78,6 +78,10 @@ class Builder {
     bricks_.grid = plan.grid;
     bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
     bricks_.rate = plan.gold_rate;
+    bricks_.coarsening = plan.coarsening;
+    if (!is_possible(plan.coarsening, plan.grid, bricks_.granularity, plan.gold_rate))
+      throw InputError(
+          fmt::format("a plan for granularity {}, not {}", plan.settings.granularity, options.granularity));
     bricks_.sampled = plan.settings.coefficients == "sampled";
     choose_storage(options.storage);
     closing_ = options.closing;
@@ -98,6 +102,7 @@ class Builder {
     settings.midrange = plan.settings.coefficients == "midrange";
     settings.anisotropic = plan.settings.levels == "anisotropic" && closing_ != Closing::paper;
     settings.grid_only = plan.settings.terms == "grid";
+    settings.coarsening = plan.coarsening;
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     node_test_.emplace(state_, *gold_, bricks_, host_, journal_, progress_,
                        [this](float slack, double tolerance) { refuse(slack, tolerance); });
@@ -108,7 +113,7 @@ class Builder {
 
   /// Puts the base on the lattice of integer samples; before it is measured.
   void choose_storage(StorageChoice storage) {
-    bricks_.base = plan_.fitted.empty() ? plan_.base.samples : plan_.fitted;
+    bricks_.base = plan_.fitted.empty() ? take_base(plan_.base, plan_.coarsening) : plan_.fitted;
     bricks_.lattice = choose_lattice(
         bricks_.base, storage, most_rounding(plan_.epsilon_abs, plan_.settings.levels == "anisotropic"));
     round_base(bricks_.base, bricks_.lattice);
@@ -128,7 +133,7 @@ class Builder {
     double largest = 0;
     for (const float v : bricks_.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
     const double strict = tolerance - std::min(2 * stream().arithmetic(), 0x1p-15 * largest);
-    const DeviceField base(state_, as_mixed({bricks_.grid, bricks_.base}, bricks_.granularity));
+    const DeviceField base(state_, as_mixed(bricks_.base, stream().settings()));
     node_test_->classify(base, strict, classified());
     watch_.lap("classify");
   }
@@ -207,11 +212,10 @@ class Builder {
 
   // Levels only rise.
   std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
-    const int top = std::countr_zero(static_cast<unsigned>(plan_.gold_rate));
     std::vector<LevelTriple> to = bricks_.level;
     for (std::size_t i = 0; i < pending.size(); ++i)
       if (pending[i] && measures()[i].violated != 0 &&
-          !raise_levels(bricks_, static_cast<std::int64_t>(i), measures()[i].violated, top,
+          !raise_levels(bricks_, static_cast<std::int64_t>(i), measures()[i].violated,
                         gold_->fine().settings().anisotropic ? &node_test_->along()[i] : nullptr, to))
         refuse(measures()[i].total, plan_.epsilon_abs);
     std::vector<std::uint8_t> raised(bricks_.level.size(), 0);
@@ -287,8 +291,8 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.not_covered_count = plan.not_covered_count;
   c.not_covered_fraction = plan.not_covered_fraction;
   c.not_covered_rule =
-      "a point is covered when all its projections fall on the detector; samples more than two base-cell "
-      "diagonals outside are stored as 0";
+      "a point is covered when all its projections fall on the detector; samples further outside than the "
+      "diagonals of a cell of the grid and of the base are stored as 0";
   c.input_name = scan.report.name;
   c.input_sha256 = scan.report.sha256;
   c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};

@@ -1,6 +1,7 @@
 #include "host/build_journal.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "vdvr/hash.hpp"
 
@@ -56,7 +57,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "3"},
+      {"record format", "4"},
       {"version", VDVR_VERSION},
       {"device", device.info().name},
       {"driver", device.info().driver},
@@ -73,6 +74,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"coefficients", plan.settings.coefficients},
       {"levels", plan.settings.levels},
       {"terms", plan.settings.terms},
+      {"base", fmt::format("{}", fmt::join(plan.coarsening, ","))},
       {"granularity", std::to_string(stream.settings().granularity)},
       {"closing", name(options.closing)},
       {"storage", name(options.storage)},

@@ -2,7 +2,6 @@
 #include "host/classify_bricks.hpp"
 
 #include <algorithm>
-#include <bit>
 
 #include "host/build_journal.hpp"
 #include "vdvr/error.hpp"
@@ -23,11 +22,11 @@ bool any(const std::vector<std::uint8_t>& flags) {
   return std::find(flags.begin(), flags.end(), 1) != flags.end();
 }
 
-int top_level(const GoldStream& gold) {
-  return std::countr_zero(static_cast<unsigned>(gold.settings().rate));
+// Whether a field of that level is trilinear in every cell of this gold.
+bool resolves(const GoldStream& gold, const LevelTriple& level) {
+  const LevelTriple finest = gold.settings().finest();
+  return level[0] <= finest[0] && level[1] <= finest[1] && level[2] <= finest[2];
 }
-
-int finest_of(const LevelTriple& level) { return *std::max_element(level.begin(), level.end()); }
 
 bool passes(const BrickMeasure& m, double tolerance) {
   return m.total < 0 || static_cast<double>(m.total) <= tolerance;
@@ -230,7 +229,7 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
   const auto levels = in.get_vector<LevelTriple>();
   const auto samples = in.get_vector<float>();
   auto next = samples.begin();
-  const MixedVolume shape{bricks_.grid, bricks_.granularity, bricks_.rate, {}, {}, {}, {}, 0};
+  const MixedVolume shape = bricks_.shape();
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const std::int64_t size = shape.tile_size(levels.at(i));
     if (size > samples.end() - next)
@@ -290,7 +289,7 @@ void ClassifyBricks::measure(const DeviceField& field, double tolerance,
     // The test needs V to be trilinear in every cell of gold.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && finest_of(bricks_.level[i]) <= top_level(*coarse) && is_easy(i, tolerance);
+      easy[i] = easy[i] && resolves(*coarse, bricks_.level[i]) && is_easy(i, tolerance);
     measure_at(*coarse, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
       if (coarse_verdict(m, tolerance) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;

@@ -35,6 +35,7 @@ class Packer {
     v.grid = open_.grid;
     v.granularity = open_.granularity;
     v.rate = open_.rate;
+    v.coarsening = open_.coarsening;
     v.level = stored_.level;
     v.step = open_.lattice.step;
     v.tile.assign(v.level.size(), 0);
@@ -123,12 +124,14 @@ class Packer {
   // The base with the values of tiles where only bricks that take no part would read its own.
   std::vector<float> shared_base() const {
     std::vector<float> base = open_.base;
-    const Index3 n = open_.grid.samples();
+    const MixedVolume shape = open_.shape();
+    const Index3 n = shape.base_samples();
     for (std::size_t brick = 0; brick < stored_.level.size(); ++brick) {
       if (stored_.level[brick] == in_base || !borders_outsiders(brick)) continue;
       const auto id = static_cast<std::int64_t>(brick);
       const TileView view(open_, id, stored_.level[brick]);
       const std::vector<float> tile = tile_of(id);
+      const Index3 first = first_base_sample(shape, view.position);
       Index3 step{};
       for (std::size_t a = 0; a < 3; ++a) step[a] = std::int64_t{1} << view.level[a];
       for_each_part([&](const std::array<int, 3>& side) {
@@ -140,7 +143,7 @@ class Packer {
         if (!outsiders || base_read) return;
         Entity(stored_, id, side).for_each(view, step, [&](const Index3& i) {
           Index3 c{};
-          for (std::size_t a = 0; a < 3; ++a) c[a] = view.position[a] * open_.granularity + i[a] / step[a];
+          for (std::size_t a = 0; a < 3; ++a) c[a] = first[a] + i[a] / step[a];
           base[at((c[2] * n[1] + c[1]) * n[0] + c[0])] = tile[view.index(i)];
         });
       });

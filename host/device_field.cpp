@@ -19,4 +19,10 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
   for (const auto& [triple, block] : v.tiles) put(block, offsets.at(triple));
 }
 
+opencl::Defines coarse_defines(const VdvrGrid& grid) {
+  return {{"VDVR_COARSE_X", std::to_string(grid.coarse_x)},
+          {"VDVR_COARSE_Y", std::to_string(grid.coarse_y)},
+          {"VDVR_COARSE_Z", std::to_string(grid.coarse_z)}};
+}
+
 }  // namespace vdvr

@@ -16,4 +16,7 @@ struct DeviceField {
   opencl::Defines defines;  ///< VDVR_SAMPLE_TYPES
 };
 
+/// VDVR_COARSE_X, _Y, _Z, for kernels that read bricks through packet_sampler.h.
+opencl::Defines coarse_defines(const VdvrGrid& grid);
+
 }  // namespace vdvr

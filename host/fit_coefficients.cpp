@@ -104,9 +104,7 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, float curvature) {
                  cl_int, cl_float>
       shift(state_, "fit_coefficients", "shift_lattice");
   const std::uint64_t chunks = count(b.gold_stride / 16);
-  // Columns that have a lattice column on every side within half a spacing.
-  const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1 - 2 * (l.spacing_x / 2),
-                     deep = (l.cy - 1) * l.spacing_y + 1 - 2 * (l.spacing_y / 2);
+  const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1, deep = (l.cy - 1) * l.spacing_y + 1;
   err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors_.buffer(), level_.along.buffer(),
       gold.buffer(), margin_.buffer(), b.lowest, l, nx, ny, halo, stride, blocks, curvature);
   pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low_.buffer(), high_.buffer(),

@@ -45,10 +45,10 @@ class LatticeFit {
   /// `spacing` along x, y, z; `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many
   /// second differences below gold's interpolant, on average over a gold cell of the grid that is certified.
   /// `margins`: the blocks' margins. Right on the boxes wanted, and undefined further out, where halo >=
-  /// steps * spacing; along an axis with less halo the samples around the block stay gold. Valid until the
-  /// next call. Cost: per step about two evaluations of the interpolant per gold node of the boxes, widened
-  /// by as many spacings less a half. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the gold, and as
-  /// much as the gold.
+  /// steps * spacing; along an axis with less halo samples near the rim rest on the gold that is there. Valid
+  /// until the next call. Cost: per step about two evaluations of the interpolant per gold node of the boxes,
+  /// widened by as many spacings less a half. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the
+  /// gold, and as much as the gold.
   const LevelSamples& operator()(const opencl::DeviceArray<float>& gold, const std::vector<float>& margins,
                                  const std::vector<ColumnBox>& wanted, const Index3& spacing, int steps,
                                  float curvature);

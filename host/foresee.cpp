@@ -161,21 +161,27 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const st
 
 }  // namespace
 
-Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base, double tolerance) {
+Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
+                       const std::vector<float>& stored, double tolerance) {
   const GoldSettings& settings = gold.fine().settings();
   const Index3 n = bricks_of(settings);
   const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
-  const DeviceField field(state, as_mixed(base, settings.granularity));
+  const DeviceField field(state, as_mixed(stored, settings));
   HostMemory host(state);
   const auto classify = [&](const std::vector<std::uint8_t>& selected) {
-    OpenBricks bricks{base.grid, settings.granularity, settings.rate, {}, {}, {}, {}, {}, false};
+    OpenBricks bricks;
+    bricks.grid = settings.grid;
+    bricks.granularity = settings.granularity;
+    bricks.rate = settings.rate;
+    bricks.coarsening = settings.coarsening;
+    bricks.sampled = false;
     bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
     bricks.involved.assign(near.size(), 0);
     bricks.samples.resize(near.size());
     ClassifyBricks test(state, gold, bricks, host, nullptr, {}, [](float, double) {});
     test.classify(field, tolerance, selected);
     std::vector<std::pair<double, BrickMeasure>> out;
-    const MixedVolume shape{base.grid, settings.granularity, settings.rate, {}, {}, {}, {}, 0};
+    const MixedVolume shape = bricks.shape();
     for (std::size_t i = 0; i < near.size(); ++i)
       out.emplace_back(bricks.level[i] == LevelTriple{0, 0, 0}
                            ? 0.0
@@ -232,7 +238,8 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   }
   Foreseen out;
   const auto samples = static_cast<double>(base.samples.size());
-  out.samples_ratio = (samples + static_cast<double>(near.size()) + tile_samples) / samples;
+  out.samples_ratio =
+      (static_cast<double>(stored.size()) + static_cast<double>(near.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
   out.seconds = first_pass;
   const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {

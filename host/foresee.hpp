@@ -14,9 +14,10 @@ struct Foreseen {
 };
 
 /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
-/// which tells the storage. `base` holds the base samples, `tolerance` is what the node test may take.
-/// Raising bricks after closing is not foreseen: it concerns few. Cost: about 1 % of the build, and six
-/// layers of rows.
-Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base, double tolerance);
+/// which tells the storage. `base` holds F on the grid, `stored` the base samples to store, `tolerance` is
+/// what the node test may take. Raising bricks after closing is not foreseen: it concerns few. Cost: about 1
+/// % of the build, and six layers of rows.
+Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
+                       const std::vector<float>& stored, double tolerance);
 
 }  // namespace vdvr

@@ -55,8 +55,10 @@ void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, s
 }
 
 Index3 GoldStream::Batch::spacing_of(const LevelTriple& level) const {
-  const std::int64_t rate = settings_.rate;
-  return {rate >> level[2], rate >> level[1], rate >> level[0]};
+  Index3 spacing{};
+  for (std::size_t a = 0; a < 3; ++a)
+    spacing[a] = std::int64_t{settings_.rate} << settings_.coarsening[2 - a] >> level[2 - a];
+  return spacing;
 }
 
 std::size_t GoldStream::Batch::slot(std::int64_t brick) const {
@@ -170,30 +172,33 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
 }
 
 std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::int64_t>& bricks) {
-  const int levels =
-      std::min(std::countr_zero(static_cast<unsigned>(settings_.rate)), AxisErrors::most_levels);
-  if (!settings_.anisotropic || levels == 0 || bricks.empty()) return std::vector<AxisErrors>(bricks.size());
+  constexpr int most = AxisErrors::most_levels;
+  Index3 levels{};
+  for (std::size_t a = 0; a < 3; ++a) levels[a] = std::min<int>(settings_.finest()[2 - a], most);
+  if (!settings_.anisotropic || *std::max_element(levels.begin(), levels.end()) == 0 || bricks.empty())
+    return std::vector<AxisErrors>(bricks.size());
   const std::int64_t n = shape_.count;
   const std::vector<std::uint8_t> wanted = flags(bricks);
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
                                                     "bricks to look at");
-  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(6 * levels), "errors along axes");
+  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(6 * most), "errors along axes");
   errors.fill(0);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
       kernel(state_, "classify", "axis_errors", brick_nodes());
   kernel({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, errors.buffer(),
          on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_.lowest, to_int(shape_.nx),
-         to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo), to_int(shape_.gold_stride), levels,
-         to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+         to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo), to_int(shape_.gold_stride),
+         to_int(levels[0]), to_int(levels[1]), to_int(levels[2]), most, to_int(bricks_x_), to_int(bricks_y_),
+         to_int(bricks_z_), to_int(n));
   const auto bits = errors.to_host();
   std::vector<AxisErrors> out(bricks.size());
   for (std::size_t i = 0; i < bricks.size(); ++i)
     for (std::size_t a = 0; a < 3; ++a)
-      for (std::size_t l = 0; l < at(levels); ++l)
+      for (std::size_t l = 0; l < at(most); ++l)
         for (std::size_t sign = 0; sign < 2; ++sign)
           out[i].of[a][l][sign] =
-              std::bit_cast<float>(bits[((slot(bricks[i]) * 3 + a) * at(levels) + l) * 2 + sign]);
+              std::bit_cast<float>(bits[((slot(bricks[i]) * 3 + a) * at(most) + l) * 2 + sign]);
   return out;
 }
 
@@ -273,7 +278,6 @@ void GoldStream::Batch::try_levels(std::vector<Candidate>& candidates, const Tri
 std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, float tolerance,
                                                     const opencl::DeviceArray<std::uint8_t>& selected,
                                                     bool gold_too) {
-  const int top = std::countr_zero(static_cast<unsigned>(settings_.rate));
   std::vector<BrickClass> out;
   for (const BrickMeasure& m : measure(base, tolerance, selected)) {
     BrickClass c;
@@ -292,19 +296,20 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
       c.along = errors[candidates.size()];
       candidates.push_back({&c, {c.along, c.base.slack}});
     }
-  try_levels(candidates, TripleSearch(settings_.granularity, top, settings_.anisotropic, settings_.midrange),
-             tolerance);
+  try_levels(candidates, TripleSearch(settings_), tolerance);
 
-  const auto finest = static_cast<std::uint8_t>(std::max(top, 1));
+  // A tile needs a level above 0, even where the base is gold.
+  LevelTriple finest = settings_.finest();
+  if (finest == LevelTriple{0, 0, 0}) finest = {1, 1, 1};
   std::vector<std::int64_t> bricks;
   std::vector<BrickClass*> results;
   for (BrickClass& c : out) {
     if (c.passes) continue;
-    c.level = {finest, finest, finest};
+    c.level = finest;
     bricks.push_back(c.base.brick);
     results.push_back(&c);
   }
-  if (gold_too) give_tiles(results, copy_tiles({finest, finest, finest}, bricks, nullptr));
+  if (gold_too) give_tiles(results, copy_tiles(finest, bricks, nullptr));
   return out;
 }
 
@@ -358,8 +363,7 @@ std::vector<float> GoldStream::Batch::copy_tiles(const LevelTriple& level,
   kernel({{size, requests.size(), 1}, {64, 1, 1}}, out.buffer(),
          (lattice ? lattice->samples : gold_).buffer(), margin_.buffer(), on_device.buffer(),
          to_int(static_cast<std::int64_t>(requests.size())), to_int(shape_.nx), to_int(shape_.ny),
-         to_int(shape_.halo), lattice ? lattice->shape : gold,
-         static_cast<cl_float>(-kept_margin(settings_.grid, 1)));
+         to_int(shape_.halo), lattice ? lattice->shape : gold, static_cast<cl_float>(-settings_.kept()));
   return out.to_host();
 }
 

@@ -50,7 +50,8 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
       upsampler_(upsampler),
       settings_(settings),
       coverage_(scan.geometry),
-      columns_(columns_for(scan.geometry, settings.grid, settings.upsampling)),
+      columns_(
+          columns_for(scan.geometry, coarsened(settings.grid, settings.coarsening), settings.upsampling)),
       cells_(std::move(cells)) {
   const std::int64_t g = settings.granularity;
   // Second differences look one node beyond a block, fits further.
@@ -145,11 +146,11 @@ double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& 
     for (int i = 0; i < raster; ++i) {
       const double bx = static_cast<double>(first[0]) + static_cast<double>(w.width_x) * (i + 0.5) / raster,
                    by = static_cast<double>(first[1]) + static_cast<double>(w.width_y) * (j + 0.5) / raster;
-      kept += coverage_.margin(grid.origin[0] + bx * settings_.granularity * grid.spacing[0],
-                               grid.origin[1] + by * settings_.granularity * grid.spacing[1]) >=
-                      -kept_margin(grid, 1)
-                  ? 1
-                  : 0;
+      kept +=
+          coverage_.margin(grid.origin[0] + bx * settings_.granularity * grid.spacing[0],
+                           grid.origin[1] + by * settings_.granularity * grid.spacing[1]) >= -settings_.kept()
+              ? 1
+              : 0;
     }
   return static_cast<double>(kept) / (raster * raster);
 }
@@ -302,7 +303,7 @@ std::vector<float> GoldStream::margins(const ColumnBlocks& columns) const {
 // Columns worth computing: those that may be kept, and those around them, for second differences.
 std::vector<std::array<std::int32_t, 2>> GoldStream::wanted(const std::vector<float>& margins,
                                                             std::int64_t nx, std::int64_t ny) const {
-  const float kept = static_cast<float>(-kept_margin(settings_.grid, 1));
+  const float kept = static_cast<float>(-settings_.kept());
   const auto is_kept = [&](float v) { return v >= kept; };
   const std::int64_t rows = static_cast<std::int64_t>(margins.size()) / nx;
   std::vector<std::array<std::int32_t, 2>> out(at(rows), {to_int(nx), -1});
@@ -447,15 +448,18 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
 }
 
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                      const FieldSups& sups, GoldSettings settings, const std::vector<std::uint8_t>& selected,
-                      std::vector<float>& base, const Progress& progress) {
+                      const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
+                      const Progress& progress) {
   // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
   settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
+  settings.grid = coarsened(settings.grid, settings.coarsening);
+  settings.granularity = fitting_granularity(settings.granularity, settings.grid);
+  settings.coarsening = {};
   settings.midrange = settings.base_only = true;
   GoldStream stream(state, scan, upsampler, sups, settings);
   stream.run(
-      selected, [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
+      stream.bricks_near_coverage(), [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
       GoldStream::For::samples);
 }
 

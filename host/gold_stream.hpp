@@ -182,12 +182,12 @@ class GoldStream {
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
 
-/// Base samples fitted to the trilinear filter, on bricks with selected != 0; elsewhere `base` stays. Gold at
-/// 2x serves: the error between base samples peaks near the middles of edges, faces and cells, and a fit to
-/// those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
+/// Base samples fitted to the trilinear filter where they are kept; elsewhere `base` stays. Gold at 2x their
+/// own rate serves: the error between base samples peaks near the middles of edges, faces and cells, and a
+/// fit to those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                      const FieldSups& sups, GoldSettings settings, const std::vector<std::uint8_t>& selected,
-                      std::vector<float>& base, const Progress& progress);
+                      const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
+                      const Progress& progress);
 
 class GoldStream::Batch {
  public:

@@ -16,7 +16,7 @@ namespace {
 
 VdvrLitBlock block_of_base(const MixedVolume& v) {
   VdvrLitBlock b{};
-  const Index3 n = v.grid.samples();
+  const Index3 n = v.base_samples();
   b.size_x = static_cast<int>(n[0]);
   b.size_y = static_cast<int>(n[1]);
   b.size_z = static_cast<int>(n[2]);
@@ -48,15 +48,16 @@ LitLayout::LitLayout(const MixedVolume& v) {
     if (v.level[i] != LevelTriple{0, 0, 0}) bricks[v.level[i]].push_back(static_cast<std::uint32_t>(i));
 
   // Places: of base bricks where they lie in the base, of tiles in the order of their bricks.
-  const Index3 n = v.bricks(), base = v.grid.samples();
+  const Index3 n = v.bricks(), base = v.base_samples();
   std::vector<std::uint64_t> place(v.level.size());
   for (std::size_t i = 0; i < place.size(); ++i) {
     const auto k = static_cast<std::int64_t>(i);
-    const std::int64_t x = k % n[0], y = k / n[0] % n[1], z = k / (n[0] * n[1]);
-    place[i] = static_cast<std::uint64_t>(((z * base[1] + y) * base[0] + x) * v.granularity);
+    const Index3 first = first_base_sample(v, {k % n[0], k / n[0] % n[1], k / (n[0] * n[1])});
+    place[i] = static_cast<std::uint64_t>((first[2] * base[1] + first[1]) * base[0] + first[0]);
   }
   blocks_.push_back({block_of_base(v), {}});
-  samples_ = static_cast<std::uint64_t>(v.grid.sample_count());
+  samples_ = v.base.size();
+  is_uniform_ = bricks.empty() && v.coarsening == LevelTriple{0, 0, 0};
   for (auto& [triple, of_triple] : bricks) {
     VdvrLitBlock params = block_of_tiles(v, triple);
     params.tiles = static_cast<int>(of_triple.size());
@@ -97,10 +98,11 @@ LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const Lit
   const int lanes =
       state.info.is_cpu && field.samples.size() <= std::numeric_limits<std::int32_t>::max() ? 8 : 1;
   const bool uniform = layout.is_uniform() && layout.blocks_.front().params.base_type == VDVR_F32;
-  const opencl::Defines defines{{"VDVR_GRANULARITY", std::to_string(field.grid.granularity)},
-                                {"VDVR_LANES", std::to_string(lanes)},
-                                {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
-                                field.defines.front()};
+  opencl::Defines defines = coarse_defines(field.grid);
+  defines.emplace_back("VDVR_GRANULARITY", std::to_string(field.grid.granularity));
+  defines.emplace_back("VDVR_LANES", std::to_string(lanes));
+  defines.emplace_back("VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0");
+  defines.push_back(field.defines.front());
   opencl::Kernel<cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, VdvrLitBlock, cl::Buffer> light(
       state, "lit_samples", "light_samples", defines);
   opencl::Kernel<cl::Buffer, VdvrGrid, cl::Buffer, VdvrLitBlock, cl::Buffer> close(

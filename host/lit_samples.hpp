@@ -16,8 +16,8 @@ class LitLayout {
   explicit LitLayout(const MixedVolume& volume);
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const;  ///< samples and records on the device
-  /// No brick has a tile.
-  [[nodiscard]] bool is_uniform() const { return blocks_.size() == 1; }
+  /// No brick has a tile, and the base is as fine as the grid.
+  [[nodiscard]] bool is_uniform() const { return is_uniform_; }
 
  private:
   friend class LitSamples;
@@ -28,6 +28,7 @@ class LitLayout {
   std::vector<Block> blocks_;           ///< base first
   std::vector<std::uint32_t> records_;  ///< two words a brick (mixed_sampler.h)
   std::uint64_t samples_ = 0;
+  bool is_uniform_ = false;
 };
 
 class LitSamples {

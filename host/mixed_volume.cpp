@@ -12,7 +12,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrGrid) == 32 && offsetof(VdvrGrid, step) == 28);
+static_assert(sizeof(VdvrGrid) == 48 && offsetof(VdvrGrid, step) == 28 && offsetof(VdvrGrid, coarse_x) == 32);
 static_assert(static_cast<int>(SampleType::f32) == VDVR_F32 &&
               static_cast<int>(SampleType::u16) == VDVR_U16 && static_cast<int>(SampleType::u8) == VDVR_U8);
 
@@ -64,7 +64,17 @@ VdvrGrid sampler_grid(const MixedVolume& v) {
           i32(b[0]),
           i32(b[1]),
           i32(b[2]),
-          static_cast<float>(v.step)};
+          static_cast<float>(v.step),
+          v.coarsening[2],
+          v.coarsening[1],
+          v.coarsening[0],
+          0};
+}
+
+Index3 first_base_sample(const MixedVolume& v, const Index3& brick) {
+  Index3 first{};
+  for (std::size_t a = 0; a < 3; ++a) first[a] = brick[a] * v.granularity >> v.coarsening[2 - a];
+  return first;
 }
 
 StoredTile stored_tile(const MixedVolume& v, std::size_t brick) {
@@ -117,12 +127,13 @@ RecordBits record_bits(const MixedVolume& v, std::size_t brick) {
 
 std::uint64_t place_of(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz) {
-  const Index3 bricks = v.bricks(), samples = v.grid.samples();
+  const Index3 bricks = v.bricks(), samples = v.base_samples();
   const std::size_t brick = at((bz * bricks[1] + by) * bricks[0] + bx);
   const LevelTriple level = v.level[brick];
-  const std::int64_t g = v.granularity;
-  if (level == in_base)
-    return static_cast<std::uint64_t>((bz * g * samples[1] + by * g) * samples[0] + bx * g);
+  if (level == in_base) {
+    const Index3 first = first_base_sample(v, {bx, by, bz});
+    return static_cast<std::uint64_t>((first[2] * samples[1] + first[1]) * samples[0] + first[0]);
+  }
   const StoredTile tile = stored_tile(v, brick);
   return offsets.at(tile.kind) / tile.block->sample_bytes() +
          std::uint64_t{tile.number} * static_cast<std::uint64_t>(v.tile_size(level));
@@ -172,16 +183,18 @@ BrickSamples::BrickSamples(const MixedVolume& v, const Index3& brick)
   data_ = stored.block->data();
   for (std::size_t a = 0; a < 3; ++a)
     end_[a] = std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity)
-              << level[2 - a];
+                  << level[2 - a] >>
+              v.coarsening[2 - a];
 }
 
 float BrickSamples::at(float cx, float cy, float cz) const {
-  const auto local = [&](float c, std::size_t a, std::uint32_t level, std::int32_t cells) {
-    return vdvr_local(c, static_cast<std::int32_t>(brick_[a]), level, grid_.granularity, cells);
+  const auto local = [&](float c, std::size_t a, std::uint32_t level, std::int32_t cells,
+                         std::int32_t coarse) {
+    return vdvr_local(c, static_cast<std::int32_t>(brick_[a]), level, grid_.granularity, cells, coarse);
   };
-  return vdvr_sample_in_brick(data_, record_, local(cx, 0, record_.level_x, grid_.cells_x),
-                              local(cy, 1, record_.level_y, grid_.cells_y),
-                              local(cz, 2, record_.level_z, grid_.cells_z));
+  return vdvr_sample_in_brick(data_, record_, local(cx, 0, record_.level_x, grid_.cells_x, grid_.coarse_x),
+                              local(cy, 1, record_.level_y, grid_.cells_y, grid_.coarse_y),
+                              local(cz, 2, record_.level_z, grid_.cells_z, grid_.coarse_z));
 }
 
 MixedVolume as_mixed(const Volume& volume, int granularity) {
@@ -261,13 +274,19 @@ Storage storage_of(const MixedVolume& v, bool interior) {
         }
         base += cells;
       }
+  // What a brick has of the base are its cells there.
+  double stored_base = std::ldexp(base, -(v.coarsening[0] + v.coarsening[1] + v.coarsening[2]));
+  if (!interior) {
+    base = static_cast<double>(v.grid.sample_count());
+    stored_base = static_cast<double>(v.base.size());
+  }
   Storage s;
-  if (!interior) base = static_cast<double>(v.grid.sample_count());
   if (base == 0) return s;
-  s.samples_ratio = (base + index + tiles) / base;
+  s.samples_ratio = (stored_base + index + tiles) / base;
   // Resident: samples, the bricks' records, and per brick a byte of distance by which rays leap.
   const double record = sample_types(v) == 1 << VDVR_F32 ? 8 : 12;
-  const double bytes = static_cast<double>(v.base.sample_bytes()) * base + tile_bytes + (record + 1) * index;
+  const double bytes =
+      static_cast<double>(v.base.sample_bytes()) * stored_base + tile_bytes + (record + 1) * index;
   s.bytes_ratio = bytes / (4 * base);
   s.device_bytes = static_cast<std::uint64_t>(bytes);
   return s;

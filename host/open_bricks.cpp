@@ -17,6 +17,13 @@ Index3 OpenBricks::counts() const {
   return n;
 }
 
+LevelTriple OpenBricks::finest() const {
+  LevelTriple top{};
+  for (std::size_t a = 0; a < 3; ++a)
+    top[a] = static_cast<std::uint8_t>(std::countr_zero(static_cast<unsigned>(rate)) + coarsening[a]);
+  return top;
+}
+
 Index3 OpenBricks::position(std::int64_t brick) const {
   const Index3 n = counts();
   return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
@@ -46,18 +53,18 @@ TileView::TileView(const OpenBricks& b, std::int64_t brick, const LevelTriple& l
   for (std::size_t a = 0; a < 3; ++a) {
     const std::int64_t width =
         std::min<std::int64_t>(b.granularity, b.grid.cells[a] - position[a] * b.granularity);
-    end[a] = width << level[a];
-    last[a] = static_cast<std::int64_t>(b.granularity) << level[a];
+    end[a] = width << level[a] >> b.coarsening[2 - a];
+    last[a] = static_cast<std::int64_t>(b.granularity) << level[a] >> b.coarsening[2 - a];
   }
   stride_y = last[0] + 1;
   stride_z = stride_y * (last[1] + 1);
 }
 
 float base_sample(const OpenBricks& b, const TileView& t, const Index3& i) {
-  const Index3 n = b.grid.samples();
+  const Index3 n = b.shape().base_samples();
   Index3 c{};
   for (std::size_t a = 0; a < 3; ++a)
-    c[a] = std::min(t.position[a] * b.granularity + (i[a] >> t.level[a]), b.grid.cells[a]);
+    c[a] = std::min((t.position[a] * b.granularity >> b.coarsening[2 - a]) + (i[a] >> t.level[a]), n[a] - 1);
   return b.base[at((c[2] * n[1] + c[1]) * n[0] + c[0])];
 }
 

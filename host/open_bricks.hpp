@@ -16,7 +16,8 @@ struct OpenBricks {
   Grid grid;
   int granularity = 4;
   int rate = 8;
-  std::vector<float> base;                  ///< [nz+1][ny+1][nx+1], on the lattice
+  LevelTriple coarsening{};                 ///< as in MixedVolume
+  std::vector<float> base;                  ///< as in MixedVolume, on the lattice
   std::vector<LevelTriple> level;           ///< [bz][by][bx]; 0 where a brick takes no part
   std::vector<std::uint8_t> involved;       ///< [bz][by][bx]
   std::vector<std::vector<float>> samples;  ///< per brick: its tile at its level; empty at level 0
@@ -25,6 +26,10 @@ struct OpenBricks {
 
   /// Bricks per axis.
   [[nodiscard]] Index3 counts() const;
+  /// The same shape without samples: for sizes.
+  [[nodiscard]] MixedVolume shape() const { return {grid, granularity, rate, coarsening, {}, {}, {}, {}, 0}; }
+  /// The level of gold, z, y, x.
+  [[nodiscard]] LevelTriple finest() const;
   [[nodiscard]] Index3 position(std::int64_t brick) const;
 };
 

@@ -10,12 +10,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/choose_coarsening.hpp"
 #include "host/foresee.hpp"
 #include "host/gold_stream.hpp"
 #include "host/host_memory.hpp"
 #include "host/paper_bounds.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
+#include "host/volume_problem.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -205,18 +207,25 @@ void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t
        r.gold, t.gold, true});
 }
 
+// Samples of a plane [y][x] that lie on the detector in every view.
+std::vector<std::uint8_t> covered_in_plane(const Grid& grid, const Coverage& coverage) {
+  const Index3 n = grid.samples();
+  std::vector<std::uint8_t> inside(at(n[0] * n[1]));
+  for (std::int64_t y = 0; y < n[1]; ++y)
+    for (std::int64_t x = 0; x < n[0]; ++x) {
+      const Vec3 p = grid.position({x, y, 0});
+      inside[at(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= 0;
+    }
+  return inside;
+}
+
 // Smallest and largest covered sample.
 std::pair<double, double> covered_values(const Volume& volume, const Coverage& coverage,
                                          std::int64_t& not_covered) {
   const Index3 n = volume.grid.samples();
   double low = INFINITY, high = -INFINITY;
   not_covered = 0;
-  std::vector<std::uint8_t> inside(at(n[0] * n[1]));
-  for (std::int64_t y = 0; y < n[1]; ++y)
-    for (std::int64_t x = 0; x < n[0]; ++x) {
-      const Vec3 p = volume.grid.position({x, y, 0});
-      inside[at(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= 0;
-    }
+  const std::vector<std::uint8_t> inside = covered_in_plane(volume.grid, coverage);
   for (std::int64_t z = 0; z < n[2]; ++z) {
     const bool in_height = coverage.margin_z(volume.grid.position({0, 0, z})[2]) >= 0;
     for (std::int64_t i = 0; i < n[0] * n[1]; ++i) {
@@ -248,6 +257,22 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
     throw InputError(
         "the field is constant over the covered samples, so a relative tolerance means nothing; give "
         "--epsilon-abs");
+}
+
+// How much coarser than the grid the base will be.
+LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const GoldSettings& s, const Trial& t) {
+  if (const auto& wanted = plan.settings.coarsening) {
+    if (is_possible(*wanted, plan.grid, s.granularity, s.rate)) return *wanted;
+    throw InputError(fmt::format(
+        "--base {}x{}x{} must divide the granularity {} and the grid's {} x {} x {} cells, and "
+        "with --gold {} be at most {}",
+        1 << (*wanted)[2], 1 << (*wanted)[1], 1 << (*wanted)[0], s.granularity, plan.grid.cells[0],
+        plan.grid.cells[1], plan.grid.cells[2], s.rate, (1 << largest_level) / s.rate));
+  }
+  if (!s.anisotropic) return {};
+  const double tolerance = s.grid_only ? plan.epsilon_abs : plan.epsilon_abs - 2 * t.arithmetic;
+  return choose_coarsening(plan.base, covered_in_plane(plan.grid, coverage),
+                           {s.granularity, s.rate, tolerance, s.grid_only ? 0.0 : t.projection, s.midrange});
 }
 
 // The largest |F| that gold shows, between base samples too: what the paper takes its thresholds of. Cost: a
@@ -323,6 +348,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     s.midrange = settings.coefficients == "midrange";
     s.grid_only = grid_only;
     s.anisotropic = settings.levels == "anisotropic";
+    s.coarsening = plan.coarsening;
     return s;
   };
   const auto stream_at = [&](const Rates& r) {
@@ -380,18 +406,18 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
   report(progress, "plan", 0.8);
 
+  plan.coarsening = coarsening_of(plan, coverage, settings_at(r), t);
   if (settings.coefficients == "midrange") {
     start = now();
-    plan.fitted = plan.base.samples;
-    fit_base_samples(state, filtered, upsampler, sups, settings_at(r), stream_at(r).bricks_near_coverage(),
-                     plan.fitted, {});
+    plan.fitted = take_base(plan.base, plan.coarsening);
+    fit_base_samples(state, filtered, upsampler, sups, settings_at(r), plan.fitted, {});
     preparation += since(start);
   }
   if (settings.foresee) {
     GoldRates gold(state, filtered, upsampler, sups, settings_at(r));
-    const Foreseen foreseen =
-        foresee_build(state, gold, plan.fitted.empty() ? plan.base : Volume{grid, plan.fitted},
-                      plan.epsilon_abs - t.arithmetic);
+    const Foreseen foreseen = foresee_build(
+        state, gold, plan.base, plan.fitted.empty() ? take_base(plan.base, plan.coarsening) : plan.fitted,
+        plan.epsilon_abs - t.arithmetic);
     plan.samples_ratio = foreseen.samples_ratio;
     start = now();
     probe_sampler(device);  // as build will

@@ -20,7 +20,12 @@ void rise(std::uint8_t& level, std::uint8_t to) { level = std::max(level, to); }
 class Raise {
  public:
   Raise(const OpenBricks& bricks, std::int64_t brick, const AxisErrors* along, std::vector<LevelTriple>& to)
-      : bricks_(bricks), brick_(brick), own_(bricks.level[at(brick)]), along_(along), to_(to) {}
+      : bricks_(bricks),
+        brick_(brick),
+        own_(bricks.level[at(brick)]),
+        top_(bricks.finest()),
+        along_(along),
+        to_(to) {}
 
   // Bricks that share this part and are coarser along it: what they store there is what was interpolated
   // from.
@@ -45,13 +50,13 @@ class Raise {
   }
 
   // The others: what they store elsewhere bears on this part only through its owner.
-  bool others(const std::array<int, 3>& side, int top) {
+  bool others(const std::array<int, 3>& side) {
     bool any = false;
     for (const std::int64_t j : incident_bricks(bricks_, brick_, side)) {
       if (j == brick_) continue;
       for (std::size_t a = 0; a < 3; ++a) {
         const std::uint8_t level = bricks_.level[at(j)][a];
-        if (level >= top) continue;
+        if (level >= top_[a]) continue;
         rise(to_[at(j)][a], static_cast<std::uint8_t>(level + 1));
         any = true;
       }
@@ -60,19 +65,22 @@ class Raise {
   }
 
   // The axis that errs most; where that is not known, the coarsest ones; with isotropic levels, all.
-  bool itself(int top) {
-    const std::uint8_t lowest = *std::min_element(own_.begin(), own_.end());
-    if (lowest >= top) return false;
+  bool itself() {
+    if (own_ == top_) return false;
+    // Samples a cell, as log2.
+    const auto density = [&](std::size_t zyx) { return own_[zyx] - bricks_.coarsening[zyx]; };
+    const int lowest = std::min({density(0), density(1), density(2)});
     std::size_t worst = 3;
     float gain = 0;
     for (std::size_t a = 0; along_ && a < 3; ++a) {
-      const float g = error(*along_, a, own_[2 - a], top) - error(*along_, a, own_[2 - a] + 1, top);
-      if (own_[2 - a] >= top || g <= gain) continue;
+      const int own = own_[2 - a], top = top_[2 - a];
+      const float g = error(*along_, a, own, top) - error(*along_, a, own + 1, top);
+      if (own >= top || g <= gain) continue;
       worst = a;
       gain = g;
     }
     for (std::size_t a = 0; a < 3; ++a)
-      if (worst < 3 ? a == worst : own_[2 - a] == lowest)
+      if (worst < 3 ? a == worst : density(2 - a) == lowest)
         rise(to_[at(brick_)][2 - a], static_cast<std::uint8_t>(own_[2 - a] + 1));
     return true;
   }
@@ -80,20 +88,20 @@ class Raise {
  private:
   const OpenBricks& bricks_;
   std::int64_t brick_;
-  LevelTriple own_;
+  LevelTriple own_, top_;
   const AxisErrors* along_;
   std::vector<LevelTriple>& to_;
 };
 
 }  // namespace
 
-bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated, int top,
+bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
                   const AxisErrors* along, std::vector<LevelTriple>& to) {
   Raise raise(bricks, brick, along, to);
   for (int part = 0; part < 27; ++part) {
     if (!(violated >> part & 1)) continue;
     const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
-    if (!raise.coarser_neighbours(side) && !raise.itself(top) && !raise.others(side, top)) return false;
+    if (!raise.coarser_neighbours(side) && !raise.itself() && !raise.others(side)) return false;
   }
   return true;
 }

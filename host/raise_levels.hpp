@@ -13,10 +13,10 @@ namespace vdvr {
 /// `violated`: one bit per part of the brick, as in BrickMeasure. A violation on a shared part raises the
 /// bricks there that are coarser along it, by one level in the axes where they are. Any other raises the
 /// brick itself, along the axis that errs most by `along`, or its coarsest axes where that tells nothing; one
-/// at `top` raises all who share the part. Without `along` levels are isotropic, and all axes rise. `to`
+/// of gold raises all who share the part. Without `along` levels are isotropic, and all axes rise. `to`
 /// holds the levels after all raises of this round, from `bricks.level` on: no axis rises by more than one in
-/// a round. False where all are at `top` already.
-bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated, int top,
+/// a round. False where all are gold already.
+bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
                   const AxisErrors* along, std::vector<LevelTriple>& to);
 
 }  // namespace vdvr

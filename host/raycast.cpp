@@ -239,18 +239,22 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
                             const RaycastTuning& tuning, int lanes) {
   const bool lit = gradient == GradientKind::stored;
   const bool uniform = lit ? v.lit_layout.is_uniform() : v.is_uniform;
-  return {{"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
-          {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
-          {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
-          {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
-          {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
-          {"VDVR_BOUNDS", o.output == RenderOutput::error ? "1" : "0"},
-          {"VDVR_GRADIENT_ANALYTIC", gradient == GradientKind::analytic ? "1" : "0"},
-          {"VDVR_LIT", lit ? "1" : "0"},
-          {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
-          {"VDVR_LANES", std::to_string(lanes)},
-          {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
-          lit ? std::pair<std::string, std::string>{"VDVR_SAMPLE_TYPES", "1"} : v.field->defines.front()};
+  opencl::Defines defines = coarse_defines(v.field->grid);
+  const opencl::Defines more{
+      {"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
+      {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
+      {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
+      {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
+      {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
+      {"VDVR_BOUNDS", o.output == RenderOutput::error ? "1" : "0"},
+      {"VDVR_GRADIENT_ANALYTIC", gradient == GradientKind::analytic ? "1" : "0"},
+      {"VDVR_LIT", lit ? "1" : "0"},
+      {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
+      {"VDVR_LANES", std::to_string(lanes)},
+      {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
+      lit ? std::pair<std::string, std::string>{"VDVR_SAMPLE_TYPES", "1"} : v.field->defines.front()};
+  defines.insert(defines.end(), more.begin(), more.end());
+  return defines;
 }
 
 void prepare_frame(Impl& v, const RenderOptions& o, const BakedTransfer& table) {

@@ -31,7 +31,7 @@ struct AtlasImage {
 // Shelves of one type's samples for a given width and depth; size[1] follows.
 AtlasImage lay_out(const MixedVolume& v, SampleType type, std::uint64_t width, std::uint64_t depth) {
   AtlasImage image;
-  std::uint64_t y = v.base.type == type ? static_cast<std::uint64_t>(v.grid.samples()[1]) : 0;
+  std::uint64_t y = v.base.type == type ? static_cast<std::uint64_t>(v.base_samples()[1]) : 0;
   for (const auto& [triple, block] : v.tiles) {
     if (block.type != type) continue;
     const auto shape = v.tile_shape(triple);
@@ -51,7 +51,7 @@ AtlasImage lay_out(const MixedVolume& v, SampleType type, std::uint64_t width, s
 
 // Width and depth no smaller than the base and any tile; 0 where the type does not occur.
 Size3 least_size(const MixedVolume& v, SampleType type) {
-  const Index3 base = v.grid.samples();
+  const Index3 base = v.base_samples();
   Size3 least{0, 0, 0};
   if (v.base.type == type)
     for (std::size_t a = 0; a < 3; ++a) least[a] = static_cast<std::uint64_t>(base[a]);
@@ -91,7 +91,7 @@ Index3 position_of(const MixedVolume& v, std::size_t brick) {
 // Marks bricks that read the base, as those across their faces do. Kernels address the base by 32-bit offsets
 // there.
 void mark_base_around(const MixedVolume& v, PackedRecords& records) {
-  if (v.grid.sample_count() > std::numeric_limits<std::int32_t>::max()) return;
+  if (v.base.size() > std::numeric_limits<std::int32_t>::max()) return;
   const Index3 b = v.bricks();
   const auto reads_base = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
     const bool inside = x >= 0 && x < b[0] && y >= 0 && y < b[1] && z >= 0 && z < b[2];
@@ -106,6 +106,8 @@ void mark_base_around(const MixedVolume& v, PackedRecords& records) {
   }
 }
 
+std::size_t count_of(const Index3& n) { return static_cast<std::size_t>(n[0] * n[1] * n[2]); }
+
 void check_sizes(const MixedVolume& v) {
   for (std::size_t a = 0; a < 3; ++a) {
     // Cell coordinates are fp32, and the kernels' leaps rely on rounding below 2^-8 cell.
@@ -117,11 +119,10 @@ void check_sizes(const MixedVolume& v) {
       throw InputError(fmt::format("a grid spacing of {} cannot be rendered", v.grid.spacing[a]));
   }
   const auto bricks = static_cast<std::size_t>(v.brick_count());
-  if (v.base.size() != static_cast<std::size_t>(v.grid.sample_count()) || v.level.size() != bricks ||
-      v.tile.size() != bricks)
+  if (v.base.size() != count_of(v.base_samples()) || v.level.size() != bricks || v.tile.size() != bricks)
     throw InputError(fmt::format(
         "a mixed volume of {} base samples and {} / {} index entries, where its grid needs {} and {}",
-        v.base.size(), v.level.size(), v.tile.size(), v.grid.sample_count(), bricks));
+        v.base.size(), v.level.size(), v.tile.size(), count_of(v.base_samples()), bricks));
 }
 
 }  // namespace
@@ -249,7 +250,8 @@ std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& cla
 
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
     : state(&device.state()), grid(v.grid), lit_layout((check_sizes(v), v)) {
-  is_uniform = v.base.type == SampleType::f32 && v.tiles.empty();
+  is_uniform = v.base.type == SampleType::f32 && v.tiles.empty() && v.coarsening == LevelTriple{0, 0, 0};
+  base_samples_ = v.base_samples();
   offsets_ = tile_offsets(v);
   types_[{}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
@@ -264,7 +266,8 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     texel_records_ = records.words();
   }
   for (const auto& [triple, block] : v.tiles)
-    highest_level = std::max<int>(highest_level, *std::max_element(triple.level.begin(), triple.level.end()));
+    for (std::size_t a = 0; a < 3; ++a)
+      highest_level = std::max(highest_level, triple.level[a] - v.coarsening[a]);
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const BrickSamples stored(v, position_of(v, i));
     host_ranges.push_back(range_of(stored));
@@ -294,9 +297,10 @@ void ResidentVolume::Impl::set_texels(const MixedVolume& v, PackedRecords& recor
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const Index3 p = position_of(v, i);
     Size3 origin{};
-    if (v.level[i] == LevelTriple{0, 0, 0})
-      for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<std::uint64_t>(p[a] * v.granularity);
-    else {
+    if (v.level[i] == LevelTriple{0, 0, 0}) {
+      const Index3 first = first_base_sample(v, p);
+      for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<std::uint64_t>(first[a]);
+    } else {
       const StoredTile tile = stored_tile(v, i);
       origin = layout.shelves.at(tile.kind).origin(tile.number);
     }
@@ -313,7 +317,7 @@ void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type)
   // Texels beside a tile weigh 0, but 0 times NaN would be NaN.
   state->queue.enqueueFillImage(image, cl_float4{{0, 0, 0, 0}}, region({0, 0, 0}),
                                 region(layout.size[static_cast<std::size_t>(type)]));
-  const Index3 base = grid.samples();
+  const Index3& base = base_samples_;
   if (types_.at({}) == type)
     state->queue.enqueueCopyBufferToImage(
         samples, image, 0, region({0, 0, 0}),

@@ -85,8 +85,8 @@ struct ResidentVolume::Impl {
   std::vector<cl_float2> host_ranges;  ///< what ranges() holds
   std::pair<float, float> value_range{0, 0};
   float largest = 0;        ///< that a texel can decode to, in magnitude
-  int highest_level = 0;    ///< of any brick and axis
-  bool is_uniform = false;  ///< every brick reads a float32 base
+  int highest_level = 0;    ///< of any brick and axis: log2 of samples per cell
+  bool is_uniform = false;  ///< every brick reads a float32 base as fine as the grid
   AtlasLayout layout;
   LitLayout lit_layout;
 
@@ -107,6 +107,7 @@ struct ResidentVolume::Impl {
   void set_texels(const MixedVolume& volume, PackedRecords& records) const;
   void fill_image(const cl::Image3D& image, SampleType type);
 
+  Index3 base_samples_{};
   std::map<TileKind, std::uint64_t> offsets_;
   std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
   std::vector<std::uint32_t> texel_records_;

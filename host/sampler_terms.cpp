@@ -25,7 +25,7 @@ FieldSlopes field_slopes(const MixedVolume& v) {
     const std::int64_t bz = row / bricks[1], by = row % bricks[1];
     for (std::int64_t bx = 0; bx < bricks[0]; ++bx) {
       const BrickSamples stored(v, {bx, by, bz});
-      const std::array<int, 3> levels = stored.level();
+      const std::array<int, 3> finer = stored.per_cell();
       const Index3& end = stored.end();
       std::array<float, 3> largest{0, 0, 0};
       float magnitude = 0;
@@ -45,7 +45,7 @@ FieldSlopes field_slopes(const MixedVolume& v) {
         own.scale = (own.type == SampleType::u16 ? 65535 : 255) * static_cast<double>(stored.record().scale);
       for (std::size_t a = 0; a < 3; ++a) {
         own.per_sample[a] = static_cast<double>(largest[a]);
-        per_cell[a] = std::max(per_cell[a], own.per_sample[a] * std::ldexp(1.0, levels[a]));
+        per_cell[a] = std::max(per_cell[a], own.per_sample[a] * std::ldexp(1.0, finer[a]));
       }
     }
     const std::lock_guard guard(lock);

@@ -15,31 +15,33 @@ constexpr float slack_share = 0.5f;
 // are left.
 constexpr std::size_t most_failures = 4;
 
-double samples_of(int granularity, const LevelTriple& l) {
-  double n = 1;
-  for (const std::uint8_t level : l) n *= static_cast<double>((granularity << level) + 1);
-  return n;
-}
-
 bool is_coarser(const LevelTriple& a, const LevelTriple& b) {
   return a[0] <= b[0] && a[1] <= b[1] && a[2] <= b[2];
 }
 
 }  // namespace
 
-TripleSearch::TripleSearch(int granularity, int top, bool anisotropic, bool fitted)
-    : top_(std::min(top, AxisErrors::most_levels)), anisotropic_(anisotropic), fitted_(fitted) {
-  for (int z = 0; z <= top_; ++z)
-    for (int y = 0; y <= top_; ++y)
-      for (int x = 0; x <= top_; ++x) {
-        const int sum = x + y + z;
-        if (sum == 0 || sum == 3 * top_ || (!anisotropic && (x != y || y != z))) continue;
-        candidates_.push_back(
-            {static_cast<std::uint8_t>(z), static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(x)});
-      }
+TripleSearch::TripleSearch(const GoldSettings& settings)
+    : coarsening_(settings.coarsening),
+      top_(settings.finest()),
+      anisotropic_(settings.anisotropic),
+      fitted_(settings.midrange) {
+  for (std::uint8_t& top : top_) top = std::min<std::uint8_t>(top, AxisErrors::most_levels);
+  LevelTriple l{};
+  for (l[0] = 0; l[0] <= top_[0]; ++l[0])
+    for (l[1] = 0; l[1] <= top_[1]; ++l[1])
+      for (l[2] = 0; l[2] <= top_[2]; ++l[2])
+        if (l != LevelTriple{0, 0, 0} && l != top_ && (anisotropic_ || is_isotropic(l)))
+          candidates_.push_back(l);
+  const MixedVolume shape{settings.grid, settings.granularity, settings.rate, coarsening_, {}, {}, {}, {}, 0};
   std::stable_sort(candidates_.begin(), candidates_.end(), [&](const LevelTriple& a, const LevelTriple& b) {
-    return samples_of(granularity, a) < samples_of(granularity, b);
+    return shape.tile_size(a) < shape.tile_size(b);
   });
+}
+
+// As many samples a cell along every axis.
+bool TripleSearch::is_isotropic(const LevelTriple& l) const {
+  return l[0] - coarsening_[0] == l[1] - coarsening_[1] && l[1] - coarsening_[1] == l[2] - coarsening_[2];
 }
 
 // Interpolation along one axis after the other: errors of either sign add up. Fitted samples halve them.
@@ -47,7 +49,7 @@ float TripleSearch::foreseen(const Brick& brick, const LevelTriple& level) const
   float plus = 0, minus = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     const std::size_t l = level[2 - a];
-    if (static_cast<int>(l) >= top_) continue;
+    if (l >= top_[2 - a]) continue;
     plus += brick.errors.of[a][l][0];
     minus += brick.errors.of[a][l][1];
   }
@@ -56,8 +58,7 @@ float TripleSearch::foreseen(const Brick& brick, const LevelTriple& level) const
 
 std::optional<LevelTriple> TripleSearch::next(const Brick& brick, float tolerance) const {
   for (const LevelTriple& level : candidates_) {
-    const bool isotropic = level[0] == level[1] && level[1] == level[2];
-    if (brick.failed.size() >= most_failures && !isotropic) continue;
+    if (brick.failed.size() >= most_failures && !is_isotropic(level)) continue;
     const bool hopeless = std::any_of(brick.failed.begin(), brick.failed.end(),
                                       [&](const LevelTriple& f) { return is_coarser(level, f); });
     if (hopeless) continue;

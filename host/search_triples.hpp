@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "host/gold_settings.hpp"
 
 namespace vdvr {
 
@@ -19,8 +19,8 @@ struct AxisErrors {
 /// The candidates of a volume, from the cheapest to the last before gold itself.
 class TripleSearch {
  public:
-  /// `top`: level of the gold rate. Isotropic: the levels in turn.
-  TripleSearch(int granularity, int top, bool anisotropic, bool fitted);
+  /// Levels up to the gold rate's. Isotropic: the levels in turn.
+  TripleSearch(const GoldSettings& settings);
 
   /// One brick's search. Cost of next(): a look at each candidate.
   struct Brick {
@@ -37,7 +37,9 @@ class TripleSearch {
  private:
   [[nodiscard]] float foreseen(const Brick& brick, const LevelTriple& level) const;
 
-  int top_;
+  [[nodiscard]] bool is_isotropic(const LevelTriple& level) const;
+
+  LevelTriple coarsening_, top_;
   bool anisotropic_, fitted_;
   std::vector<LevelTriple> candidates_;
 };

@@ -4,6 +4,7 @@
 #include "vdvr/vdvr_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <bit>
@@ -29,9 +30,9 @@ namespace h5 = io::hdf5_file;
 static_assert(std::endian::native == std::endian::little,
               "content_sha256 hashes memory, which must be little-endian");
 
-// Version 2 is version 1 with integer samples, version 3 with triples whose tiles have several types; a file
-// has the lowest that says what it holds.
-constexpr int newest_version = 3;
+// Version 2 is version 1 with integer samples, version 3 with triples whose tiles have several types, version
+// 4 with a base coarser than the grid; a file has the lowest that says what it holds.
+constexpr int newest_version = 4;
 constexpr std::uint64_t longest_certificate = 64u << 20;
 
 template <class T>
@@ -46,11 +47,16 @@ h5::Shape shape_of(std::initializer_list<std::int64_t> extents) {
 }
 
 h5::Shape base_shape(const MixedVolume& v) {
-  const Index3 s = v.grid.samples();
+  const Index3 s = v.base_samples();
   return shape_of({s[2], s[1], s[0]});
 }
 
 std::string text_of(const h5::Shape& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
+
+bool is_coarse(const MixedVolume& v) { return v.coarsening != LevelTriple{0, 0, 0}; }
+
+/// As the file and its hash have it, z, y, x.
+std::array<std::int64_t, 3> wide(const LevelTriple& zyx) { return {zyx[0], zyx[1], zyx[2]}; }
 
 // --- writing
 // ----------------------------------------------------------------------------------------------------------
@@ -63,6 +69,7 @@ void write_grid(h5::Writer& file, const MixedVolume& v) {
   file.attribute("/grid", "unit", v.grid.unit);
   file.attribute("/grid", "granularity", std::int64_t{v.granularity});
   file.attribute("/grid", "rate", std::int64_t{v.rate});
+  if (is_coarse(v)) file.attribute("/grid", "coarsening", wide(v.coarsening));
 }
 
 void write_index(h5::Writer& file, const MixedVolume& v) {
@@ -108,7 +115,7 @@ int read_small(const h5::Reader& file, const char* name) {
       std::clamp<std::int64_t>(file.integer("/grid", name), -1, std::numeric_limits<int>::max()));
 }
 
-void read_grid(const h5::Reader& file, MixedVolume& v) {
+void read_grid(const h5::Reader& file, int version, MixedVolume& v) {
   file.require_group("/grid");
   const auto cells = file.integers("/grid", "cells", 3);
   const auto origin = file.reals("/grid", "origin", 3), spacing = file.reals("/grid", "spacing", 3);
@@ -120,6 +127,14 @@ void read_grid(const h5::Reader& file, MixedVolume& v) {
   v.grid.unit = file.text_attribute("/grid", "unit");
   v.granularity = read_small(file, "granularity");
   v.rate = read_small(file, "rate");
+  if (version >= 4) {
+    const auto coarsening = file.integers("/grid", "coarsening", 3);
+    for (std::size_t a = 0; a < 3; ++a)
+      v.coarsening[a] = static_cast<std::uint8_t>(std::clamp<std::int64_t>(coarsening[a], 0, 255));
+    if (wide(v.coarsening) != std::array{coarsening[0], coarsening[1], coarsening[2]})
+      file.refuse("attribute 'coarsening' of /grid",
+                  fmt::format("is {}, expected 0 to 3", fmt::join(coarsening, ", ")));
+  }
   if (const auto p = grid_problem(v)) file.refuse(p->where, p->what);
 }
 
@@ -194,7 +209,6 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
   c.tile = expect(file, "/tile", {h5::Element::u32}, shape_of({b[2], b[1], b[0]}));
   if (!file.has("/tiles")) return c;
   file.require_group("/tiles");
-  const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
   std::vector<std::string> tables;
   for (const std::string& name : file.members("/tiles")) {
     if (name.ends_with("_offset") || name.ends_with("_shift")) {
@@ -202,8 +216,9 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
       continue;
     }
     const TileKind l = kind_of(file, name);
-    if (*std::max_element(l.level.begin(), l.level.end()) > finest)
-      file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate, finest));
+    if (!is_within_rate(v, l.level))
+      file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate,
+                                          fmt::join(finest_level(v), ", ")));
     const auto side = v.tile_shape(l);
     c.tiles[l] = expect(file, path_of(l), kSampleElements, shape_of({0, side[0], side[1], side[2]}));
     c.counts[l] = c.tiles[l].shape.front();
@@ -352,6 +367,9 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
   hash.update(v.grid.unit.data(), v.grid.unit.size());
   const std::array<std::int64_t, 2> counts{v.granularity, v.rate};
   add(hash, std::span<const std::int64_t>(counts));
+  if (!is_coarse(v)) return;
+  const auto coarsening = wide(v.coarsening);
+  add(hash, std::span<const std::int64_t>(coarsening));
 }
 
 VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
@@ -360,7 +378,7 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
   result.file_bytes = file.file_bytes();
   result.format_version = read_version(file);
   result.generator = file.text_attribute("/", "generator");
-  read_grid(file, result.volume);
+  read_grid(file, result.format_version, result.volume);
   const Contents contents = open_contents(file, result.volume);
   read_step(file, contents, result.volume);
   check_memory(file, path.string(), contents, max_memory_bytes);
@@ -412,7 +430,11 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
   {
     h5::Writer file(target.temporary(), path);
     file.attribute("/", "format", std::string("vdvr"));
-    file.attribute("/", "format_version", std::int64_t{has_parts(v) ? 3 : has_integers(v) ? 2 : 1});
+    file.attribute("/", "format_version",
+                   std::int64_t{is_coarse(v)      ? 4
+                                : has_parts(v)    ? 3
+                                : has_integers(v) ? 2
+                                                  : 1});
     file.attribute("/", "generator", std::string("vdvr " VDVR_VERSION));
     if (has_integers(v)) file.attribute("/", "step", v.step);
     write_grid(file, v);

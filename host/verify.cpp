@@ -97,6 +97,7 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
   p.level = v.level[at(brick)];
   const bool base = p.level == LevelTriple{0, 0, 0};
   const std::array<int, 3> levels = stored.level();
+  const Index3 in_base = first_base_sample(v, b);
   std::vector<Vec3> points;
   std::vector<double> values;
   std::vector<Index3> nodes;
@@ -122,8 +123,8 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
   p.value = values[worst];
   p.field = F[worst];
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t per_sample = v.rate >> levels[a];
-    p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? b[a] * v.granularity : 0);
+    const std::int64_t per_sample = std::int64_t{v.rate} << v.coarsening[2 - a] >> levels[a];
+    p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? in_base[a] : 0);
   }
   p.dataset = "/base";
   if (!base) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <mutex>
 
 #include "host/brick_layout.hpp"
@@ -34,9 +35,10 @@ Seams compare_seams(const MixedVolume& v) {
         for (std::size_t a = 0; a < 3; ++a) {
           const int coarse = std::min(level_p[a], level_q[a]);
           const std::int64_t g = v.granularity;
-          if (step[a] == 0) count[a] = std::min<std::int64_t>(g, v.grid.cells[a] - p[a] * g) << coarse;
-          if (step[a] > 0) first_p[a] = g << level_p[a];
-          if (step[a] < 0) first_q[a] = g << level_q[a];
+          if (step[a] == 0)
+            count[a] = std::min<std::int64_t>(g, v.grid.cells[a] - p[a] * g) << coarse >> v.coarsening[2 - a];
+          if (step[a] > 0) first_p[a] = g << level_p[a] >> v.coarsening[2 - a];
+          if (step[a] < 0) first_q[a] = g << level_q[a] >> v.coarsening[2 - a];
           by_p[a] = std::int64_t{1} << (level_p[a] - coarse);
           by_q[a] = std::int64_t{1} << (level_q[a] - coarse);
         }
@@ -55,10 +57,11 @@ Seams compare_seams(const MixedVolume& v) {
               if (local.different++ > 0) continue;
               local.bricks = {(p[2] * n[1] + p[1]) * n[0] + p[0], (q[2] * n[1] + q[1]) * n[0] + q[0]};
               for (std::size_t a = 0; a < 3; ++a)
-                local.at[a] = v.grid.origin[a] +
-                              v.grid.spacing[a] * (static_cast<double>(p[a] * v.granularity) +
-                                                   static_cast<double>(first_p[a] + i[a] * by_p[a]) /
-                                                       static_cast<double>(std::int64_t{1} << level_p[a]));
+                local.at[a] =
+                    v.grid.origin[a] +
+                    v.grid.spacing[a] *
+                        (static_cast<double>(p[a] * v.granularity) +
+                         std::ldexp(static_cast<double>(first_p[a] + i[a] * by_p[a]), -sp.per_cell()[a]));
             }
       }
     }

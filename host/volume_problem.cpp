@@ -2,6 +2,7 @@
 #include "host/volume_problem.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <bit>
@@ -49,6 +50,19 @@ std::optional<Problem> grid_problem(const MixedVolume& v) {
     return at_grid(fmt::format("granularity {}, expected 1, 2, 4 or 8", v.granularity));
   if (v.rate < 1 || v.rate > largest_rate || !std::has_single_bit(static_cast<unsigned>(v.rate)))
     return at_grid(fmt::format("rate {}, expected a power of two up to {}", v.rate, largest_rate));
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int c = v.coarsening[2 - a];
+    if (c > 3 || v.granularity % (1 << c) != 0 || v.grid.cells[a] % (1 << c) != 0)
+      return at_grid(fmt::format(
+          "a base sample every 2^{} cells along {}, which must divide its {} cells and the granularity "
+          "{}",
+          c, "xyz"[a], v.grid.cells[a], v.granularity));
+    if (c + std::countr_zero(static_cast<unsigned>(v.rate)) > largest_level)
+      return at_grid(fmt::format(
+          "rate {} with a base sample every 2^{} cells along {} has levels up to {}, expected at "
+          "most {}",
+          v.rate, c, "xyz"[a], c + std::countr_zero(static_cast<unsigned>(v.rate)), largest_level));
+  }
   if (v.grid.unit.find('\0') != std::string::npos || v.grid.unit.size() > longest_unit)
     return at_grid(fmt::format("the unit has a zero byte or more than {} bytes", longest_unit));
   return std::nullopt;
@@ -64,9 +78,20 @@ std::string brick_text(const MixedVolume& v, std::size_t brick) {
 
 }  // namespace
 
+LevelTriple finest_level(const MixedVolume& v) {
+  const int rate = std::countr_zero(static_cast<unsigned>(v.rate));
+  LevelTriple finest{};
+  for (std::size_t a = 0; a < 3; ++a) finest[a] = static_cast<std::uint8_t>(rate + v.coarsening[a]);
+  return finest;
+}
+
+bool is_within_rate(const MixedVolume& v, const LevelTriple& l) {
+  const LevelTriple finest = finest_level(v);
+  return l[0] <= finest[0] && l[1] <= finest[1] && l[2] <= finest[2];
+}
+
 /// Levels within the rate, and every tile of every triple used by exactly one brick.
 std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& counts) {
-  const int finest = std::countr_zero(static_cast<unsigned>(v.rate));
   std::map<LevelTriple, std::vector<bool>> used;
   for (const auto& [kind, count] : counts) {
     auto& flags = used[kind.level];
@@ -75,9 +100,9 @@ std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKi
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const LevelTriple l = v.level[i];
     const std::uint32_t t = v.tile[i];
-    if (*std::max_element(l.begin(), l.end()) > finest)
+    if (!is_within_rate(v, l))
       return Problem{"/level", fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i),
-                                           l[0], l[1], l[2], v.rate, finest)};
+                                           l[0], l[1], l[2], v.rate, fmt::join(finest_level(v), ", "))};
     if (l == in_base) {
       if (t != 0)
         return Problem{"/tile",
@@ -192,7 +217,8 @@ bool has_parts(const MixedVolume& v) {
 std::optional<Problem> volume_problem(const MixedVolume& v) {
   if (auto p = grid_problem(v)) return p;
   const auto bricks = static_cast<std::uint64_t>(v.brick_count());
-  if (auto p = size_problem("/base", v.base.size(), static_cast<std::uint64_t>(v.grid.sample_count())))
+  const Index3 base = v.base_samples();
+  if (auto p = size_problem("/base", v.base.size(), static_cast<std::uint64_t>(base[0] * base[1] * base[2])))
     return p;
   if (auto p = size_problem("/level", v.level.size(), bricks)) return p;
   if (auto p = size_problem("/tile", v.tile.size(), bricks)) return p;
@@ -211,8 +237,8 @@ std::optional<Problem> volume_problem(const MixedVolume& v) {
   for (const auto& [triple, samples] : v.tiles) {
     if (triple.level == in_base)
       return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
-    if (*std::max_element(triple.level.begin(), triple.level.end()) > 6)
-      return Problem{path_of(triple), "a level above 6"};
+    if (*std::max_element(triple.level.begin(), triple.level.end()) > largest_level)
+      return Problem{path_of(triple), fmt::format("a level above {}", largest_level)};
     if (triple.part >= most_parts) return Problem{path_of(triple), "more parts than sample types"};
     const auto size = static_cast<std::uint64_t>(v.tile_size(triple));
     if (samples.size() % size != 0)

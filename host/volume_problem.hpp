@@ -12,6 +12,7 @@
 namespace vdvr {
 
 inline constexpr int largest_shift = 24;
+inline constexpr int largest_level = 6;  ///< of any axis: a record has three bits for it
 inline constexpr std::int64_t code_limit = std::int64_t{1} << 24;  ///< integers below are exact in fp32
 
 /// What is wrong with a volume, and where.
@@ -22,6 +23,10 @@ struct Problem {
 /// "021", and where tiles of that triple and type lie: "/tiles/021", "/tiles/021_1".
 std::string name_of(const LevelTriple& level);
 std::string path_of(const TileKind& kind);
+
+/// Levels of the gold rate, z, y, x.
+LevelTriple finest_level(const MixedVolume& volume);
+bool is_within_rate(const MixedVolume& volume, const LevelTriple& level);
 
 std::optional<Problem> grid_problem(const MixedVolume& volume);
 /// Levels within the rate, and every tile of every triple used by exactly one brick; `counts` has the tiles.

@@ -43,21 +43,20 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
 }
 
 // Error of the interpolant at 16 gold nodes along z: errors float[block][y + halo][x + halo][gold_stride].
-// Columns nearer to the rim than half a spacing are left out, and so are those with a margin below `lowest`,
-// which do not count.
+// Columns with a margin below `lowest` do not count and are left out.
 __kernel void lattice_errors(__global float* errors, __global const float* along, __global const float* gold,
                              __global const float* margin, float lowest, VdvrLattice l, int nx, int ny,
                              int halo, int gold_stride, int blocks, float curvature) {
   const int z = (int)get_global_id(0) * 16,
-            x = (int)get_global_id(1) + l.spacing_x / 2;  // from the lattice's rim
-  const int deep = (l.cy - 1) * l.spacing_y + 1 - 2 * (l.spacing_y / 2);
-  const int block = (int)get_global_id(2) / deep, y = (int)get_global_id(2) - block * deep + l.spacing_y / 2;
-  if (z + 16 > gold_stride || x > (l.cx - 1) * l.spacing_x - l.spacing_x / 2 || block >= blocks) return;
+            x = (int)get_global_id(1);  // from the lattice's rim
+  const int deep = (l.cy - 1) * l.spacing_y + 1;
+  const int block = (int)get_global_id(2) / deep, y = (int)get_global_id(2) - block * deep;
+  if (z + 16 > gold_stride || x > (l.cx - 1) * l.spacing_x || block >= blocks) return;
   const int row = nx + 2 * halo, gx = x - l.reach_x * l.spacing_x + halo,
             gy = y - l.reach_y * l.spacing_y + halo;
   const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * row + gx;
   if (margin[column] < lowest) return;
-  // At spacing 1 the last column is no cell's lower end. The halo's outermost columns have no second
+  // The last column is no cell's lower end. The halo's outermost columns have no second
   // differences across; they lie outside what is asked for.
   const int ix = min(x / l.spacing_x, l.cx - 2), iy = min(y / l.spacing_y, l.cy - 2);
   const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
@@ -80,18 +79,20 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
 }
 
 // Smallest and largest error over the gold columns within half a spacing of a lattice column, at 16 gold
-// nodes along z. Lattice columns on the rim have no cell on one side: they are left out.
+// nodes along z. Lattice columns on the rim have a cell on one side only, which has to do.
 __kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
                           __global const float* margin, float lowest, __global const uchar* needed,
                           VdvrLattice l, int nx, int ny, int halo, int gold_stride, int blocks) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
-  if (z + 16 > gold_stride || x < 1 || y < 1 || x >= l.cx - 1 || y >= l.cy - 1 || block >= blocks) return;
+  if (z + 16 > gold_stride || x >= l.cx || block >= blocks) return;
   const size_t of_lattice = ((size_t)block * l.cy + y) * l.cx + x;
   if (!needed[of_lattice]) return;
   float16 smallest = (float16)(INFINITY), largest = (float16)(-INFINITY);
-  for (int dy = -(l.spacing_y / 2); dy <= l.spacing_y / 2; ++dy)
-    for (int dx = -(l.spacing_x / 2); dx <= l.spacing_x / 2; ++dx) {
+  const int x0 = x > 0 ? -(l.spacing_x / 2) : 0, x1 = x + 1 < l.cx ? l.spacing_x / 2 : 0;
+  const int y0 = y > 0 ? -(l.spacing_y / 2) : 0, y1 = y + 1 < l.cy ? l.spacing_y / 2 : 0;
+  for (int dy = y0; dy <= y1; ++dy)
+    for (int dx = x0; dx <= x1; ++dx) {
       const int gx = (x - l.reach_x) * l.spacing_x + halo + dx,
                 gy = (y - l.reach_y) * l.spacing_y + halo + dy;
       const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * (nx + 2 * halo) + gx;
@@ -104,17 +105,18 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
   vstore16(largest, 0, high + of_lattice * gold_stride + z);
 }
 
-// One step of the fit. Gold nodes outside [z_first, z_last] do not count. The rim of the lattice stays.
+// One step of the fit. Gold nodes outside [z_first, z_last] do not count, nor those beyond the lattice.
 __kernel void shift_lattice(__global float* lattice, __global const float* low, __global const float* high,
                             __global const uchar* needed, VdvrLattice l, int halo, int gold_stride,
                             int blocks, int z_first, int z_last, float share) {
   const int k = (int)get_global_id(0), x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
-  if (k < 1 || x < 1 || y < 1 || k >= l.cz - 1 || x >= l.cx - 1 || y >= l.cy - 1 || block >= blocks) return;
+  if (k >= l.cz || x >= l.cx || block >= blocks) return;
   const size_t column = ((size_t)block * l.cy + y) * l.cx + x;
   if (!needed[column]) return;
   const int centre = (k - l.reach_z) * l.spacing_z;
-  const int first = max(centre - l.spacing_z / 2, z_first), last = min(centre + l.spacing_z / 2, z_last);
+  const int first = max(k > 0 ? centre - l.spacing_z / 2 : centre, z_first),
+            last = min(k + 1 < l.cz ? centre + l.spacing_z / 2 : centre, z_last);
   float smallest = INFINITY, largest = -INFINITY;
   for (int z = first; z <= last; ++z) {
     smallest = fmin(smallest, low[column * gold_stride + z + halo]);

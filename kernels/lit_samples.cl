@@ -51,10 +51,11 @@ __kernel void light_samples(FIELD, BRICKS, VdvrGrid grid, __global const uint* r
     own.z = (I)(layer / grid.bricks_y);
   }
   // Tiles go on beyond the grid, where nothing reads them.
-  const V3 c = clamp_to_grid(v3(TO_V(own.x * VDVR_GRANULARITY) + TO_V(x) / (float)(1 << block.level_x),
-                                TO_V(own.y * VDVR_GRANULARITY) + (float)y / (float)(1 << block.level_y),
-                                TO_V(own.z * VDVR_GRANULARITY) + (float)z / (float)(1 << block.level_z)),
-                             grid);
+  const V3 c = clamp_to_grid(
+      v3(TO_V(own.x * VDVR_GRANULARITY) + TO_V(x) / vdvr_per_cell(block.level_x, VDVR_COARSE_X),
+         TO_V(own.y * VDVR_GRANULARITY) + (float)y / vdvr_per_cell(block.level_y, VDVR_COARSE_Y),
+         TO_V(own.z * VDVR_GRANULARITY) + (float)z / vdvr_per_cell(block.level_z, VDVR_COARSE_Z)),
+      grid);
   const OpenBrick around = open_brick(bricks, grid, brick_at(grid, c));
   const Sampled there = sample_open(field, &around, grid, c);
   const float3 cells_per_length =
@@ -85,7 +86,7 @@ __kernel void light_samples(FIELD, BRICKS, VdvrGrid grid, __global const uint* r
 
 typedef struct {
   __global uint2* samples;
-  int level[3], stride[3];  // x, y, z
+  int level[3], last[3], stride[3];  // x, y, z; index of the last sample
   int brick[3];
 } LitTile;
 
@@ -122,9 +123,8 @@ RAY_INLINE void close_edges(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
   for (int corner = 0; corner < 4; ++corner) {
     const int far_u = corner & 1, far_v = corner >> 1;
     const int m = lowest_level(bricks, grid, t, axis, u, far_u ? 1 : -1, v, far_v ? 1 : -1);
-    const int run = 1 << (t->level[axis] - m), last = VDVR_GRANULARITY << t->level[axis];
-    const int edge = far_u * (VDVR_GRANULARITY << t->level[u]) * t->stride[u] +
-                     far_v * (VDVR_GRANULARITY << t->level[v]) * t->stride[v];
+    const int run = 1 << (t->level[axis] - m), last = t->last[axis];
+    const int edge = far_u * t->last[u] * t->stride[u] + far_v * t->last[v] * t->stride[v];
     for (int i = 0; i < last; i += run) {
       const float3 a = gradient_in(t, edge + i * w), b = gradient_in(t, edge + (i + run) * w);
       for (int k = 1; k < run; ++k)
@@ -136,13 +136,13 @@ RAY_INLINE void close_edges(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
 // The two faces across `axis`, without their edges.
 RAY_INLINE void close_faces(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3, wu = t->stride[u], wv = t->stride[v];
-  const int last_u = VDVR_GRANULARITY << t->level[u], last_v = VDVR_GRANULARITY << t->level[v];
+  const int last_u = t->last[u], last_v = t->last[v];
   for (int far = 0; far < 2; ++far) {
     const int away = far ? 1 : -1;
     const int run_u = 1 << (t->level[u] - lowest_level(bricks, grid, t, u, axis, away, v, 0));
     const int run_v = 1 << (t->level[v] - lowest_level(bricks, grid, t, v, axis, away, u, 0));
     if (run_u == 1 && run_v == 1) continue;
-    const int face = far * (VDVR_GRANULARITY << t->level[axis]) * t->stride[axis];
+    const int face = far * t->last[axis] * t->stride[axis];
     for (int j = 1; j < last_v; ++j)
       for (int i = 1; i < last_u; ++i) {
         const int di = i % run_u, dj = j % run_v;
@@ -166,6 +166,7 @@ __kernel void close_gradients(BRICKS, VdvrGrid grid, __global const uint* restri
   const int brick = (int)tile_bricks[tile], layer = brick / grid.bricks_x, size = block.size_x * block.size_y;
   const LitTile t = {lit + block.first + (ulong)tile * (ulong)(size * block.size_z),
                      {block.level_x, block.level_y, block.level_z},
+                     {block.size_x - 1, block.size_y - 1, block.size_z - 1},
                      {1, block.size_x, size},
                      {brick - layer * grid.bricks_x, layer % grid.bricks_y, layer / grid.bricks_y}};
   for (int axis = 0; axis < 3; ++axis) close_edges(bricks, grid, &t, axis);

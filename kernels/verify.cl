@@ -49,17 +49,17 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
     if (bz >= grid.bricks_z || !selected[brick]) continue;
     const int last_z = min(g, grid.cells_z - bz * g) * rate;
     const VdvrBrick b = vdvr_brick(bricks, grid, brick);
-    const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x),
-                    y = vdvr_local(cy, by, b.level_y, g, grid.cells_y);
+    const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x, grid.coarse_x),
+                    y = vdvr_local(cy, by, b.level_y, g, grid.cells_y, grid.coarse_y);
     __global const float* gold_column = gold_start + brick_z * g * rate;
     __global const float *above_column = above_start + brick_z * g * rate,
                          *below_column = below_start + brick_z * g * rate;
-    const float interval = (float)(1 << b.level_z) / (float)rate;
+    const int per_interval = (rate << grid.coarse_z) >> b.level_z;
+    const float interval = 1.0f / (float)per_interval;
     float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
     int parts = 0;
     // Sample interval by sample interval: its two faces are what vdvr_trilinear interpolates for every node
     // between them, and the nodes' fractions are the dyadic ones vdvr_local gives.
-    const int per_interval = rate >> b.level_z;
     for (int index = 0; index * per_interval < last_z; ++index) {
       const float low = vdvr_sample_in_plane(samples, b, x, y, index);
       const float high = vdvr_sample_in_plane(samples, b, x, y, index + 1);

@@ -86,13 +86,13 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
       vdvr_brick(bricks, grid, ((ulong)item.z * grid.bricks_y + item.y) * grid.bricks_x + item.x);
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
   const VdvrLocal lx = vdvr_local((float)(item.x * g) + (float)x / (float)rate, item.x, b.level_x, g,
-                                  grid.cells_x),
+                                  grid.cells_x, grid.coarse_x),
                   ly = vdvr_local((float)(item.y * g) + (float)y / (float)rate, item.y, b.level_y, g,
-                                  grid.cells_y);
+                                  grid.cells_y, grid.coarse_y);
   __global const float* f = field_column(field, item, first[item.w], x, y, cells, nx, ny, z_padded);
   __global float* out = error + (((size_t)i * side + y) * side + x) * error_padded;
   // vdvr_trilinear, its two faces kept for all nodes between them.
-  const int per_interval = rate >> b.level_z;
+  const int per_interval = (rate << grid.coarse_z) >> b.level_z;
   const float step = 1.0f / (float)per_interval;
   float low = vdvr_sample_in_plane(samples, b, lx, ly, 0);
   for (int index = 0, k = 0; index * per_interval < last_z; ++index) {

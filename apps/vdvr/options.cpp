@@ -209,6 +209,9 @@ void refuse(const Arguments& args, const std::vector<std::string>& names, const 
 void add_build(Arguments& args) {
   args.group("Build")
       .value("granularity", "1|2|4|8", "base cells per brick and axis (default 4)")
+      .value(
+          "base", "auto|NxNxN",
+          "cells of the grid per base sample in x, y, z: 1, 2, 4 or 8 each (default auto: what stores least)")
       .value("window", "LO,HI", "test only where the field meets these values");
   for (const auto& l : kBuildLimits) add_limited(args, l.name, l.all, l.supported, l.help);
   args.flag("paper",
@@ -241,6 +244,23 @@ BuildOptions build_options(const Arguments& args) {
   return build;
 }
 
+namespace {
+
+// Of --base, as log2, z, y, x; none: to be chosen.
+std::optional<LevelTriple> coarsening(const Arguments& args) {
+  if (!args.has("base") || args.text("base") == "auto") return std::nullopt;
+  const auto cells = *args.sizes("base", 3);
+  LevelTriple c{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (cells[a] > 8 || !is_power_of_two(cells[a]))
+      throw InputError(fmt::format("--base: {} is not one of 1, 2, 4, 8", cells[a]));
+    c[2 - a] = static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint64_t>(cells[a])));
+  }
+  return c;
+}
+
+}  // namespace
+
 PlanSettings plan_settings(const Arguments& args) {
   const bool paper = args.has("paper");
   PlanSettings settings;
@@ -251,6 +271,10 @@ PlanSettings plan_settings(const Arguments& args) {
       args.choice("levels", {"isotropic", "anisotropic"},
                   paper || build_options(args).closing == Closing::paper ? "isotropic" : "anisotropic");
   settings.granularity = build_options(args).granularity;
+  settings.coarsening = coarsening(args);
+  if (settings.coarsening.value_or(LevelTriple{}) != LevelTriple{} && settings.levels == "isotropic")
+    throw InputError(
+        "--base: isotropic levels have the grid itself as their base; take --levels anisotropic");
   if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
@@ -264,6 +288,7 @@ std::string options_json(const Plan& plan, const BuildOptions& build, bool epsil
                          const ParallelGeometry& geometry, double center) {
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
+  j["base"] = {1 << plan.coarsening[2], 1 << plan.coarsening[1], 1 << plan.coarsening[0]};
   j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = plan.settings.coefficients;
   j["levels"] = plan.settings.levels;

@@ -262,6 +262,9 @@ void print_storage(const MixedVolume& volume, std::uint64_t file_bytes) {
   if (file_bytes != 0) fmt::print(", {} in the file", bytes_text(file_bytes));
   fmt::print("\n  bricks       {} of {}^3 cells; by level zyx: {}\n", volume.brick_count(),
              volume.granularity, levels_json(volume).dump());
+  const LevelTriple& c = volume.coarsening;
+  if (c != LevelTriple{})
+    fmt::print("  base         a sample every {} x {} x {} cells\n", 1 << c[2], 1 << c[1], 1 << c[0]);
 }
 
 void print_seconds(const std::map<std::string, double>& seconds) {

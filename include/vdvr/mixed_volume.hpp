@@ -1,9 +1,10 @@
 // The certified volume: base samples, an index of bricks, and tiles per level triple (docs/file-format.md).
 //
-// A brick is granularity^3 base cells. Its level triple (lz, ly, lx) sets the spacing spacing / 2^l per axis.
-// A brick of level (0,0,0) reads `base`; any other reads tile number `tile` of its triple:
-// tile[g*2^lz+1][g*2^ly+1][g*2^lx+1], on the brick's closed box. Beyond the grid a tile repeats its last
-// plane, which is never read. Base and tiles are float32, or integers on one lattice.
+// A brick is granularity^3 cells of the grid. The base has a sample every 2^c cells, c = coarsening per axis;
+// a brick's level triple (lz, ly, lx) sets the spacing spacing * 2^(c - l). A brick of level (0,0,0) reads
+// `base`; any other reads tile number `tile` of its triple:
+// tile[g*2^(lz-cz)+1][g*2^(ly-cy)+1][g*2^(lx-cx)+1], on the brick's closed box. Beyond the grid a tile
+// repeats its last plane, which is never read. Base and tiles are float32, or integers on one lattice.
 #pragma once
 
 #include <array>
@@ -72,8 +73,9 @@ inline constexpr std::uint8_t most_parts = 3;
 struct MixedVolume {
   Grid grid;
   int granularity = 4;
-  int rate = 1;                           ///< gold rate: no level is finer than log2(rate)
-  SampleBlock base;                       ///< [nz+1][ny+1][nx+1]
+  int rate = 1;                           ///< gold rate: no level is above log2(rate) + coarsening
+  LevelTriple coarsening{};               ///< log2 of cells per base cell; divides cells and granularity
+  SampleBlock base;                       ///< [nz/2^cz+1][ny/2^cy+1][nx/2^cx+1]
   std::vector<LevelTriple> level;         ///< [bz][by][bx]
   std::vector<std::uint32_t> tile;        ///< [bz][by][bx]: its number among its triple's
   std::map<TileKind, SampleBlock> tiles;  ///< per triple and type: [count][sz][sy][sx]
@@ -89,12 +91,17 @@ struct MixedVolume {
     const Index3 b = bricks();
     return b[0] * b[1] * b[2];
   }
+  /// Samples of the base per axis x, y, z.
+  [[nodiscard]] Index3 base_samples() const {
+    return {(grid.cells[0] >> coarsening[2]) + 1, (grid.cells[1] >> coarsening[1]) + 1,
+            (grid.cells[2] >> coarsening[0]) + 1};
+  }
   /// Samples of one tile per axis z, y, x.
   [[nodiscard]] std::array<std::int64_t, 3> tile_shape(const LevelTriple& l) const {
-    const auto side = [this](std::uint8_t level_of_axis) {
-      return (static_cast<std::int64_t>(granularity) << level_of_axis) + 1;
+    const auto side = [&](std::size_t axis) {
+      return (static_cast<std::int64_t>(granularity) << l[axis] >> coarsening[axis]) + 1;
     };
-    return {side(l[0]), side(l[1]), side(l[2])};
+    return {side(0), side(1), side(2)};
   }
   [[nodiscard]] std::int64_t tile_size(const LevelTriple& l) const {
     const auto s = tile_shape(l);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/mixed_volume.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -30,6 +31,9 @@ struct PlanSettings {
       "all";  ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
   std::string levels = "anisotropic";  ///< anisotropic: a level per axis | isotropic: one per brick
   int granularity = 4;                 ///< for what is foreseen
+  /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to
+  /// store least, and 0 with isotropic levels.
+  std::optional<LevelTriple> coarsening{};
   bool foresee =
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
 };
@@ -51,6 +55,7 @@ struct Plan {
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;                ///< the 1x reconstruction it rests on
+  LevelTriple coarsening{};   ///< of the base that is stored
   std::vector<float> fitted;  ///< the base samples to store, where those are not F: midrange coefficients
   std::vector<std::string> notes;
 };

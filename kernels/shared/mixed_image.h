@@ -14,11 +14,11 @@ __constant sampler_t vdvr_linear =
 // Texel coordinate of c along one axis. Clamped to the brick's own samples, so that a rounding error at its
 // face cannot read the texel of a neighbouring tile.
 VDVR_INLINE float vdvr_texel(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 granularity, vdvr_i32 cells,
-                             float texel) {
+                             vdvr_i32 coarse, float texel) {
   const vdvr_i32 first = b * granularity;
   const vdvr_i32 width = cells - first < granularity ? cells - first : granularity;
-  const float r = (c - (float)first) * (float)(1 << level);
-  const float last = (float)(width << level);
+  const float r = (c - (float)first) * vdvr_per_cell(level, coarse);
+  const float last = (float)((width << level) >> coarse);
   return texel + (r < 0.0f ? 0.0f : (r > last ? last : r));
 }
 
@@ -27,11 +27,11 @@ VDVR_INLINE float vdvr_image_sample_in_brick(__read_only image3d_t f32, __read_o
                                              __read_only image3d_t u8, const VdvrBrick* b, VdvrGrid grid,
                                              vdvr_i32 bx, vdvr_i32 by, vdvr_i32 bz, float cx, float cy,
                                              float cz) {
-  const float x =
-      vdvr_texel(cx, bx, b->level_x, grid.granularity, grid.cells_x, (float)(b->place & 0x7fffu) + 0.5f);
-  const float y = vdvr_texel(cy, by, b->level_y, grid.granularity, grid.cells_y,
+  const float x = vdvr_texel(cx, bx, b->level_x, grid.granularity, grid.cells_x, grid.coarse_x,
+                             (float)(b->place & 0x7fffu) + 0.5f);
+  const float y = vdvr_texel(cy, by, b->level_y, grid.granularity, grid.cells_y, grid.coarse_y,
                              (float)(b->place >> 15 & 0xffffu) + 0.5f);
-  const float z = vdvr_texel(cz, bz, b->level_z, grid.granularity, grid.cells_z,
+  const float z = vdvr_texel(cz, bz, b->level_z, grid.granularity, grid.cells_z, grid.coarse_z,
                              (float)(b->place >> 31 & 0xffffu) + 0.5f);
   const float4 texel = (float4)(x, y, z, 0.0f);
   // The filter of a normalised format returns stored / largest.

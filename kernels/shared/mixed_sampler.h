@@ -6,8 +6,8 @@
 // to int and comparisons only, contraction off on both sides, so that both give the same bits.
 //
 // Coordinates are in cells: c = (p - origin) / spacing, 0 <= c <= cells. A point belongs to the brick floor(c
-// / g) (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^level is exact in
-// fp32.
+// / g) (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^(level - coarse) is
+// exact in fp32: the base has a sample every 2^coarse cells of an axis, and a level doubles them.
 #ifndef VDVR_MIXED_SAMPLER_H
 #define VDVR_MIXED_SAMPLER_H
 
@@ -64,12 +64,15 @@ typedef struct {
   float scale, bias;  // sample = stored * scale + bias, for integers
 } VdvrBrick;
 
-// The grid and its bricks. 32 bytes.
+// The grid and its bricks. 48 bytes.
 typedef struct {
   vdvr_i32 cells_x, cells_y, cells_z;
   vdvr_i32 granularity;
   vdvr_i32 bricks_x, bricks_y, bricks_z;
   float step;  // of the lattice that integer samples lie on: a power of two
+  vdvr_i32 coarse_x, coarse_y,
+      coarse_z;  // log2 of cells per cell of the base, which divides cells and bricks
+  vdvr_i32 pad;
 } VdvrGrid;
 
 // Scale and bias are a power of two and a multiple of step below 2^24 steps: exact, as is every sample.
@@ -82,9 +85,11 @@ VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u32 low, vdvr_u32 bits, vdvr_i32 offset, 
   b.type = bits >> 10 & 3u;
   b.place = (vdvr_u64)(bits >> 17) << 32 | low;
   const int in_base = (bits & 511u) == 0u;
-  b.stride_y = (in_base ? (vdvr_u32)grid.cells_x : (vdvr_u32)grid.granularity << b.level_x) + 1u;
+  b.stride_y =
+      ((in_base ? (vdvr_u32)grid.cells_x : (vdvr_u32)grid.granularity << b.level_x) >> grid.coarse_x) + 1u;
   b.stride_z =
-      b.stride_y * ((in_base ? (vdvr_u32)grid.cells_y : (vdvr_u32)grid.granularity << b.level_y) + 1u);
+      b.stride_y *
+      (((in_base ? (vdvr_u32)grid.cells_y : (vdvr_u32)grid.granularity << b.level_y) >> grid.coarse_y) + 1u);
   b.scale = grid.step * (float)(1 << (bits >> 12 & 31u));
   b.bias = grid.step * (float)offset;
   return b;
@@ -112,12 +117,18 @@ VDVR_INLINE vdvr_i32 vdvr_brick_of(float c, vdvr_i32 granularity, vdvr_i32 brick
   return b < 0 ? 0 : (b > bricks - 1 ? bricks - 1 : b);
 }
 
+// Samples of a level per cell of the grid: a power of two.
+VDVR_INLINE float vdvr_per_cell(vdvr_u32 level, vdvr_i32 coarse) {
+  return (float)(1 << level) / (float)(1 << coarse);
+}
+
 // The local coordinate of c in brick b of the given level; c may lie on the brick's far face.
-VDVR_INLINE VdvrLocal vdvr_local(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 granularity, vdvr_i32 cells) {
+VDVR_INLINE VdvrLocal vdvr_local(float c, vdvr_i32 b, vdvr_u32 level, vdvr_i32 granularity, vdvr_i32 cells,
+                                 vdvr_i32 coarse) {
   const vdvr_i32 first = b * granularity;
   const vdvr_i32 width = cells - first < granularity ? cells - first : granularity;
-  const vdvr_i32 last = width << level;
-  const float r = (c - (float)first) * (float)(1 << level);
+  const vdvr_i32 last = (width << level) >> coarse;
+  const float r = (c - (float)first) * vdvr_per_cell(level, coarse);
   VdvrLocal l;
   l.index = (vdvr_i32)r;  // as in vdvr_brick_of
   l.index = l.index < 0 ? 0 : (l.index > last - 1 ? last - 1 : l.index);
@@ -185,9 +196,10 @@ VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const void* samples, VDVR_GLOBAL const
   const VdvrBrick b = vdvr_brick(
       records, grid,
       ((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x + (vdvr_u64)bx);
-  return vdvr_sample_in_brick(samples, b, vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x),
-                              vdvr_local(cy, by, b.level_y, grid.granularity, grid.cells_y),
-                              vdvr_local(cz, bz, b.level_z, grid.granularity, grid.cells_z));
+  return vdvr_sample_in_brick(samples, b,
+                              vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x, grid.coarse_x),
+                              vdvr_local(cy, by, b.level_y, grid.granularity, grid.cells_y, grid.coarse_y),
+                              vdvr_local(cz, bz, b.level_z, grid.granularity, grid.cells_z, grid.coarse_z));
 }
 
 #endif

@@ -10,19 +10,20 @@ typedef struct {
   V3 low, scale;
 } CellBox;
 #if defined(VDVR_SAMPLER_IMAGE3D)
-RAY_INLINE float cell_low(float c, int b, uint level, int cells) {
-  const VdvrLocal l = vdvr_local(c, b, level, VDVR_GRANULARITY, cells);
-  return (float)(b * VDVR_GRANULARITY) + (float)l.index / (float)(1 << level);
+RAY_INLINE float cell_low(float c, int b, uint level, int cells, int coarse) {
+  const VdvrLocal l = vdvr_local(c, b, level, VDVR_GRANULARITY, cells, coarse);
+  return (float)(b * VDVR_GRANULARITY) + (float)l.index / vdvr_per_cell(level, coarse);
 }
 #endif
 RAY_INLINE CellBox cell_box(VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c) {
   CellBox box;
 #ifdef VDVR_SAMPLER_IMAGE3D
   const VdvrBrick* r = &b->record;
-  box.scale = v3((float)(1 << r->level_x), (float)(1 << r->level_y), (float)(1 << r->level_z));
-  box.low =
-      v3(cell_low(c.x, b->at.x, r->level_x, grid.cells_x), cell_low(c.y, b->at.y, r->level_y, grid.cells_y),
-         cell_low(c.z, b->at.z, r->level_z, grid.cells_z));
+  box.scale = v3(vdvr_per_cell(r->level_x, VDVR_COARSE_X), vdvr_per_cell(r->level_y, VDVR_COARSE_Y),
+                 vdvr_per_cell(r->level_z, VDVR_COARSE_Z));
+  box.low = v3(cell_low(c.x, b->at.x, r->level_x, grid.cells_x, VDVR_COARSE_X),
+               cell_low(c.y, b->at.y, r->level_y, grid.cells_y, VDVR_COARSE_Y),
+               cell_low(c.z, b->at.z, r->level_z, grid.cells_z, VDVR_COARSE_Z));
 #elif VDVR_UNIFORM
   const I3 i = k->cell.index;
   box.scale = v3((V)(1.0f), (V)(1.0f), (V)(1.0f));

@@ -11,6 +11,12 @@
 #ifndef VDVR_LIT
 #define VDVR_LIT 0
 #endif
+// As VdvrGrid has them.
+#ifndef VDVR_COARSE_X
+#define VDVR_COARSE_X 0
+#define VDVR_COARSE_Y 0
+#define VDVR_COARSE_Z 0
+#endif
 #if VDVR_LIT && (defined(VDVR_SAMPLER_IMAGE3D) || VDVR_SAMPLE_TYPES != 1)
 #error "lit samples are float32 in a buffer"
 #endif
@@ -40,7 +46,7 @@ typedef struct {
   VdvrBrick record;
 #elif !VDVR_UNIFORM
   V3 scale;  // samples per cell
-  I3 reach;  // samples per half a cell, 0 at level 0
+  I3 reach;  // samples per half a cell, 0 where a cell has no more than one
   I3 top;    // index of the last cell of samples
   // What a brick's addresses reach: its own samples, or where the bricks around read the base too, all of the
   // base. Indices count from the brick's first sample.
@@ -56,14 +62,14 @@ typedef struct {
 
 #if !VDVR_UNIFORM && defined(VDVR_SAMPLER_BUFFER)
 // The reach of one axis of a brick that starts at cell `low`.
-RAY_INLINE void open_axis(OpenBrick* b, I level, I low, int cells, V* scale, I* reach, I* top, I* first,
-                          I* last) {
+RAY_INLINE void open_axis(OpenBrick* b, I level, I low, int cells, int coarse, V* scale, I* reach, I* top,
+                          I* first, I* last) {
   const I width = LEAST(cells - low, (I)(VDVR_GRANULARITY));
-  *scale = TO_V((I)(1) << level);
-  *reach = ((I)(1) << level) >> 1;
-  *top = (width << level) - 1;
-  *first = PICK(b->base_around, -low, (I)(0));
-  *last = PICK(b->base_around, cells - low, *top + 1);
+  *scale = TO_V((I)(1) << level) * (1.0f / (float)(1 << coarse));
+  *reach = ((I)(1) << level) >> (1 + coarse);
+  *top = ((width << level) >> coarse) - 1;
+  *first = PICK(b->base_around, -(low >> coarse), (I)(0));
+  *last = PICK(b->base_around, (cells - low) >> coarse, *top + 1);
 }
 #endif
 
@@ -88,17 +94,23 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
 #else
   b.place = GATHER(I, words, word);
 #endif
-  b.stride_y = TO_OFFSET(PICK(in_base, (I)(grid.cells_x), (I)(VDVR_GRANULARITY) << lx) + 1);
-  b.stride_z = b.stride_y * TO_OFFSET(PICK(in_base, (I)(grid.cells_y), (I)(VDVR_GRANULARITY) << ly) + 1);
+  b.stride_y =
+      TO_OFFSET((PICK(in_base, (I)(grid.cells_x), (I)(VDVR_GRANULARITY) << lx) >> VDVR_COARSE_X) + 1);
+  b.stride_z =
+      b.stride_y *
+      TO_OFFSET((PICK(in_base, (I)(grid.cells_y), (I)(VDVR_GRANULARITY) << ly) >> VDVR_COARSE_Y) + 1);
 #if VDVR_LANES == 1
   b.alike = 0;
 #else
   b.alike = !ANY((b.stride_y != LANE(b.stride_y, 0)) | (b.stride_z != LANE(b.stride_z, 0)));
 #endif
   b.base_around = (bits & 512) != 0;
-  open_axis(&b, lx, low.x, grid.cells_x, &b.scale.x, &b.reach.x, &b.top.x, &b.first.x, &b.last.x);
-  open_axis(&b, ly, low.y, grid.cells_y, &b.scale.y, &b.reach.y, &b.top.y, &b.first.y, &b.last.y);
-  open_axis(&b, lz, low.z, grid.cells_z, &b.scale.z, &b.reach.z, &b.top.z, &b.first.z, &b.last.z);
+  open_axis(&b, lx, low.x, grid.cells_x, VDVR_COARSE_X, &b.scale.x, &b.reach.x, &b.top.x, &b.first.x,
+            &b.last.x);
+  open_axis(&b, ly, low.y, grid.cells_y, VDVR_COARSE_Y, &b.scale.y, &b.reach.y, &b.top.y, &b.first.y,
+            &b.last.y);
+  open_axis(&b, lz, low.z, grid.cells_z, VDVR_COARSE_Z, &b.scale.z, &b.reach.z, &b.top.z, &b.first.z,
+            &b.last.z);
   b.type = bits >> 10 & 3;
   b.value_scale = grid.step * TO_V((I)(1) << (bits >> 12 & 31));
   b.bias = grid.step * TO_V(VDVR_BRICK_WORDS == 3 ? GATHER(I, words + VDVR_BRICK_WORDS - 1, word) : (I)(0));
@@ -110,17 +122,20 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
 // All of the base as one brick.
 RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias) {
   const I none = (I)(0);
-  const V zero = (V)(0.0f), one = (V)(1.0f);
+  const V zero = (V)(0.0f);
+  const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
+            nz = grid.cells_z >> VDVR_COARSE_Z;
   OpenBrick b = no_brick();
   b.low = v3(zero, zero, zero);
-  b.scale = v3(one, one, one);
+  b.scale = v3((V)(1.0f / (float)(1 << VDVR_COARSE_X)), (V)(1.0f / (float)(1 << VDVR_COARSE_Y)),
+               (V)(1.0f / (float)(1 << VDVR_COARSE_Z)));
   b.reach.x = b.reach.y = b.reach.z = none;
-  b.top.x = (I)(grid.cells_x - 1);
-  b.top.y = (I)(grid.cells_y - 1);
-  b.top.z = (I)(grid.cells_z - 1);
+  b.top.x = (I)(nx - 1);
+  b.top.y = (I)(ny - 1);
+  b.top.z = (I)(nz - 1);
   b.place = (Offset)(0);
-  b.stride_y = (Offset)(grid.cells_x + 1);
-  b.stride_z = b.stride_y * (Offset)(grid.cells_y + 1);
+  b.stride_y = (Offset)(nx + 1);
+  b.stride_z = b.stride_y * (Offset)(ny + 1);
   b.type = (I)(type);
   b.value_scale = (V)(scale);
   b.bias = (V)(bias);
@@ -353,18 +368,20 @@ RAY_INLINE V face_at(FIELD, const Cell* c, Place i, int along_x, Place u, V fu, 
   return along_x ? in_face_along_x(field, c, i, fu, v, fv) : in_face(field, c, i, u, fu, v, fv);
 }
 
-// How one axis' two points lie: cells of samples away from the sampled one's, and the fraction in both. Half
-// a base cell is a whole number of samples at every level but 0.
+// How one axis' two points lie: cells of samples away from the sampled one's, and the fractions there. Half a
+// base cell is a whole number of samples where a cell has several, else half a spacing or less: `half`.
 typedef struct {
   I back, ahead;
-  V fraction;
+  V behind, before;
 } Spread;
-RAY_INLINE Spread spread_of(I reach, V t) {
+RAY_INLINE Spread spread_of(I reach, V t, V half) {
   Spread s;
-  const I nearer = t < 0.5f, whole = reach != 0;
-  s.back = PICK(whole, -reach, PICK(nearer, (I)(-1), (I)(0)));
-  s.ahead = PICK(whole, reach, s.back + 1);
-  s.fraction = PICK(whole, t, PICK(nearer, t + 0.5f, t - 0.5f));
+  const I whole = reach != 0;
+  const V lo = t - half, hi = t + half;
+  s.back = PICK(whole, -reach, PICK(lo < 0.0f, (I)(-1), (I)(0)));
+  s.ahead = PICK(whole, reach, PICK(hi < 1.0f, (I)(0), (I)(1)));
+  s.behind = PICK(whole, t, lo - TO_V(s.back));
+  s.before = PICK(whole, t, hi - TO_V(s.ahead));
   return s;
 }
 
@@ -376,9 +393,9 @@ typedef struct {
 // The field half a base cell before and behind the sampled point along one axis, w its stride; a, b are the
 // field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the outermost
 // face counts.
-RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, I first, I last, Offset w,
-                           int along_x, Place u, V fu, Place v, V fv) {
-  const Spread s = spread_of(reach, t);
+RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, V half, I first, I last,
+                           Offset w, int along_x, Place u, V fu, Place v, V fv) {
+  const Spread s = spread_of(reach, t, half);
 #define FACE(n)                                                                                              \
   face_at(field, c,                                                                                          \
           after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), along_x, \
@@ -393,7 +410,7 @@ RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t
     nearer = PICK(s.ahead > 0, b, a);
   }
 #undef FACE
-  const Ends e = {lerp(outer, inner, s.fraction), lerp(nearer, outermost, s.fraction)};
+  const Ends e = {lerp(outer, inner, s.behind), lerp(nearer, outermost, s.before)};
   return e;
 }
 
@@ -408,22 +425,24 @@ RAY_INLINE Neighbours neighbours_within(FIELD, VdvrGrid grid, const OpenBrick* b
 #if VDVR_UNIFORM
   const I3 reach = {(I)(0), (I)(0), (I)(0)}, first = reach;
   const I3 last = {(I)(grid.cells_x), (I)(grid.cells_y), (I)(grid.cells_z)};
+  const V3 half = v3((V)(0.5f), (V)(0.5f), (V)(0.5f));
   const Offset wy = (Offset)(c->y.all), wz = (Offset)(c->z.all);
 #else
   const I3 reach = b->reach, first = b->first, last = b->last;
+  const V3 half = v3(0.5f * b->scale.x, 0.5f * b->scale.y, 0.5f * b->scale.z);
   const Offset wy = b->stride_y, wz = b->stride_z;
 #endif
   Neighbours n;
   n.x = ends_along(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
                    lerp(lerp(k->s001, k->s011, t.y), lerp(k->s101, k->s111, t.y), t.z), reach.x, c->index.x,
-                   t.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
+                   t.x, half.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
   // Along y and z the edges along x are shared.
   const V e00 = lerp(k->s000, k->s001, t.x), e01 = lerp(k->s010, k->s011, t.x);
   const V e10 = lerp(k->s100, k->s101, t.x), e11 = lerp(k->s110, k->s111, t.x);
-  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, first.y,
-                   last.y, wy, 1, c->x, t.x, c->z, t.z);
-  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, first.z,
-                   last.z, wz, 1, c->x, t.x, c->y, t.y);
+  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, half.y,
+                   first.y, last.y, wy, 1, c->x, t.x, c->z, t.z);
+  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, half.z,
+                   first.z, last.z, wz, 1, c->x, t.x, c->y, t.y);
   return n;
 }
 

@@ -1,16 +1,18 @@
 // Emission-absorption with steps adapted to the level: step k of a ray is cut into 2^l equal parts where the
-// brick at its middle has level l (the largest of its axes), each sampled at its middle with its own opacity.
-// The parts depend on the ray's own parameter and that level alone. Included by raycast.cl.
+// brick at its middle has 2^l samples a cell (along the axis that has most; 1 at least), each sampled at its
+// middle with its own opacity. The parts depend on the ray's own parameter and that level alone. Included by
+// raycast.cl.
 #ifndef VDVR_RAYCAST_LEVEL_H
 #define VDVR_RAYCAST_LEVEL_H
 
-// The largest level of each lane's brick.
+// The largest l of each lane's brick.
 RAY_INLINE I level_at(BRICKS, VdvrGrid grid, V3 c) {
   const I3 at = brick_at(grid, c);
   const Offset place = brick_index(grid, at) * (Offset)(VDVR_BRICK_WORDS);
   __global const int* bits = (__global const int*)bricks + 1;
-  const I b = GATHER(I, bits, place), x = b & 7, y = b >> 3 & 7, z = b >> 6 & 7, xy = MOST(x, y);
-  return MOST(xy, z);
+  const I b = GATHER(I, bits, place), x = (b & 7) - VDVR_COARSE_X, y = (b >> 3 & 7) - VDVR_COARSE_Y,
+          z = (b >> 6 & 7) - VDVR_COARSE_Z, xy = MOST(x, y), xyz = MOST(xy, z);
+  return MOST(xyz, (I)(0));
 }
 
 // Opacities of a part at level l stand behind those of a step, one table a level.
