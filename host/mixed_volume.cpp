@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "host/brick_layout.hpp"
+#include "host/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -205,6 +206,28 @@ MixedVolume as_mixed(const Volume& volume, int granularity) {
   m.level.assign(static_cast<std::size_t>(m.brick_count()), LevelTriple{0, 0, 0});
   m.tile.assign(static_cast<std::size_t>(m.brick_count()), 0);
   return m;
+}
+
+Volume on_grid(const MixedVolume& v) {
+  if (v.coarsening == LevelTriple{}) return {v.grid, decoded(v.base, v.step)};
+  const Index3 n = v.grid.samples(), bricks = v.bricks();
+  Volume out{v.grid, std::vector<float>(at(n[0] * n[1] * n[2]))};
+  // Samples that a brick owns: its low faces, and at the end of the grid the high ones too.
+  const auto end = [&](std::int64_t brick, std::size_t a) {
+    return brick + 1 == bricks[a] ? n[a] : (brick + 1) * v.granularity;
+  };
+  parallel_for(bricks[2] * bricks[1], {}, "grid", [&](std::int64_t row) {
+    const std::int64_t bz = row / bricks[1], by = row % bricks[1];
+    for (std::int64_t bx = 0; bx < bricks[0]; ++bx) {
+      const BrickSamples stored(v, {bx, by, bz});
+      for (std::int64_t z = bz * v.granularity; z < end(bz, 2); ++z)
+        for (std::int64_t y = by * v.granularity; y < end(by, 1); ++y)
+          for (std::int64_t x = bx * v.granularity; x < end(bx, 0); ++x)
+            out.samples[at((z * n[1] + y) * n[0] + x)] =
+                stored.at(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+    }
+  });
+  return out;
 }
 
 namespace {

@@ -193,9 +193,9 @@ BOOST_AUTO_TEST_CASE(one_sampler_for_packed_records_and_for_single_points) {
       const VdvrBrick r = vdvr_unpack(
           words[0], words[1], records.words_per_brick() == 3 ? static_cast<std::int32_t>(words[2]) : 0, grid);
       const float packed = vdvr_sample_in_brick(
-          samples.data(), r, vdvr_local(x, b[0], r.level_x, grid.granularity, grid.cells_x),
-          vdvr_local(y, b[1], r.level_y, grid.granularity, grid.cells_y),
-          vdvr_local(z, b[2], r.level_z, grid.granularity, grid.cells_z));
+          samples.data(), r, vdvr_local(x, b[0], r.level_x, grid.granularity, grid.cells_x, grid.coarse_x),
+          vdvr_local(y, b[1], r.level_y, grid.granularity, grid.cells_y, grid.coarse_y),
+          vdvr_local(z, b[2], r.level_z, grid.granularity, grid.cells_z, grid.coarse_z));
       const Vec3 cell{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
       if (packed != sample_at(v, world(v.grid, cell))) ++wrong;
     }

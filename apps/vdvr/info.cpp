@@ -26,7 +26,7 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
                {"format_version", file.format_version},
                {"grid", grid_json(file.volume.grid)}};
   json["grid"]["granularity"] = file.volume.granularity;
-  json["grid"]["coarsening_zyx"] = file.volume.coarsening;
+  json["grid"]["cells_per_base_sample"] = cells_per_base_sample(file.volume.coarsening);
   json["grid"]["rate"] = file.volume.rate;
   json["bricks"] = levels_json(file.volume);
   json["storage"] = storage_json(file.volume, file.file_bytes);

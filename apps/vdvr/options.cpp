@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 
+#include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -288,7 +290,7 @@ std::string options_json(const Plan& plan, const BuildOptions& build, bool epsil
                          const ParallelGeometry& geometry, double center) {
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
-  j["base"] = {1 << plan.coarsening[2], 1 << plan.coarsening[1], 1 << plan.coarsening[0]};
+  j["base"] = cells_per_base_sample(plan.coarsening);
   j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = plan.settings.coefficients;
   j["levels"] = plan.settings.levels;

@@ -136,6 +136,8 @@ Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes) {
   return j;
 }
 
+std::array<int, 3> cells_per_base_sample(const LevelTriple& c) { return {1 << c[2], 1 << c[1], 1 << c[0]}; }
+
 Json levels_json(const MixedVolume& volume) {
   std::map<std::string, std::int64_t> counts;
   for (const auto& l : volume.level) ++counts[fmt::format("{}{}{}", l[0], l[1], l[2])];
@@ -262,9 +264,8 @@ void print_storage(const MixedVolume& volume, std::uint64_t file_bytes) {
   if (file_bytes != 0) fmt::print(", {} in the file", bytes_text(file_bytes));
   fmt::print("\n  bricks       {} of {}^3 cells; by level zyx: {}\n", volume.brick_count(),
              volume.granularity, levels_json(volume).dump());
-  const LevelTriple& c = volume.coarsening;
-  if (c != LevelTriple{})
-    fmt::print("  base         a sample every {} x {} x {} cells\n", 1 << c[2], 1 << c[1], 1 << c[0]);
+  const auto base = cells_per_base_sample(volume.coarsening);
+  fmt::print("  base         a sample every {} x {} x {} cells\n", base[0], base[1], base[2]);
 }
 
 void print_seconds(const std::map<std::string, double>& seconds) {

@@ -60,6 +60,8 @@ Json certificate_json(const Certificate& certificate);
 /// With `interior` inside. `file_bytes` 0: not stored in a file.
 Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes);
 /// Bricks per level triple, in file order "zyx".
+/// Along x, y, z.
+std::array<int, 3> cells_per_base_sample(const LevelTriple& coarsening);
 Json levels_json(const MixedVolume& volume);
 Json seconds_json(const std::map<std::string, double>& seconds);
 

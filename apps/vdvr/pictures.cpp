@@ -19,11 +19,9 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
     case InputKind::certified: {
       VdvrFile file = read_vdvr(path, max_memory);
       if (!unverified) check_certificate(path, file);
-      // The base samples alone are an ordinary volume; the certificate says nothing about their
+      // Samples on the grid alone are an ordinary volume; the certificate says nothing about their
       // interpolation.
-      if (method == "dvr")
-        return {as_mixed({file.volume.grid, decoded(file.volume.base, file.volume.step)}), std::nullopt,
-                false};
+      if (method == "dvr") return {as_mixed(on_grid(file.volume)), std::nullopt, false};
       return {std::move(file.volume), std::move(file.certificate), !unverified};
     }
     case InputKind::volume:
@@ -94,7 +92,7 @@ Vec3 centroid_above(const Grid& grid, const std::vector<float>& base, double thr
 }  // namespace
 
 Brightness brightness_of(const MixedVolume& volume) {
-  const std::vector<float> base = decoded(volume.base, volume.step);
+  const std::vector<float> base = on_grid(volume).samples;
   const auto [least, largest] = std::minmax_element(base.begin(), base.end());
   const double lo = static_cast<double>(*least), hi = static_cast<double>(*largest);
   Brightness b{lo, hi, lo, hi, 0.5 * (lo + hi), lo, {}};

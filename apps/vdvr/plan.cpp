@@ -23,6 +23,7 @@ Json plan_json(const Planned& p) {
       {"epsilon_abs", plan.epsilon_abs},
       {"reference_range", plan.reference_range},
       {"rates", {{"upsampling_u", plan.upsampling_u}, {"u_filter", plan.u_filter}, {"gold", plan.gold_rate}}},
+      {"base", cells_per_base_sample(plan.coarsening)},
       {"bounds", bounds_json(plan.bounds)},
       {"budget", budget_json(plan.budget)},
       {"foreseen",
@@ -46,6 +47,8 @@ void print_plan(const Planned& p) {
              100 * plan.epsilon, plan.reference_range);
   fmt::print("  rates        u {}x {}, gold {}x\n", plan.upsampling_u, plan.u_filter, plan.gold_rate);
   print_budget(plan.budget, plan.epsilon_abs);
+  const auto base = cells_per_base_sample(plan.coarsening);
+  fmt::print("  base         a sample every {} x {} x {} cells\n", base[0], base[1], base[2]);
   fmt::print("  not covered  {} samples ({:.2f} %)\n", plan.not_covered_count,
              100 * plan.not_covered_fraction);
   fmt::print(

@@ -112,6 +112,10 @@ struct MixedVolume {
 /// A volume with every brick at level 0: the uniform grid as a mixed one, so that one sampler serves both.
 MixedVolume as_mixed(const Volume& volume, int granularity = 4);
 
+/// A uniform volume on the grid: the base, decoded; where that is coarser than the grid, the field at the
+/// grid's samples.
+Volume on_grid(const MixedVolume& volume);
+
 /// The brick (x, y, z) a world point belongs to, by the same header; the point is clamped to the grid's box.
 Index3 brick_at(const MixedVolume& volume, const Vec3& point);
 

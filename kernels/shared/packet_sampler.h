@@ -369,15 +369,15 @@ RAY_INLINE V face_at(FIELD, const Cell* c, Place i, int along_x, Place u, V fu, 
 }
 
 // How one axis' two points lie: cells of samples away from the sampled one's, and the fractions there. Half a
-// base cell is a whole number of samples where a cell has several, else half a spacing or less: `half`.
+// base cell is a whole number of samples where a cell has several, else half a spacing or less: `half_cell`.
 typedef struct {
   I back, ahead;
   V behind, before;
 } Spread;
-RAY_INLINE Spread spread_of(I reach, V t, V half) {
+RAY_INLINE Spread spread_of(I reach, V t, V half_cell) {
   Spread s;
   const I whole = reach != 0;
-  const V lo = t - half, hi = t + half;
+  const V lo = t - half_cell, hi = t + half_cell;
   s.back = PICK(whole, -reach, PICK(lo < 0.0f, (I)(-1), (I)(0)));
   s.ahead = PICK(whole, reach, PICK(hi < 1.0f, (I)(0), (I)(1)));
   s.behind = PICK(whole, t, lo - TO_V(s.back));
@@ -390,12 +390,12 @@ typedef struct {
   V lo, hi;
 } Ends;
 
-// The field half a base cell before and behind the sampled point along one axis, w its stride; a, b are the
-// field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the outermost
-// face counts.
-RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, V half, I first, I last,
-                           Offset w, int along_x, Place u, V fu, Place v, V fv) {
-  const Spread s = spread_of(reach, t, half);
+// The field half a cell of the grid before and behind the sampled point along one axis, w its stride; a, b
+// are the field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the
+// outermost face counts.
+RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, V half_cell, I first,
+                           I last, Offset w, int along_x, Place u, V fu, Place v, V fv) {
+  const Spread s = spread_of(reach, t, half_cell);
 #define FACE(n)                                                                                              \
   face_at(field, c,                                                                                          \
           after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), along_x, \
@@ -425,23 +425,23 @@ RAY_INLINE Neighbours neighbours_within(FIELD, VdvrGrid grid, const OpenBrick* b
 #if VDVR_UNIFORM
   const I3 reach = {(I)(0), (I)(0), (I)(0)}, first = reach;
   const I3 last = {(I)(grid.cells_x), (I)(grid.cells_y), (I)(grid.cells_z)};
-  const V3 half = v3((V)(0.5f), (V)(0.5f), (V)(0.5f));
+  const V3 half_cell = v3((V)(0.5f), (V)(0.5f), (V)(0.5f));
   const Offset wy = (Offset)(c->y.all), wz = (Offset)(c->z.all);
 #else
   const I3 reach = b->reach, first = b->first, last = b->last;
-  const V3 half = v3(0.5f * b->scale.x, 0.5f * b->scale.y, 0.5f * b->scale.z);
+  const V3 half_cell = v3(0.5f * b->scale.x, 0.5f * b->scale.y, 0.5f * b->scale.z);
   const Offset wy = b->stride_y, wz = b->stride_z;
 #endif
   Neighbours n;
   n.x = ends_along(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
                    lerp(lerp(k->s001, k->s011, t.y), lerp(k->s101, k->s111, t.y), t.z), reach.x, c->index.x,
-                   t.x, half.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
+                   t.x, half_cell.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
   // Along y and z the edges along x are shared.
   const V e00 = lerp(k->s000, k->s001, t.x), e01 = lerp(k->s010, k->s011, t.x);
   const V e10 = lerp(k->s100, k->s101, t.x), e11 = lerp(k->s110, k->s111, t.x);
-  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, half.y,
+  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, half_cell.y,
                    first.y, last.y, wy, 1, c->x, t.x, c->z, t.z);
-  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, half.z,
+  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, half_cell.z,
                    first.z, last.z, wz, 1, c->x, t.x, c->y, t.y);
   return n;
 }
