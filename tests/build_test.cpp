@@ -29,6 +29,7 @@ struct Wanted {
   std::uint64_t max_memory = 0;
   bool sampled = false;
   bool isotropic = false;
+  std::optional<LevelTriple> coarsening{};
 };
 
 struct Built {
@@ -41,6 +42,8 @@ Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   PlanSettings settings;
   if (wanted.sampled) settings.coefficients = "sampled";
   if (wanted.isotropic) settings.levels = "isotropic";
+  settings.granularity = wanted.options.granularity;
+  settings.coarsening = wanted.coarsening;
   Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, {wanted.epsilon, {}}, settings);
   BuildResult result = build(device, scan, plan, wanted.options);
   if (wanted.max_memory > 0) BOOST_TEST(device.peak_memory() <= wanted.max_memory);
@@ -142,7 +145,8 @@ void check_shared_bits(const MixedVolume& v) {
       for (std::size_t a = 0; a < 3; ++a)
         count[a] = a == axis ? 0
                              : std::min<std::int64_t>(v.granularity, v.grid.cells[a] - p[a] * v.granularity)
-                                   << std::min(lp[2 - a], lq[2 - a]);
+                                       << std::min(lp[2 - a], lq[2 - a]) >>
+                                   v.coarsening[2 - a];
       for (std::int64_t z = 0; z <= count[2]; ++z)
         for (std::int64_t y = 0; y <= count[1]; ++y)
           for (std::int64_t x = 0; x <= count[0]; ++x) {
@@ -150,8 +154,7 @@ void check_shared_bits(const MixedVolume& v) {
             Index3 ip{}, iq{};
             for (std::size_t a = 0; a < 3; ++a) {
               const int coarse = std::min(lp[2 - a], lq[2 - a]);
-              ip[a] = a == axis ? static_cast<std::int64_t>(v.granularity) << lp[2 - a]
-                                : step[a] << (lp[2 - a] - coarse);
+              ip[a] = a == axis ? v.tile_shape(lp)[2 - a] - 1 : step[a] << (lp[2 - a] - coarse);
               iq[a] = a == axis ? 0 : step[a] << (lq[2 - a] - coarse);
             }
             if (reference::stored_sample(v, p, ip) != reference::stored_sample(v, q, iq)) ++different;
@@ -313,6 +316,42 @@ BOOST_AUTO_TEST_CASE(levels_per_axis_and_per_brick_are_certified_and_continuous)
   }
 }
 
+BOOST_AUTO_TEST_CASE(bases_coarser_than_the_grid_are_certified_and_continuous) {
+  const ProjectionSet scan = noise_scan(19, 9, 33);
+  for (const bool sampled : {false, true})
+    for (const LevelTriple& coarsening : {LevelTriple{2, 0, 0}, {0, 1, 2}, {2, 2, 1}, {1, 1, 1}}) {
+      Wanted wanted{grid_of(scan, {12, 12, 8}, 0.9), 0.2};
+      wanted.sampled = sampled;
+      wanted.coarsening = coarsening;
+      check_all(scan, wanted, 3);
+      BOOST_TEST((build_of(scan, wanted).result.volume.coarsening == coarsening));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(what_hardly_varies_along_an_axis_takes_a_coarser_base_there_and_fewer_samples) {
+  // Every row of the detector sees the same.
+  ProjectionSet scan = noise_scan(17, 17, 21, 6);
+  const std::int64_t columns = scan.geometry.columns, view = columns * scan.geometry.rows;
+  for (std::int64_t i = 0; i < scan.size(); ++i)
+    scan.data[static_cast<std::size_t>(i)] =
+        scan.data[static_cast<std::size_t>(i / view * view + i % columns)];
+  Wanted wanted{grid_of(scan, {12, 12, 16}, 0.8), 0.2};
+  wanted.coarsening = LevelTriple{0, 0, 0};
+  const double plain = storage_of(build_of(scan, wanted).result.volume, false).samples_ratio;
+  wanted.coarsening.reset();
+  const Built built = build_of(scan, wanted);
+  BOOST_TEST(built.result.volume.coarsening[0] == 2);
+  BOOST_TEST(storage_of(built.result.volume, false).samples_ratio < plain / 2);
+  BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+}
+
+BOOST_AUTO_TEST_CASE(a_base_that_does_not_divide_is_refused) {
+  const ProjectionSet scan = noise_scan(9, 5, 11);
+  Wanted wanted{grid_of(scan, {6, 6, 4}, 1.0), 0.3};
+  wanted.coarsening = LevelTriple{0, 0, 2};
+  BOOST_CHECK_THROW(build_of(scan, wanted), InputError);
+}
+
 BOOST_AUTO_TEST_CASE(altered_tile_sample_is_noticed) {
   const ProjectionSet scan = noise_scan(19, 9, 33, 10);
   const Built built = build_of(scan, {grid_of(scan, {8, 8, 8}, 0.9), 0.05, {}, f32_storage()});
@@ -376,6 +415,7 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
   Device device("", 20 << 20);
   PlanSettings sampled;
   sampled.coefficients = "sampled";
+  sampled.granularity = 2;
   const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.1, {}}, sampled);
   BuildOptions options;
   options.granularity = 2;

@@ -25,6 +25,7 @@ struct Case {
   double involved = 1;  ///< share of the bricks
   unsigned seed = 1;
   double offset_of_levels = 0;  ///< samples of level l lie this much times l beside gold, as fitted ones do
+  LevelTriple coarsening{};
 };
 
 const std::vector<LevelTriple> isotropic{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
@@ -52,14 +53,14 @@ OpenBricks random_bricks(const Case& c) {
   b.grid.cells = c.cells;
   b.granularity = c.granularity;
   b.rate = c.rate;
-  const Index3 n = b.grid.samples();
+  b.coarsening = c.coarsening;
+  const MixedVolume shape = b.shape();
+  const Index3 n = shape.base_samples();
+  const Index3 apart{c.rate << c.coarsening[2], c.rate << c.coarsening[1], c.rate << c.coarsening[0]};
   for (std::int64_t z = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x)
-        b.base.push_back(gold_at({x * c.rate, y * c.rate, z * c.rate}, c.rate));
-  MixedVolume shape;
-  shape.grid = b.grid;
-  shape.granularity = b.granularity;
+        b.base.push_back(gold_at({x * apart[0], y * apart[1], z * apart[2]}, c.rate));
   const Index3 bricks = shape.bricks();
   std::mt19937 random(c.seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -76,7 +77,7 @@ OpenBricks random_bricks(const Case& c) {
     const float own = 1 + 0x1p-20f * static_cast<float>(unit(random));
     const auto beside = static_cast<float>(c.offset_of_levels * (l[0] + l[1] + l[2]));
     const auto node = [&](std::size_t a, std::int64_t s) {
-      return std::min(p[a] * c.granularity * c.rate + s * (c.rate >> l[2 - a]), c.cells[a] * c.rate);
+      return std::min(p[a] * c.granularity * c.rate + s * (apart[a] >> l[2 - a]), c.cells[a] * c.rate);
     };
     for (std::int64_t z = 0; z < side[0]; ++z)
       for (std::int64_t y = 0; y < side[1]; ++y)
@@ -130,7 +131,8 @@ std::optional<float> stored_at(const MixedVolume& v, const Index3& brick, const 
   const LevelTriple l = level_of(v, brick);
   Index3 sample{};
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t local = node[a] - brick[a] * v.granularity * v.rate, spacing = v.rate >> l[2 - a];
+    const std::int64_t local = node[a] - brick[a] * v.granularity * v.rate,
+                       spacing = std::int64_t{v.rate} << v.coarsening[2 - a] >> l[2 - a];
     if (local % spacing != 0) return std::nullopt;
     sample[a] = local / spacing;
   }
@@ -259,6 +261,23 @@ BOOST_AUTO_TEST_CASE(partial_last_bricks_close_too) {
                  {Closing::paper, storage});
     check_closed({{7, 3, 5}, 2, 8, {{0, 0, 0}, {3, 3, 3}, {1, 1, 1}, {0, 3, 2}}, 1.0, 6},
                  {Closing::coarse, storage});
+  }
+}
+
+BOOST_AUTO_TEST_CASE(bases_coarser_than_the_grid_close_too) {
+  // Up to gold at 4x.
+  const auto triples = [](const LevelTriple& coarsening) {
+    std::vector<LevelTriple> all{{0, 0, 0}, {1, 2, 0}, {0, 0, 2}, {2, 1, 1}, {4, 1, 2}, {0, 3, 0}};
+    for (LevelTriple& l : all)
+      for (std::size_t a = 0; a < 3; ++a) l[a] = std::min<std::uint8_t>(l[a], 2 + coarsening[a]);
+    return all;
+  };
+  for (const StorageChoice storage : storages) {
+    for (const LevelTriple& coarsening : {LevelTriple{2, 0, 1}, {0, 2, 2}, {1, 1, 0}})
+      for (const double involved : {1.0, 0.7})
+        check_closed({{12, 12, 12}, 4, 4, triples(coarsening), involved, 8, 0, coarsening},
+                     {Closing::coarse, storage});
+    check_closed({{14, 12, 10}, 4, 4, triples({1, 2, 1}), 1.0, 9, 0, {1, 2, 1}}, {Closing::coarse, storage});
   }
 }
 

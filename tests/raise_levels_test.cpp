@@ -27,7 +27,7 @@ constexpr std::uint32_t inside = bit(1, 1, 1), low_x = bit(0, 1, 1), high_x = bi
 std::vector<LevelTriple> raised(const OpenBricks& b, std::int64_t brick, std::uint32_t violated,
                                 const AxisErrors& along = {}, bool anisotropic = true) {
   std::vector<LevelTriple> to = b.level;
-  BOOST_TEST(raise_levels(b, brick, violated, top, anisotropic ? &along : nullptr, to));
+  BOOST_TEST(raise_levels(b, brick, violated, anisotropic ? &along : nullptr, to));
   return to;
 }
 
@@ -63,7 +63,7 @@ BOOST_AUTO_TEST_CASE(at_the_gold_rate_the_others_rise_until_all_are_there) {
   BOOST_TEST((raised(pair_of(gold, {3, 3, 1}), 0, high_x) == std::vector<LevelTriple>{gold, {3, 3, 2}}));
   const OpenBricks all = pair_of(gold, gold);
   std::vector<LevelTriple> to = all.level;
-  BOOST_TEST(!raise_levels(all, 0, high_x, top, &unknown, to));
+  BOOST_TEST(!raise_levels(all, 0, high_x, &unknown, to));
   BOOST_TEST((to == all.level));
 }
 
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(repairs_end_whatever_is_violated) {
       BOOST_REQUIRE(rounds < 20);
       std::vector<LevelTriple> to = b.level;
       any = false;
-      for (std::int64_t i = 0; i < 2; ++i) any = raise_levels(b, i, (1u << 27) - 1, top, &unknown, to) || any;
+      for (std::int64_t i = 0; i < 2; ++i) any = raise_levels(b, i, (1u << 27) - 1, &unknown, to) || any;
       any = any && to != b.level;
       for (std::size_t i = 0; i < 2; ++i)
         for (std::size_t a = 0; a < 3; ++a) {

@@ -63,7 +63,9 @@ BOOST_AUTO_TEST_CASE(analytic_normals_are_the_derivative_of_the_cell) {
   const MixedVolume v =
       support::random_mixed(centred_grid({10, 9, 8}), 4, 8, {{0, 0, 0}, {1, 1, 1}, {2, 0, 1}, {0, 3, 0}}, 4);
   const MixedVolume uniform = support::random_mixed(centred_grid({10, 9, 8}), 4, 1, {{0, 0, 0}}, 7);
-  for (const MixedVolume* field : {&v, &uniform}) {
+  const MixedVolume coarse = support::random_mixed(
+      centred_grid({10, 9, 8}), 4, 8, {{0, 0, 0}, {1, 1, 1}, {2, 0, 1}, {0, 3, 0}}, 4, {2, 0, 1});
+  for (const MixedVolume* field : {&v, &uniform, &coarse}) {
     const ResidentVolume resident(device(), *field);
     RenderOptions o = normals_of(field->grid, 37, 21, 0.2);
     o.gradient = GradientKind::analytic;

@@ -11,6 +11,17 @@ namespace {
 
 constexpr int top = 3;
 
+// Bricks of 4 cells, gold at 2^levels.
+GoldSettings settings_of(int levels, bool anisotropic, bool fitted, const LevelTriple& coarsening = {}) {
+  GoldSettings s;
+  s.grid.cells = {8, 8, 8};
+  s.rate = 1 << levels;
+  s.anisotropic = anisotropic;
+  s.midrange = fitted;
+  s.coarsening = coarsening;
+  return s;
+}
+
 // Interpolation of a field of constant curvature errs by a quarter at half the spacing.
 TripleSearch::Brick curved(float x, float y, float z) {
   TripleSearch::Brick b;
@@ -40,7 +51,7 @@ double samples_of(const LevelTriple& l) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(the_axis_that_errs_is_refined_alone) {
-  const TripleSearch search(4, top, true, false);
+  const TripleSearch search(settings_of(top, true, false));
   BOOST_TEST((search.next(curved(3, 0, 0), 1.0f) == LevelTriple{0, 0, 1}));
   BOOST_TEST((search.next(curved(0, 3, 0), 1.0f) == LevelTriple{0, 1, 0}));
   BOOST_TEST((search.next(curved(0, 0, -3), 1.0f) == LevelTriple{1, 0, 0}));
@@ -48,25 +59,44 @@ BOOST_AUTO_TEST_CASE(the_axis_that_errs_is_refined_alone) {
   BOOST_TEST((search.next(curved(3, 3, 0), 1.5f) == LevelTriple{0, 1, 1}));
 }
 
+BOOST_AUTO_TEST_CASE(a_coarse_base_is_refined_along_the_axes_that_err) {
+  // Two levels below the grid along every axis: what errs there is 16 times what errs on the grid.
+  const TripleSearch search(settings_of(1, true, false, {2, 2, 2}));
+  BOOST_TEST((search.next(curved(3, 0, 0), 1.0f) == LevelTriple{0, 0, 1}));
+  BOOST_TEST((search.next(curved(48, 0, 0), 1.0f) == LevelTriple{0, 0, 3}));
+  BOOST_TEST((search.next(curved(0, 3, 12), 2.0f) == LevelTriple{2, 1, 0}));
+}
+
+BOOST_AUTO_TEST_CASE(after_four_failures_only_equal_densities_are_tried) {
+  const TripleSearch search(settings_of(2, true, false, {2, 0, 1}));
+  TripleSearch::Brick brick = curved(1, 1, 1);
+  for (int i = 0; i < 4; ++i) brick.failed.push_back({0, 0, 1});
+  BOOST_TEST((search.next(brick, 1e-6f) == LevelTriple{2, 0, 1}));
+  search.fail(brick, {2, 0, 1}, 1);
+  BOOST_TEST((search.next(brick, 1e-6f) == LevelTriple{3, 1, 2}));
+  search.fail(brick, {3, 1, 2}, 1);
+  BOOST_TEST(!search.next(brick, 1e-6f));
+}
+
 BOOST_AUTO_TEST_CASE(errors_of_opposite_signs_do_not_add) {
-  const TripleSearch search(4, top, true, false);
+  const TripleSearch search(settings_of(top, true, false));
   const auto same = search.next(curved(1, 1, 1), 1.1f), opposite = search.next(curved(1, -1, 0.05f), 1.1f);
   BOOST_REQUIRE((same && opposite));
   BOOST_TEST(samples_of(*opposite) < samples_of(*same));
 }
 
 BOOST_AUTO_TEST_CASE(isotropic_levels_come_in_turn_and_end_below_gold) {
-  const TripleSearch search(4, top, false, true);
+  const TripleSearch search(settings_of(top, false, true));
   BOOST_TEST((tried(search, curved(1, 1, 1), 1e-6f) == std::vector<LevelTriple>{{1, 1, 1}, {2, 2, 2}}));
-  BOOST_TEST((!TripleSearch(4, 1, false, true).next(curved(1, 1, 1), 1.0f)));
-  BOOST_TEST((!TripleSearch(4, 0, true, true).next(curved(1, 1, 1), 1.0f)));
+  BOOST_TEST((!TripleSearch(settings_of(1, false, true)).next(curved(1, 1, 1), 1.0f)));
+  BOOST_TEST((!TripleSearch(settings_of(0, true, true)).next(curved(1, 1, 1), 1.0f)));
 }
 
 BOOST_AUTO_TEST_CASE(every_search_ends_and_nothing_coarser_than_a_failure_is_tried) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> error(-4, 4);
   for (const bool fitted : {false, true}) {
-    const TripleSearch search(4, top, true, fitted);
+    const TripleSearch search(settings_of(top, true, fitted));
     for (int trial = 0; trial < 100; ++trial) {
       const auto levels = tried(search, curved(error(random), error(random), error(random)), 1.0f);
       BOOST_TEST(levels.size() <= 4u + top - 1);
@@ -81,7 +111,7 @@ BOOST_AUTO_TEST_CASE(every_search_ends_and_nothing_coarser_than_a_failure_is_tri
 }
 
 BOOST_AUTO_TEST_CASE(a_failure_corrects_what_is_foreseen) {
-  const TripleSearch search(4, top, true, false);
+  const TripleSearch search(settings_of(top, true, false));
   TripleSearch::Brick hopeful = curved(3, 0, 0);
   const auto first = search.next(hopeful, 1.0f);
   search.fail(hopeful, *first, 1.5f);  // twice what was foreseen

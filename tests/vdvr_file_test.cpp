@@ -35,6 +35,38 @@ BOOST_AUTO_TEST_CASE(round_trip_keeps_every_bit) {
   BOOST_TEST(content_sha256(back.volume) == content_sha256(v));
 }
 
+BOOST_AUTO_TEST_CASE(a_base_coarser_than_the_grid_comes_back_and_is_part_of_the_hash) {
+  const Folder folder;
+  const Grid grid{{8, 6, 12}, {-4.5, 0.1, 1e-7}, {1, 0.5, 0.7071067811865476}, "mm"};
+  const MixedVolume v = support::random_mixed(grid, 4, 8, support::triples, 12, {2, 1, 0});
+  write_vdvr(folder.path / "a.vdvr", v, support::full_certificate());
+  const VdvrFile back = read_vdvr(folder.path / "a.vdvr");
+  BOOST_TEST(back.format_version == 4);
+  BOOST_TEST(same_volume(back.volume, v));
+  BOOST_TEST((back.volume.coarsening == v.coarsening));
+  // A uniform column of samples may be of either grid: the hash tells them apart.
+  MixedVolume coarse = support::empty_mixed({{4, 4, 4}, {0, 0, 0}, {1, 1, 1}, "mm"}, 4, 1, {{0, 0, 0}}, 1,
+                                            {2, 0, 0}),
+              other = coarse;
+  other.coarsening = {0, 2, 0};
+  BOOST_TEST(content_sha256(coarse) != content_sha256(other));
+}
+
+BOOST_AUTO_TEST_CASE(a_base_that_does_not_fit_its_grid_is_refused) {
+  const Folder folder;
+  const Grid grid{{8, 6, 12}, {0, 0, 0}, {1, 1, 1}, "mm"};
+  const MixedVolume good = support::empty_mixed(grid, 4, 8, {{0, 0, 0}}, 1, {2, 1, 0});
+  for (const LevelTriple& bad : {LevelTriple{3, 0, 0}, {0, 2, 0}, {0, 0, 200}}) {
+    MixedVolume v = good;
+    v.coarsening = bad;
+    BOOST_CHECK_THROW(write_vdvr(folder.path / "b.vdvr", v, support::full_certificate()), InputError);
+  }
+  MixedVolume deep = good;
+  deep.rate = 64;
+  BOOST_CHECK_THROW(write_vdvr(folder.path / "b.vdvr", deep, support::full_certificate()), InputError);
+  BOOST_TEST(!fs::exists(folder.path / "b.vdvr"));
+}
+
 BOOST_AUTO_TEST_CASE(a_given_content_hash_is_stored_as_given) {
   const Folder folder;
   Certificate c = support::full_certificate();
@@ -197,7 +229,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_file_is_rejected) {
 // ----------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_newer_or_invalid_format_version_is_refused) {
-  BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 4)), {"format_version", "4", "newer"}));
+  BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 5)), {"format_version", "5", "newer"}));
   BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 0)), {"format_version"}));
   BOOST_TEST(says(refusal_after(set_attribute<double>("/", "format_version", H5T_NATIVE_DOUBLE, {1.0})),
                   {"format_version", "integer"}));

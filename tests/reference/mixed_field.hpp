@@ -20,17 +20,20 @@ inline double sample_of(const MixedVolume& v, const SampleBlock& b, std::size_t 
 
 /// The stored sample number `sample` (x, y, z) of a brick at the brick's own level.
 inline double stored_sample(const MixedVolume& v, const Index3& brick, const Index3& sample) {
-  const Index3 bricks = v.bricks(), n = v.grid.samples();
+  const Index3 bricks = v.bricks();
+  // Cells per base sample, x, y, z.
+  const Index3 c{1 << v.coarsening[2], 1 << v.coarsening[1], 1 << v.coarsening[0]};
+  const Index3 n{v.grid.cells[0] / c[0] + 1, v.grid.cells[1] / c[1] + 1, v.grid.cells[2] / c[2] + 1};
   const auto b = static_cast<std::size_t>(brick[0] + bricks[0] * (brick[1] + bricks[1] * brick[2]));
   const LevelTriple l = v.level.at(b);
   if (l == LevelTriple{0, 0, 0}) {
     const std::int64_t g = v.granularity;
-    const std::int64_t x = brick[0] * g + sample[0], y = brick[1] * g + sample[1],
-                       z = brick[2] * g + sample[2];
+    const std::int64_t x = brick[0] * g / c[0] + sample[0], y = brick[1] * g / c[1] + sample[1],
+                       z = brick[2] * g / c[2] + sample[2];
     return sample_of(v, v.base, static_cast<std::size_t>(x + n[0] * (y + n[1] * z)));
   }
-  const std::int64_t sx = (v.granularity << l[2]) + 1, sy = (v.granularity << l[1]) + 1,
-                     sz = (v.granularity << l[0]) + 1;
+  const std::int64_t sx = (v.granularity << l[2]) / c[0] + 1, sy = (v.granularity << l[1]) / c[1] + 1,
+                     sz = (v.granularity << l[0]) / c[2] + 1;
   auto i = static_cast<std::size_t>(static_cast<std::int64_t>(v.tile.at(b)) * sz * sy * sx + sample[0] +
                                     sx * (sample[1] + sy * sample[2]));
   // Tile numbers run on from one type's dataset to the next.
@@ -55,7 +58,7 @@ inline double field_of_brick(const MixedVolume& v, const Index3& brick, const Ve
   Index3 low{};
   Vec3 t{};
   for (std::size_t a = 0; a < 3; ++a) {
-    const double scale = std::ldexp(1.0, l[2 - a]);
+    const double scale = std::ldexp(1.0, l[2 - a] - v.coarsening[2 - a]);
     const double local = (cell[a] - static_cast<double>(brick[a] * v.granularity)) * scale;
     const std::int64_t width =
         std::min<std::int64_t>(v.granularity, v.grid.cells[a] - brick[a] * v.granularity);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "vdvr/mixed_volume.hpp"
@@ -32,26 +33,34 @@ inline Volume uniform(const Grid& grid, const Field& f) {
 }
 
 /// One tile of f; beyond the grid the last plane repeats.
-inline std::vector<float> tile_of(const Grid& grid, int granularity, const Index3& brick,
-                                  const LevelTriple& level, const Field& f) {
+inline std::vector<float> tile_of(const MixedVolume& v, const Index3& brick, const LevelTriple& level,
+                                  const Field& f) {
   std::vector<float> tile;
-  const auto at = [&](std::size_t a, std::int64_t i, int l) {
-    const double cell =
-        static_cast<double>(brick[a] * granularity) + static_cast<double>(i) / static_cast<double>(1 << l);
+  const Grid& grid = v.grid;
+  const auto at = [&](std::size_t a, std::int64_t i) {
+    const double cell = static_cast<double>(brick[a] * v.granularity) +
+                        std::ldexp(static_cast<double>(i), v.coarsening[2 - a] - level[2 - a]);
     return grid.origin[a] + std::min(cell, static_cast<double>(grid.cells[a])) * grid.spacing[a];
   };
-  const auto side = [&](int l) { return (static_cast<std::int64_t>(granularity) << l) + 1; };
-  for (std::int64_t z = 0; z < side(level[0]); ++z)
-    for (std::int64_t y = 0; y < side(level[1]); ++y)
-      for (std::int64_t x = 0; x < side(level[2]); ++x)
-        tile.push_back(static_cast<float>(f(at(0, x, level[2]), at(1, y, level[1]), at(2, z, level[0]))));
+  const auto side = v.tile_shape(level);
+  for (std::int64_t z = 0; z < side[0]; ++z)
+    for (std::int64_t y = 0; y < side[1]; ++y)
+      for (std::int64_t x = 0; x < side[2]; ++x)
+        tile.push_back(static_cast<float>(f(at(0, x), at(1, y), at(2, z))));
   return tile;
 }
 
 /// f sampled at each brick's level. Not closed: continuous across levels only where f is trilinear on the
 /// coarser cells.
-inline MixedVolume mixed(const Grid& grid, int granularity, const LevelOf& level_of, const Field& f) {
-  MixedVolume m = as_mixed(uniform(grid, f), granularity);
+inline MixedVolume mixed(const Grid& grid, int granularity, const LevelOf& level_of, const Field& f,
+                         const LevelTriple& coarsening = {}) {
+  Grid base = grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    base.cells[a] >>= coarsening[2 - a];
+    base.spacing[a] *= 1 << coarsening[2 - a];
+  }
+  MixedVolume m = as_mixed(Volume{grid, uniform(base, f).samples}, granularity);
+  m.coarsening = coarsening;
   const Index3 b = m.bricks();
   std::size_t i = 0;
   for (std::int64_t z = 0; z < b[2]; ++z)
@@ -62,9 +71,10 @@ inline MixedVolume mixed(const Grid& grid, int granularity, const LevelOf& level
         if (level == LevelTriple{0, 0, 0}) continue;
         auto& tiles = m.tiles[level].f32;
         m.tile[i] = static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles.size()) / m.tile_size(level));
-        const auto tile = tile_of(grid, granularity, {x, y, z}, level, f);
+        const auto tile = tile_of(m, {x, y, z}, level, f);
         tiles.insert(tiles.end(), tile.begin(), tile.end());
-        for (const auto l : level) m.rate = std::max(m.rate, 1 << l);
+        for (std::size_t a = 0; a < 3; ++a)
+          if (level[a] > coarsening[a]) m.rate = std::max(m.rate, 1 << (level[a] - coarsening[a]));
       }
   return m;
 }

@@ -13,12 +13,15 @@ namespace vdvr::support {
 
 /// Every brick takes one of `triples` at random, tiles in shuffled order; all samples 0.
 inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate,
-                               const std::vector<LevelTriple>& triples, unsigned seed) {
+                               const std::vector<LevelTriple>& triples, unsigned seed,
+                               const LevelTriple& coarsening = {}) {
   MixedVolume v;
   v.grid = grid;
   v.granularity = granularity;
   v.rate = rate;
-  v.base.f32.assign(static_cast<std::size_t>(grid.sample_count()), 0.0f);
+  v.coarsening = coarsening;
+  const Index3 base = v.base_samples();
+  v.base.f32.assign(static_cast<std::size_t>(base[0] * base[1] * base[2]), 0.0f);
   std::mt19937 random(seed);
   std::uniform_int_distribution<std::size_t> pick(0, triples.size() - 1);
   std::map<LevelTriple, std::vector<std::size_t>> bricks_of;
@@ -38,8 +41,9 @@ inline MixedVolume empty_mixed(const Grid& grid, int granularity, int rate,
 
 /// Samples uniform in [-1, 1]: bricks disagree on shared faces, so that a test sees which brick answered.
 inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate,
-                                const std::vector<LevelTriple>& triples, unsigned seed) {
-  MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed);
+                                const std::vector<LevelTriple>& triples, unsigned seed,
+                                const LevelTriple& coarsening = {}) {
+  MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed, coarsening);
   std::mt19937 random(seed + 1);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
   for (float& s : v.base.f32) s = value(random);
@@ -51,14 +55,18 @@ inline MixedVolume random_mixed(const Grid& grid, int granularity, int rate,
 /// Samples of `f` at cell coordinates x, y, z; beyond the grid a tile repeats its last plane.
 inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate,
                                  const std::vector<LevelTriple>& triples, unsigned seed,
-                                 const std::function<double(double, double, double)>& f) {
-  MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed);
-  const Index3 n = grid.samples(), bricks = v.bricks();
+                                 const std::function<double(double, double, double)>& f,
+                                 const LevelTriple& coarsening = {}) {
+  MixedVolume v = empty_mixed(grid, granularity, rate, triples, seed, coarsening);
+  const Index3 n = v.base_samples(), bricks = v.bricks();
+  const auto cell_of = [&](std::size_t axis, std::int64_t sample) {
+    return static_cast<double>(sample << coarsening[2 - axis]);
+  };
   for (std::int64_t z = 0, i = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x, ++i)
         v.base.f32[static_cast<std::size_t>(i)] =
-            static_cast<float>(f(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)));
+            static_cast<float>(f(cell_of(0, x), cell_of(1, y), cell_of(2, z)));
   for (std::size_t b = 0; b < v.level.size(); ++b) {
     const LevelTriple l = v.level[b];
     if (l == LevelTriple{0, 0, 0}) continue;
@@ -67,7 +75,7 @@ inline MixedVolume sampled_mixed(const Grid& grid, int granularity, int rate,
     const Index3 brick{id % bricks[0], id / bricks[0] % bricks[1], id / (bricks[0] * bricks[1])};
     const auto at = [&](std::size_t axis, std::int64_t sample) {
       const double cell = static_cast<double>(brick[axis] * granularity) +
-                          static_cast<double>(sample) / static_cast<double>(1 << l[2 - axis]);
+                          std::ldexp(static_cast<double>(sample), coarsening[2 - axis] - l[2 - axis]);
       return std::min(cell, static_cast<double>(grid.cells[axis]));
     };
     float* sample = v.tiles[l].f32.data() +
@@ -136,6 +144,7 @@ inline MixedVolume in_types_by_tile(const MixedVolume& v, const std::vector<Samp
       }
       if (one.tiles.empty()) continue;
       one.granularity = v.granularity;
+      one.coarsening = v.coarsening;
       out.tiles[{kind.level, part++}] = in_types(one, {types[0], types[t]}).tiles.at(kind);
     }
     for (std::size_t i = 0; i < v.level.size(); ++i)
