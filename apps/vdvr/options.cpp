@@ -241,6 +241,16 @@ BuildOptions build_options(const Arguments& args) {
   return build;
 }
 
+void add_compression(Arguments& args) {
+  args.value("compression", "deflate|none",
+             "of the .vdvr file; on the device samples lie as they are (default deflate)");
+}
+
+Compression compression(const Arguments& args) {
+  return args.choice("compression", {"deflate", "none"}, "deflate") == "none" ? Compression::none
+                                                                              : Compression::deflate;
+}
+
 PlanSettings plan_settings(const Arguments& args) {
   const bool paper = args.has("paper");
   PlanSettings settings;
