@@ -34,8 +34,7 @@ static_assert(std::endian::native == std::endian::little,
 // has the lowest that says what it holds.
 constexpr int newest_version = 3;
 constexpr std::uint64_t longest_certificate = 64u << 20;
-// Of zlib's nine: within 2 % of the smallest file on real volumes, at a third of the time of 6
-// (docs/file-format.md).
+// Of zlib's nine: within 1.5 % of the smallest on real volumes, at half the time of 6 (docs/file-format.md).
 constexpr unsigned deflate_level = 4;
 
 template <class T>
