@@ -377,8 +377,8 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
     read_volume_data(file, contents, result.volume);
     read_totals(file, result.volume, result.certificate);
   } catch (const std::bad_alloc&) {
-    throw ResourceError(
-        fmt::format("{}: not enough memory for {} bytes of samples", path.string(), file.file_bytes()));
+    throw ResourceError(fmt::format("{}: not enough memory for the samples in its {} bytes", path.string(),
+                                    file.file_bytes()));
   }
   return result;
 }
