@@ -183,6 +183,8 @@ BOOST_AUTO_TEST_CASE(bad_numbers_are_refused_by_option) {
   check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--size", "99999999999999999999x4x4"},
                 "--size");
   check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--origin", "-1,-2"}, "--origin");
+  check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--compression", "zip"}, "--compression");
+  check_refused({"plan", "x.h5", "--epsilon", "3%", "--compression", "none"}, "--compression");
   check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--granularity", "3"}, "--granularity");
   check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--upsampling", "3"}, "--upsampling");
   check_refused({"build", "x.h5", "--epsilon", "3%", "-o", o, "--max-memory", "lots"}, "--max-memory");

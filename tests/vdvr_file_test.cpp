@@ -7,6 +7,7 @@
 #include <csignal>
 #include <iterator>
 #include <limits>
+#include <random>
 
 #include "host/io/hdf5_file.hpp"
 
@@ -378,8 +379,9 @@ BOOST_AUTO_TEST_CASE(datasets_without_the_checksum_or_with_other_filters_are_ref
     return refusal_after(replace("/base", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, {8, 6, 10}, samples, p));
   };
   BOOST_TEST(says(with(Protection::none), {"/base", "Fletcher32"}));
-  BOOST_TEST(says(with(Protection::deflate), {"/base", "2 filters", "h5repack"}));
+  BOOST_TEST(says(with(Protection::checksum_first), {"/base", "Fletcher32, deflate", "h5repack"}));
   BOOST_TEST(with(Protection::fletcher32) == "accepted");  // other chunks than ours are read
+  BOOST_TEST(with(Protection::deflate) == "accepted");
 }
 
 BOOST_AUTO_TEST_CASE(a_missing_or_broken_certificate_is_refused) {
@@ -445,8 +447,10 @@ BOOST_AUTO_TEST_CASE(a_write_that_fails_leaves_the_old_file_and_nothing_else) {
   const Folder folder;
   const fs::path path = write_small(folder);
   const std::string before = bytes_of(path);
-  const MixedVolume large =
+  MixedVolume large =
       as_mixed({Grid{{100, 100, 100}, {0, 0, 0}, {1, 1, 1}, ""}, std::vector<float>(101 * 101 * 101)}, 4);
+  std::mt19937 random(1);  // zeros would deflate to less than the limit
+  for (float& sample : large.base.f32) sample = static_cast<float>(random());
   std::signal(SIGXFSZ, SIG_IGN);  // the limit then shows as a failing write, as a full disk does
   rlimit old{};
   getrlimit(RLIMIT_FSIZE, &old);

@@ -18,7 +18,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Certify
   const Planned planned = read_and_plan(device, args, options, progress.callback());
   const BuildResult result = build_certified(device, planned, options, progress.callback());
   throw_if_interrupted();
-  write_vdvr(output, result.volume, result.certificate);
+  write_vdvr(output, result.volume, result.certificate, options.compression);
   options.build.journal->remove();
   progress.clear();
 
@@ -48,11 +48,13 @@ int build_command(Arguments& args) {
   args.positional("IN", "projections").value("output,o", "OUT.vdvr", "the certified volume to write");
   add_plan_options(args);
   add_build(args);
+  add_compression(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;
+  options.compression = compression(args);
   const auto output = args.path("output");
   check_output(output, common.force || continues(args, output), {args.path("IN")});
   const auto journal = open_journal(args, common, output, {output});

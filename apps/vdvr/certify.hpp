@@ -25,6 +25,7 @@ struct CertifyOptions {
   Tolerance tolerance;
   BuildOptions build;
   PlanSettings plan;
+  Compression compression = Compression::deflate;  ///< of the file; `build` and `run` fill it in
 };
 CertifyOptions certify_options(const Arguments& args);
 

@@ -160,6 +160,16 @@ RateOptions rate_options(const Arguments& args) {
   return rates;
 }
 
+void add_compression(Arguments& args) {
+  args.value("compression", "deflate|none",
+             "of the .vdvr file; on the device samples lie as they are (default deflate)");
+}
+
+Compression compression(const Arguments& args) {
+  return args.choice("compression", {"deflate", "none"}, "deflate") == "none" ? Compression::none
+                                                                              : Compression::deflate;
+}
+
 void add_tolerance(Arguments& args) {
   args.group("Tolerance")
       .value("epsilon", "0.03|3%", "fraction of the reference range")

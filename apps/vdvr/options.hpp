@@ -11,6 +11,7 @@
 #include "vdvr/device.hpp"
 #include "vdvr/plan.hpp"
 #include "vdvr/reconstruct.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 
@@ -43,6 +44,9 @@ int upsampling_option(const Arguments& args);
 Tolerance tolerance(const Arguments& args);
 /// Includes --roi of the grid group.
 BuildOptions build_options(const Arguments& args);
+/// How the .vdvr file is written, for the commands that write one.
+void add_compression(Arguments& args);
+Compression compression(const Arguments& args);
 /// Of the build group, what a plan must know.
 PlanSettings plan_settings(const Arguments& args);
 

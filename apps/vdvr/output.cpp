@@ -129,10 +129,11 @@ Json budget_json(const ErrorBudget& b) {
 Json certificate_json(const Certificate& certificate) { return Json::parse(to_json(certificate)); }
 
 Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes) {
-  const Storage interior = storage_of(volume, true);
-  Json j = storage_part(storage_of(volume, false), file_bytes);
-  // The file holds what the device does, uncompressed; of the interior only that payload can be told apart.
-  j["interior"] = storage_part(interior, interior.device_bytes);
+  const Storage interior = storage_of(volume, true), whole = storage_of(volume, false);
+  Json j = storage_part(whole, file_bytes);
+  // The file does not hold the interior by itself: its bytes there are its share of those on the device.
+  const double share = static_cast<double>(interior.device_bytes) / static_cast<double>(whole.device_bytes);
+  j["interior"] = storage_part(interior, static_cast<std::uint64_t>(share * static_cast<double>(file_bytes)));
   return j;
 }
 

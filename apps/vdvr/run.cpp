@@ -159,7 +159,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
   throw_if_interrupted();
 
   folder.begin();
-  write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate);
+  write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate, options.compression);
   out.files.emplace_back("volume.vdvr", "the certified volume");
   timed(out.seconds, "pictures", [&] {
     draw_pictures(device, folder, out, progress);
@@ -186,11 +186,13 @@ int run_command(Arguments& args) {
       .value("output,o", "DIR", "the folder for volume, pictures and certificate");
   add_plan_options(args);
   add_build(args);
+  add_compression(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;
+  options.compression = compression(args);
   if (is_comparison(options.plan, options.build))
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";

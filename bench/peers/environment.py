@@ -15,6 +15,7 @@ PACKAGES = {
     "silx": ["numpy", "pyopencl", "silx"],
     "rtk": ["numpy", "itk-rtk"],
     "zfp": ["numpy", "numba", "h5py", "zfpy"],
+    "sz3": ["numpy", "pysz"],
 }
 
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "host/io/hdf5_chunks.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io::hdf5_file {
@@ -19,7 +20,6 @@ namespace {
 constexpr std::uint64_t chunk_bytes_wanted = 512 * 1024;
 // An object header message holds at most 65,535 bytes.
 constexpr std::uint64_t header_text_bytes = 60'000;
-constexpr std::uint64_t fletcher32_bytes = 4;  // appended to every chunk
 
 // A file whose last flush failed (disk full) cannot be closed; HDF5 1.10 tries once more when the process
 // exits and crashes. Every handle here is closed by its owner, so its exit handler has nothing else to do.
@@ -78,15 +78,14 @@ std::string class_name(H5T_class_t c, std::size_t size) {
   }
 }
 
+/// Only types whose bytes in the file are those in memory: chunks are read without HDF5's conversion.
 Element element_of(hid_t type) {
-  const H5T_class_t c = H5Tget_class(type);
-  const std::size_t size = H5Tget_size(type);
-  if (c == H5T_FLOAT && H5Tequal(type, H5T_IEEE_F32LE) > 0) return Element::f32;
-  if (c == H5T_INTEGER && H5Tequal(type, H5T_STD_I32LE) > 0) return Element::i32;
-  if (c != H5T_INTEGER || H5Tget_sign(type) != H5T_SGN_NONE) return Element::other;
-  if (size == 1) return Element::u8;
-  if (H5Tget_order(type) != H5T_ORDER_LE) return Element::other;
-  return size == 2 ? Element::u16 : size == 4 ? Element::u32 : Element::other;
+  const auto is = [&](hid_t known) { return H5Tequal(type, known) > 0; };
+  if (is(H5T_IEEE_F32LE)) return Element::f32;
+  if (is(H5T_STD_U8LE) || is(H5T_STD_U8BE)) return Element::u8;
+  if (is(H5T_STD_U16LE)) return Element::u16;
+  if (is(H5T_STD_U32LE)) return Element::u32;
+  return is(H5T_STD_I32LE) ? Element::i32 : Element::other;
 }
 
 std::uint64_t element_bytes(Element e) {
@@ -98,28 +97,6 @@ std::uint64_t element_bytes(Element e) {
     default:
       return 4;
   }
-}
-
-hid_t native_type(Element e) {
-  switch (e) {
-    case Element::f32:
-      return H5T_NATIVE_FLOAT;
-    case Element::u8:
-      return H5T_NATIVE_UINT8;
-    case Element::u16:
-      return H5T_NATIVE_UINT16;
-    case Element::i32:
-      return H5T_NATIVE_INT32;
-    default:
-      return H5T_NATIVE_UINT32;
-  }
-}
-
-/// a b, or the largest number when that does not fit: then no file is long enough and the comparison refuses
-/// it.
-std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
-  std::uint64_t product = 0;
-  return __builtin_mul_overflow(a, b, &product) ? std::numeric_limits<std::uint64_t>::max() : product;
 }
 
 }  // namespace
@@ -167,8 +144,8 @@ Shape chunk_shape(const Shape& shape, std::uint64_t bytes_per_element) {
 // --- writing
 // ----------------------------------------------------------------------------------------------------------
 
-Writer::Writer(const std::filesystem::path& file, const std::filesystem::path& shown)
-    : shown_(shown.string()) {
+Writer::Writer(const std::filesystem::path& file, const std::filesystem::path& shown, unsigned deflate_level)
+    : shown_(shown.string()), deflate_level_(deflate_level) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose), create(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
   // From 1.10 on all metadata carries checksums; a fixed upper bound keeps the bytes the same under newer
   // libraries.
@@ -230,11 +207,16 @@ void Writer::attribute(const std::string& object, const std::string& name, const
 }
 
 void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given,
-                            std::uint64_t bytes_per_element, const void* values) {
+                            std::uint64_t bytes_per_element, unsigned deflate_level, const void* values) {
   const Handle properties = dataset_properties(), space = simple_space(shape);
   const Shape chunk = chunk_shape(shape, bytes_per_element);
   const std::vector<hsize_t> extent(chunk.begin(), chunk.end());
+  // The checksum goes last, so that a damaged chunk is refused before it is inflated. Single bytes have
+  // nothing to shuffle.
+  const bool packed = deflate_level > 0, shuffled = packed && bytes_per_element > 1;
   if (H5Pset_chunk(properties.get(), static_cast<int>(extent.size()), extent.data()) < 0 ||
+      (shuffled && H5Pset_shuffle(properties.get()) < 0) ||
+      (packed && H5Pset_deflate(properties.get(), deflate_level) < 0) ||
       H5Pset_fletcher32(properties.get()) < 0)
     fail(fmt::format("{} cannot be chunked under Fletcher32", path));
   const Handle dataset(
@@ -247,25 +229,25 @@ void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t s
 }
 
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const float> values) {
-  create_dataset(path, shape, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, sizeof(float), values.data());
+  create_dataset(path, shape, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, sizeof(float), deflate_level_, values.data());
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint8_t> values) {
-  create_dataset(path, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, 1, values.data());
+  create_dataset(path, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, 1, deflate_level_, values.data());
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint16_t> values) {
-  create_dataset(path, shape, H5T_STD_U16LE, H5T_NATIVE_UINT16, 2, values.data());
+  create_dataset(path, shape, H5T_STD_U16LE, H5T_NATIVE_UINT16, 2, deflate_level_, values.data());
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::int32_t> values) {
-  create_dataset(path, shape, H5T_STD_I32LE, H5T_NATIVE_INT32, 4, values.data());
+  create_dataset(path, shape, H5T_STD_I32LE, H5T_NATIVE_INT32, 4, deflate_level_, values.data());
 }
 void Writer::dataset(const std::string& path, const Shape& shape, std::span<const std::uint32_t> values) {
-  create_dataset(path, shape, H5T_STD_U32LE, H5T_NATIVE_UINT32, 4, values.data());
+  create_dataset(path, shape, H5T_STD_U32LE, H5T_NATIVE_UINT32, 4, deflate_level_, values.data());
 }
 
 void Writer::text(const std::string& path, const std::string& text) {
   const Handle type = text_type(std::max<std::size_t>(1, text.size()));
   if (text.size() > header_text_bytes)
-    return create_dataset(path, {1}, type.get(), type.get(), text.size(), text.data());
+    return create_dataset(path, {1}, type.get(), type.get(), text.size(), 0, text.data());
   const Handle properties = dataset_properties(), space(H5Screate(H5S_SCALAR), H5Sclose);
   H5Pset_layout(properties.get(), H5D_COMPACT);
   const Handle dataset(H5Dcreate2(file_.get(), path.c_str(), type.get(), space.get(), H5P_DEFAULT,
@@ -424,40 +406,6 @@ std::string Reader::text_attribute(const std::string& object, const std::string&
   return text;
 }
 
-void Reader::check_storage(Dataset& d, std::uint64_t bytes_per_element) const {
-  const Handle properties(H5Dget_create_plist(d.id.get()), H5Pclose);
-  if (H5Pget_layout(properties.get()) != H5D_CHUNKED)
-    refuse(d.path, "is not chunked, so it carries no checksum");
-  unsigned flags = 0, config = 0;
-  std::size_t parameters = 0;
-  const int filters = H5Pget_nfilters(properties.get());
-  if (filters < 1) refuse(d.path, "has no Fletcher32 checksum");
-  for (int i = 0; i < filters; ++i) {
-    const H5Z_filter_t filter = H5Pget_filter2(properties.get(), static_cast<unsigned>(i), &flags,
-                                               &parameters, nullptr, 0, nullptr, &config);
-    if (filter != H5Z_FILTER_FLETCHER32 || filters > 1)
-      refuse(d.path,
-             fmt::format("has {} filters (number {} is HDF5's filter {}); only Fletcher32 alone is read: "
-                         "h5repack -f FLET rewrites the file",
-                         filters, i, filter));
-  }
-  std::vector<hsize_t> chunk(d.shape.size());
-  if (H5Pget_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data()) < 0)
-    refuse(d.path, hdf5_reason());
-  // Without compression the stored size follows from the shape; anything else means missing chunks, which
-  // HDF5 would silently replace by its fill value, or chunks left out of the checksum.
-  std::uint64_t chunks = 1, chunk_bytes = bytes_per_element;
-  for (std::size_t a = 0; a < chunk.size(); ++a) {
-    chunks = saturating_product(chunks, (d.shape[a] - 1) / chunk[a] + 1);
-    chunk_bytes = saturating_product(chunk_bytes, chunk[a]);
-  }
-  const std::uint64_t expected = saturating_product(chunks, chunk_bytes + fletcher32_bytes);
-  d.stored_bytes = H5Dget_storage_size(d.id.get());
-  if (d.stored_bytes != expected || expected > file_bytes_)
-    refuse(d.path, fmt::format("{} bytes are stored where its shape needs {}, in a file of {}: incomplete",
-                               d.stored_bytes, expected, file_bytes_));
-}
-
 Dataset Reader::dataset(const std::string& path) const {
   Dataset d;
   d.path = path;
@@ -476,15 +424,16 @@ Dataset Reader::dataset(const std::string& path) const {
                              class_name(H5Tget_class(type.get()), H5Tget_size(type.get()))));
   d.count = 1;
   for (const std::uint64_t n : d.shape) d.count = saturating_product(d.count, n);
-  d.bytes = saturating_product(d.count, element_bytes(d.element));
+  d.element_bytes = element_bytes(d.element);
+  d.bytes = saturating_product(d.count, d.element_bytes);
   if (d.count == 0) refuse(path, "is empty");
-  check_storage(d, element_bytes(d.element));
+  if (const auto problem = check_storage(d, file_bytes_)) refuse(path, *problem);
   return d;
 }
 
 void Reader::read(const Dataset& d, void* values) const {
-  if (H5Dread(d.id.get(), native_type(d.element), H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
-    refuse(d.path, fmt::format("cannot be read: {}; the file is damaged", hdf5_reason()));
+  if (const auto problem = read_chunks(d, values))
+    refuse(d.path, fmt::format("cannot be read: {}; the file is damaged", *problem));
 }
 
 std::string Reader::text(const std::string& path, std::uint64_t max_bytes) const {
@@ -496,8 +445,14 @@ std::string Reader::text(const std::string& path, std::uint64_t max_bytes) const
   if (H5Sget_simple_extent_npoints(space.get()) != 1) refuse(path, "is not one string");
   if (H5Pget_layout(properties.get()) == H5D_VIRTUAL || H5Pget_external_count(properties.get()) > 0)
     refuse(path, "lies outside the file");
-  if (H5Tis_variable_str(type.get()) <= 0 && H5Tget_size(type.get()) > max_bytes)
+  const bool fixed = H5Tis_variable_str(type.get()) <= 0;
+  if (fixed && H5Tget_size(type.get()) > max_bytes)
     refuse(path, fmt::format("has {} bytes, more than {}", H5Tget_size(type.get()), max_bytes));
+  // HDF5 takes what a chunk lacks from behind it, and inflates without a limit.
+  if (H5Pget_layout(properties.get()) == H5D_CHUNKED &&
+      (!fixed || !fletcher32_alone(properties.get()) ||
+       H5Dget_storage_size(dataset.get()) != H5Tget_size(type.get()) + fletcher32_bytes))
+    refuse(path, "is in chunks that are not one text of fixed length under Fletcher32 alone");
   std::string text;
   if (!read_text(type.get(), text, [&](hid_t memory, void* out) {
         return H5Dread(dataset.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out);

@@ -1,7 +1,8 @@
 // HDF5 files in which every stored number is under a checksum: move-only handles, a writer and a strict
-// reader. Datasets are chunked with the Fletcher32 filter; object headers, chunk indexes and superblock carry
-// HDF5's own checksums (format of HDF5 1.10). The reader hands out a dataset only after its type, shape,
-// filters and stored bytes have been checked, so that callers can size memory by it. Called by vdvr_file.cpp.
+// reader. Datasets are chunked, deflated if asked for, with the Fletcher32 filter last; object headers, chunk
+// indexes and superblock carry HDF5's own checksums (format of HDF5 1.10). The reader hands out a dataset
+// only after its type, shape, filters and stored bytes have been checked, so that callers can size memory by
+// it. Called by vdvr_file.cpp.
 //
 // The HDF5 library is not thread-safe: one thread at a time.
 #pragma once
@@ -54,10 +55,11 @@ using Shape = std::vector<std::uint64_t>;  ///< slowest axis first
 /// little is padded.
 Shape chunk_shape(const Shape& shape, std::uint64_t element_bytes);
 
-/// Writes a new file; `shown` is the path that messages name. Failures throw ResourceError (disk).
+/// Writes a new file; `shown` is the path that messages name. `deflate_level` 1 to 9, 0: not compressed; text
+/// never is. Failures throw ResourceError (disk).
 class Writer {
  public:
-  Writer(const std::filesystem::path& file, const std::filesystem::path& shown);
+  Writer(const std::filesystem::path& file, const std::filesystem::path& shown, unsigned deflate_level);
 
   void group(const std::string& path);
   void attribute(const std::string& object, const std::string& name, std::int64_t value);
@@ -78,20 +80,26 @@ class Writer {
 
  private:
   void create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given,
-                      std::uint64_t element_bytes, const void* values);
+                      std::uint64_t element_bytes, unsigned deflate_level, const void* values);
   void create_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space,
                         hid_t given, const void* values);
   [[noreturn]] void fail(const std::string& what) const;
 
   Silence silence_;
   std::string shown_;
+  unsigned deflate_level_ = 0;
   Handle file_;
 };
 
 enum class Element { f32, u8, u16, u32, i32, other };
 
-/// A dataset whose declaration was checked: chunked, Fletcher32 alone, every chunk stored, shape without a
-/// zero.
+/// What was done to a chunk before its Fletcher32 checksum was taken; shuffle goes before deflate.
+struct Packing {
+  bool deflated = false, shuffled = false;
+};
+
+/// A dataset whose declaration was checked: chunked, of a known packing, as many chunks as its shape needs,
+/// shape without a zero. A chunk's content is checked when it is read.
 struct Dataset {
   Handle id;
   std::string path;
@@ -100,6 +108,10 @@ struct Dataset {
   std::uint64_t count = 0;         ///< elements, product of shape
   std::uint64_t bytes = 0;         ///< in memory
   std::uint64_t stored_bytes = 0;  ///< in the file
+  Packing packing;
+  Shape chunk;
+  std::uint64_t chunk_bytes = 0, element_bytes = 0;
+  std::uint64_t chunk_memory = 0;  ///< that reading takes beside `bytes`
 };
 
 /// Reads and refuses: every failure is a FileError naming file and object.
@@ -133,7 +145,6 @@ class Reader {
   [[nodiscard]] Handle open_object(const std::string& path) const;
   [[nodiscard]] Handle open_attribute(const std::string& object, const std::string& name, bool number,
                                       std::uint64_t count) const;
-  void check_storage(Dataset& dataset, std::uint64_t element_bytes) const;
 
   Silence silence_;
   std::string shown_;

@@ -19,11 +19,15 @@ struct VdvrFile {
   std::uint64_t file_bytes = 0;
 };
 
-/// Written whole or not at all, chunked, with Fletcher32 checksums. An empty content_sha256 in the
-/// certificate is filled in; any other is stored as given. Throws InputError for a volume that read_vdvr
-/// would refuse or a certificate that is not finite, FileError (folder), ResourceError (disk). Not
+/// How samples and index lie in the file; what they decode to, and its hash, are the same.
+enum class Compression { none, deflate };
+
+/// Written whole or not at all, chunked, deflated or not, with Fletcher32 checksums. An empty content_sha256
+/// in the certificate is filled in; any other is stored as given. Throws InputError for a volume that
+/// read_vdvr would refuse or a certificate that is not finite, FileError (folder), ResourceError (disk). Not
 /// thread-safe with other users of HDF5.
-void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume, const Certificate& certificate);
+void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume, const Certificate& certificate,
+                Compression compression = Compression::deflate);
 
 /// Reads and checks everything: types, shapes in 64 bits before allocating, tile indices, finite geometry,
 /// checksums. Throws FileError (path, dataset, value). Does not compare the content hash: see content_sha256.

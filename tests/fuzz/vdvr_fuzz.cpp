@@ -1,4 +1,4 @@
-// The certified volume: as written, with integer samples, and rewritten in the old HDF5 layout, where a
+// The certified volume: deflated and not, with integer samples, and rewritten in the old HDF5 layout, where a
 // damaged byte of metadata meets no checksum. Read as the commands do: the content hash is compared.
 #include "tests/fuzz/seeds.hpp"
 #include "tests/fuzz/target.hpp"
@@ -16,11 +16,12 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
                                                    {{0, 0, 0}, {1, 1, 1}, {0, 2, 1}}, 5);
   std::vector<std::string> all;
   for (const MixedVolume& v :
-       {floats, support::in_types(floats, {SampleType::u16, SampleType::u8, SampleType::u16})}) {
-    write_vdvr(path, v, support::full_certificate());
-    all.push_back(support::bytes_of(path));
-    all.push_back(in_layout(path, false));
-  }
+       {floats, support::in_types(floats, {SampleType::u16, SampleType::u8, SampleType::u16})})
+    for (const Compression compression : {Compression::deflate, Compression::none}) {
+      write_vdvr(path, v, support::full_certificate(), compression);
+      all.push_back(support::bytes_of(path));
+      all.push_back(in_layout(path, false));
+    }
   return all;
 }
 

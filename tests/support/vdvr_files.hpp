@@ -103,7 +103,7 @@ inline std::string refusal_after(const Edit& edit) {
   return refusal(path);
 }
 
-enum class Protection { fletcher32, none, deflate };
+enum class Protection { fletcher32, none, deflate, checksum_first };
 
 template <class T>
 Edit replace(const char* path, hid_t type, hid_t memory, std::vector<hsize_t> shape, std::vector<T> values,
@@ -115,8 +115,11 @@ Edit replace(const char* path, hid_t type, hid_t memory, std::vector<hsize_t> sh
     std::vector<hsize_t> chunk = shape;
     for (hsize_t& n : chunk) n = std::max<hsize_t>(1, std::min<hsize_t>(n, 8));
     H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
-    if (protection == Protection::deflate) H5Pset_deflate(properties, 1);
-    if (protection != Protection::none) H5Pset_fletcher32(properties);
+    if (protection == Protection::checksum_first) H5Pset_fletcher32(properties);
+    if (protection == Protection::deflate || protection == Protection::checksum_first)
+      H5Pset_deflate(properties, 1);
+    if (protection == Protection::fletcher32 || protection == Protection::deflate)
+      H5Pset_fletcher32(properties);
     const hid_t dataset = H5Dcreate2(file, path, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
     BOOST_REQUIRE(dataset >= 0);
     if (!values.empty())

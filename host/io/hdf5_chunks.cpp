@@ -1,0 +1,267 @@
+// See hdf5_chunks.hpp. HDF5 finds a chunk and hands out its stored bytes; everything after that is here.
+// A stored chunk: shuffle, then deflate, where the dataset has them; then Fletcher32, 4 bytes, little-endian.
+#define H5Dread_chunk_vers 1  // HDF5 2.0 has a second one, with another argument
+#include "host/io/hdf5_chunks.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <vector>
+
+namespace vdvr::io::hdf5_file {
+
+// --- how a dataset is stored
+// ----------------------------------------------------------------------------------------------------------
+
+namespace {
+
+std::string filter_name(H5Z_filter_t filter) {
+  switch (filter) {
+    case H5Z_FILTER_DEFLATE:
+      return "deflate";
+    case H5Z_FILTER_SHUFFLE:
+      return "shuffle";
+    case H5Z_FILTER_FLETCHER32:
+      return "Fletcher32";
+    case H5Z_FILTER_SZIP:
+      return "szip";
+    case H5Z_FILTER_NBIT:
+      return "n-bit";
+    case H5Z_FILTER_SCALEOFFSET:
+      return "scale-offset";
+    default:
+      return fmt::format("HDF5's number {}", filter);
+  }
+}
+
+using Filters = std::vector<H5Z_filter_t>;  ///< in the order in which they were applied
+
+Filters filters_of(hid_t properties) {
+  Filters filters;
+  for (int i = 0; i < H5Pget_nfilters(properties); ++i) {
+    unsigned flags = 0;
+    std::size_t parameters = 0;
+    filters.push_back(H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &parameters, nullptr, 0,
+                                     nullptr, nullptr));
+  }
+  return filters;
+}
+
+/// Accepts what is written here and nothing else.
+std::optional<std::string> check_filters(Dataset& d, const Filters& filters) {
+  if (std::find(filters.begin(), filters.end(), H5Z_FILTER_FLETCHER32) == filters.end())
+    return "has no Fletcher32 checksum";
+  d.packing.shuffled = filters == Filters{H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE, H5Z_FILTER_FLETCHER32};
+  d.packing.deflated = d.packing.shuffled || filters == Filters{H5Z_FILTER_DEFLATE, H5Z_FILTER_FLETCHER32};
+  if (d.packing.deflated || filters == Filters{H5Z_FILTER_FLETCHER32}) return std::nullopt;
+  std::vector<std::string> names;
+  for (const H5Z_filter_t filter : filters) names.push_back(filter_name(filter));
+  return fmt::format(
+      "went through the filters {}; read is Fletcher32, alone or after deflate or after shuffle "
+      "and deflate: h5repack -f FLET rewrites the file",
+      fmt::join(names, ", "));
+}
+
+/// Before anything is inflated: what the shape promises can lie in what is stored, and one chunk is no larger
+/// than the whole.
+std::optional<std::string> check_deflated(const Dataset& d, std::uint64_t chunks, std::uint64_t file_bytes) {
+  if (d.stored_bytes > file_bytes)
+    return fmt::format("claims {} bytes in a file of {}", d.stored_bytes, file_bytes);
+  for (std::size_t a = 0; a < d.chunk.size(); ++a)
+    if (d.chunk[a] > d.shape[a])
+      return fmt::format("has chunks of [{}], larger than its shape [{}]", fmt::join(d.chunk, ", "),
+                         fmt::join(d.shape, ", "));
+  const std::uint64_t inflated = saturating_product(chunks, d.chunk_bytes);
+  if (inflated / most_inflation > d.stored_bytes)
+    return fmt::format("claims {} bytes deflated to {}, more than deflate can do: incomplete", inflated,
+                       d.stored_bytes);
+  const Handle space(H5Dget_space(d.id.get()), H5Sclose);
+  hsize_t stored_chunks = 0;
+  if (H5Dget_num_chunks(d.id.get(), space.get(), &stored_chunks) < 0)
+    return "has an index that cannot be read";
+  if (stored_chunks != chunks)
+    return fmt::format("{} chunks are stored where its shape needs {}: incomplete", stored_chunks, chunks);
+  return std::nullopt;
+}
+
+/// Without compression the stored size follows from the shape; anything else means missing chunks, or chunks
+/// left out of the checksum.
+std::optional<std::string> check_plain(const Dataset& d, std::uint64_t chunks, std::uint64_t file_bytes) {
+  const std::uint64_t expected = saturating_product(chunks, d.chunk_bytes + fletcher32_bytes);
+  if (d.stored_bytes == expected && expected <= file_bytes) return std::nullopt;
+  return fmt::format("{} bytes are stored where its shape needs {}, in a file of {}: incomplete",
+                     d.stored_bytes, expected, file_bytes);
+}
+
+}  // namespace
+
+std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t product = 0;
+  return __builtin_mul_overflow(a, b, &product) ? std::numeric_limits<std::uint64_t>::max() : product;
+}
+
+bool fletcher32_alone(hid_t properties) { return filters_of(properties) == Filters{H5Z_FILTER_FLETCHER32}; }
+
+std::optional<std::string> check_storage(Dataset& d, std::uint64_t file_bytes) {
+  const Handle properties(H5Dget_create_plist(d.id.get()), H5Pclose);
+  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) return "is not chunked, so it carries no checksum";
+  if (auto problem = check_filters(d, filters_of(properties.get()))) return problem;
+  std::vector<hsize_t> chunk(d.shape.size());
+  if (H5Pget_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data()) < 0 ||
+      std::find(chunk.begin(), chunk.end(), hsize_t{0}) != chunk.end())
+    return "has chunks without a size";
+  d.chunk.assign(chunk.begin(), chunk.end());
+  std::uint64_t chunks = 1;
+  d.chunk_bytes = d.element_bytes;
+  for (std::size_t a = 0; a < chunk.size(); ++a) {
+    chunks = saturating_product(chunks, (d.shape[a] - 1) / chunk[a] + 1);
+    d.chunk_bytes = saturating_product(d.chunk_bytes, chunk[a]);
+  }
+  // The chunk as it is stored, as it is, and before its bytes are put in order.
+  d.chunk_memory = saturating_product(d.packing.shuffled ? 3 : 2, d.chunk_bytes);
+  d.stored_bytes = H5Dget_storage_size(d.id.get());
+  return d.packing.deflated ? check_deflated(d, chunks, file_bytes) : check_plain(d, chunks, file_bytes);
+}
+
+// --- what a chunk holds
+// ----------------------------------------------------------------------------------------------------------
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "elements are stored little-endian");
+
+/// A 16-bit sum with the carries added back in: 0 only for nothing but zeros.
+std::uint32_t folded(std::uint64_t sum) {
+  while (sum > 0xffff) sum = (sum & 0xffff) + (sum >> 16);
+  return static_cast<std::uint32_t>(sum);
+}
+
+/// Undoes shuffle: all first bytes of the elements, then all second ones, and so on.
+void gather_elements(std::span<const std::uint8_t> planes, std::size_t element_bytes,
+                     std::span<std::uint8_t> elements) {
+  const std::size_t count = planes.size() / element_bytes;
+  for (std::size_t byte = 0; byte < element_bytes; ++byte)
+    for (std::size_t i = 0; i < count; ++i) elements[i * element_bytes + byte] = planes[byte * count + i];
+}
+
+std::optional<std::string> inflate_exactly(std::span<const std::uint8_t> from, std::span<std::uint8_t> to) {
+  uLongf written = to.size();
+  uLong taken = from.size();
+  const int status = ::uncompress2(to.data(), &written, from.data(), &taken);
+  if (status == Z_MEM_ERROR) throw std::bad_alloc();
+  if (status == Z_BUF_ERROR || (status == Z_OK && (written != to.size() || taken != from.size())))
+    return fmt::format("does not inflate to its {} bytes", to.size());
+  if (status != Z_OK) return std::string("is no deflate stream");
+  return std::nullopt;
+}
+
+/// Copies the part of a chunk at `at` that lies in the array; the rest of an edge chunk is padding.
+class Placement {
+ public:
+  Placement(const Dataset& d, std::uint8_t* array) : d_(d), array_(array) {}
+  void place(const Shape& at, const std::uint8_t* chunk) const { copy(at, 0, 0, chunk, 0); }
+
+ private:
+  void copy(const Shape& at, std::size_t axis, std::uint64_t to, const std::uint8_t* chunk,
+            std::uint64_t from) const {
+    const std::uint64_t n = std::min(d_.chunk[axis], d_.shape[axis] - at[axis]), size = d_.element_bytes;
+    to = to * d_.shape[axis] + at[axis];
+    from *= d_.chunk[axis];
+    if (axis + 1 == at.size()) std::memcpy(array_ + to * size, chunk + from * size, n * size);
+    else
+      for (std::uint64_t i = 0; i < n; ++i) copy(at, axis + 1, to + i, chunk, from + i);
+  }
+  const Dataset& d_;
+  std::uint8_t* array_;
+};
+
+/// The next chunk in C order; false after the last.
+bool advance(Shape& at, const Dataset& d) {
+  for (std::size_t axis = at.size(); axis-- > 0;) {
+    if (d.shape[axis] - at[axis] > d.chunk[axis]) {
+      at[axis] += d.chunk[axis];
+      return true;
+    }
+    at[axis] = 0;
+  }
+  return false;
+}
+
+/// The stored bytes of the chunk at `at`.
+std::optional<std::string> fetch(const Dataset& d, const Shape& at, std::vector<std::uint8_t>& stored) {
+  const std::vector<hsize_t> offset(at.begin(), at.end());
+  hsize_t bytes = 0;
+  if (H5Dget_chunk_storage_size(d.id.get(), offset.data(), &bytes) < 0 || bytes == 0)
+    return std::string("is missing: incomplete");
+  if (bytes <= fletcher32_bytes || bytes > most_stored(d.chunk_bytes))
+    return fmt::format("is {} bytes long, its shape needs {}", bytes, d.chunk_bytes);
+  stored.resize(bytes);
+  std::uint32_t left_out = 0;
+  if (H5Dread_chunk(d.id.get(), H5P_DEFAULT, offset.data(), &left_out, stored.data()) < 0)
+    return std::string("cannot be read");
+  if (left_out != 0) return fmt::format("was left out of filters (mask {})", left_out);
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::uint32_t fletcher32(std::span<const std::uint8_t> bytes) {
+  // Sums of 16-bit words, high byte first, and of the sums after each; so many words stay below 64 bits.
+  constexpr std::size_t words_at_once = 1 << 16;
+  std::uint64_t sum = 0, sum_of_sums = 0;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t end = std::min(bytes.size(), at + 2 * words_at_once);
+    for (; at + 1 < end; at += 2) {
+      sum += static_cast<std::uint32_t>(bytes[at] << 8 | bytes[at + 1]);
+      sum_of_sums += sum;
+    }
+    if (at < end) {  // an odd byte at the very end is the high one of its word
+      sum += static_cast<std::uint32_t>(bytes[at++] << 8);
+      sum_of_sums += sum;
+    }
+    sum = folded(sum);
+    sum_of_sums = folded(sum_of_sums);
+  }
+  return folded(sum_of_sums) << 16 | folded(sum);
+}
+
+std::optional<std::string> unpack_chunk(std::span<const std::uint8_t> stored, const Packing& packing,
+                                        std::size_t element_bytes, std::span<std::uint8_t> chunk) {
+  if (stored.size() < fletcher32_bytes) return std::string("is too short for its Fletcher32 checksum");
+  const auto content = stored.first(stored.size() - fletcher32_bytes);
+  std::uint32_t expected = 0;
+  std::memcpy(&expected, stored.data() + content.size(), sizeof expected);
+  if (fletcher32(content) != expected) return std::string("does not match its Fletcher32 checksum");
+  if (!packing.deflated) {
+    if (content.size() != chunk.size())
+      return fmt::format("holds {} bytes, its shape needs {}", content.size(), chunk.size());
+    std::memcpy(chunk.data(), content.data(), chunk.size());
+    return std::nullopt;
+  }
+  if (!packing.shuffled) return inflate_exactly(content, chunk);
+  std::vector<std::uint8_t> planes(chunk.size());
+  if (auto problem = inflate_exactly(content, planes)) return problem;
+  gather_elements(planes, element_bytes, chunk);
+  return std::nullopt;
+}
+
+std::optional<std::string> read_chunks(const Dataset& d, void* values) {
+  const Placement placement(d, static_cast<std::uint8_t*>(values));
+  std::vector<std::uint8_t> stored, chunk(d.chunk_bytes);
+  Shape at(d.shape.size(), 0);
+  do {
+    auto problem = fetch(d, at, stored);
+    if (!problem) problem = unpack_chunk(stored, d.packing, d.element_bytes, chunk);
+    if (problem) return fmt::format("chunk at [{}] {}", fmt::join(at, ", "), *problem);
+    placement.place(at, chunk.data());
+  } while (advance(at, d));
+  return std::nullopt;
+}
+
+}  // namespace vdvr::io::hdf5_file
