@@ -384,16 +384,27 @@ BOOST_AUTO_TEST_CASE(altered_base_sample_and_foreign_scan_are_noticed) {
 }
 
 BOOST_AUTO_TEST_CASE(absurd_tolerance_is_out_of_reach) {
+  constexpr double whole_range = 1;
   const ProjectionSet scan = noise_scan(13, 5, 25);
   Device device;
   const Grid grid = grid_of(scan, {6, 6, 4}, 1.0);
-  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {1e-7, {}}), ToleranceError);
-  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {2, "linear", 2}, {0.01, {}}), ToleranceError);
-  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {-1.0, {}}), InputError);
+  // No value computed in fp32 is known better than to half a unit of its last place.
+  constexpr double unreachable = tolerance::unit_roundoff;
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {unreachable, {}}), ToleranceError);
+  // What gold and projections may err by at these rates is no tolerance: nothing is left for the volume. A
+  // plan that does not count them foresees how much that is.
+  const RateOptions coarse{2, "linear", 2};
+  PlanSettings comparison;
+  comparison.terms = "grid";
+  const ErrorBudget budget = make_plan(device, scan, grid, {}, coarse, {whole_range, {}}, comparison).budget;
+  const double taken = std::max(budget.gold.value, budget.projection.value);
+  BOOST_TEST(taken > 0);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, coarse, {{}, taken}), ToleranceError);
+  BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {-whole_range, {}}), InputError);
   BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {std::nan(""), {}}), InputError);
   // A plan made for another tolerance: build finds out by itself.
-  Plan plan = make_plan(device, scan, grid, {}, {}, {0.2, {}});
-  plan.epsilon_abs = 1e-6 * plan.reference_range;
+  Plan plan = make_plan(device, scan, grid, {}, {}, {whole_range, {}});
+  plan.epsilon_abs = unreachable * plan.reference_range;
   BOOST_CHECK_THROW(build(device, scan, plan, {}), ToleranceError);
 }
 

@@ -151,6 +151,24 @@ BOOST_AUTO_TEST_CASE(ramp_filter_keeps_the_dynamic_range_of_a_spike_on_an_offset
   check_ramp(scan);
 }
 
+BOOST_AUTO_TEST_CASE(a_device_that_ends_takes_the_plans_of_no_other_with_it) {
+  const ProjectionSet scan = noise_scan(3, 2, 37);
+  const auto filtered = [&](Device& device) {
+    return filter_projections(device.state(), scan, {}, {}, FilterMethod::fourier).samples;
+  };
+  Device stays, moved;
+  const std::vector<float> before = filtered(stays);
+  for (int i = 0; i < 3; ++i) {
+    Device ends;
+    BOOST_TEST(filtered(ends) == before);
+    BOOST_TEST(filtered(stays) == before);
+    // A device that another is moved over ends too.
+    BOOST_TEST(filtered(moved) == before);
+    moved = Device();
+  }
+  BOOST_TEST(filtered(stays) == before);
+}
+
 BOOST_AUTO_TEST_CASE(good_length_is_the_smallest_of_its_kind) {
   // Even, because real transforms of even length are the ones clFFT packs.
   const auto good = [](std::int64_t n) {

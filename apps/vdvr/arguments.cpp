@@ -109,9 +109,21 @@ Arguments& Arguments::positional(const std::string& name, const std::string& hel
 
 std::string Arguments::take_word() {
   if (tokens_.empty() || tokens_[0].empty() || tokens_[0][0] == '-') return {};
-  std::string word = tokens_[0];
+  case_ = tokens_[0];
   tokens_.erase(tokens_.begin());
-  return word;
+  return case_;
+}
+
+std::string Arguments::name() const {
+  return case_.empty() ? std::string(command_.name) : fmt::format("{} {}", command_.name, case_);
+}
+
+// The command's own usage line tells of all its cases, and of none what it takes.
+std::string Arguments::usage() const {
+  if (case_.empty()) return fmt::format("usage: vdvr {} {}", command_.name, command_.usage);
+  std::string line = "usage: vdvr " + name();
+  for (const auto& [positional, help] : positional_help_) line += " " + positional;
+  return line + " [options]";
 }
 
 bool Arguments::asks(const std::string& name, const std::string& value) const {
@@ -136,20 +148,19 @@ bool Arguments::parse() {
     po::store(po::command_line_parser(tokens_).options(all).positional(positionals_).style(style).run(),
               values_);
   } catch (const po::too_many_positional_options_error&) {
-    throw InputError(fmt::format("too many arguments; usage: vdvr {} {}", command_.name, command_.usage));
+    throw InputError(fmt::format("too many arguments; {}", usage()));
   } catch (const po::error& e) {
-    throw InputError(fmt::format("{}; `vdvr {} --help` lists the options", e.what(), command_.name));
+    throw InputError(fmt::format("{}; `vdvr {} --help` lists the options", e.what(), name()));
   }
-  for (const auto& [name, help] : positional_help_)
-    if (!has(name))
-      throw InputError(fmt::format("{} is missing; usage: vdvr {} {}", name, command_.name, command_.usage));
+  for (const auto& [positional, help] : positional_help_)
+    if (!has(positional)) throw InputError(fmt::format("{} is missing; {}", positional, usage()));
   return true;
 }
 
 void Arguments::print_help() const {
-  fmt::print("usage: vdvr {} {}\n\n{}\n", command_.name, command_.usage, command_.purpose);
+  fmt::print("{}\n\n{}\n", usage(), command_.purpose);
   if (!positional_help_.empty()) fmt::print("\n");
-  for (const auto& [name, help] : positional_help_) fmt::print("  {:<10} {}\n", name, help);
+  for (const auto& [positional, help] : positional_help_) fmt::print("  {:<10} {}\n", positional, help);
   for (const auto& g : groups_) {
     if (g.options().empty()) continue;
     std::ostringstream text;
@@ -161,9 +172,7 @@ void Arguments::print_help() const {
 bool Arguments::has(const std::string& name) const { return values_.count(name) != 0; }
 
 std::string Arguments::text(const std::string& name) const {
-  if (!has(name))
-    throw InputError(
-        fmt::format("{} is missing; usage: vdvr {} {}", option(name), command_.name, command_.usage));
+  if (!has(name)) throw InputError(fmt::format("{} is missing; {}", option(name), usage()));
   auto result = values_[name].as<std::string>();
   if (result.empty()) throw InputError(fmt::format("{} is empty", option(name)));
   return result;

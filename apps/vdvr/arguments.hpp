@@ -65,9 +65,13 @@ class Arguments {
 
  private:
   void print_help() const;
+  /// "build"; "bench paper" once the case was taken.
+  [[nodiscard]] std::string name() const;
+  [[nodiscard]] std::string usage() const;
 
   const Command& command_;
   std::vector<std::string> tokens_;
+  std::string case_;  ///< the word that take_word took
   std::vector<boost::program_options::options_description> groups_;
   boost::program_options::options_description hidden_;
   boost::program_options::positional_options_description positionals_;

@@ -67,6 +67,16 @@ void write_report(const PaperRun& run, OutputFolder& folder) {
   }
 }
 
+/// The head's turn comes after minutes: a file that cannot be read is refused before them. It is read again
+/// then, since the other sections need the memory.
+void check_head(const std::filesystem::path& head, std::uint64_t max_memory) {
+  try {
+    (void)read_volume(head, max_memory);
+  } catch (const FileError& e) {
+    throw InputError(fmt::format("--head: {}; scripts/fetch-head makes head.mha", e.what()));
+  }
+}
+
 void print_claims(const Json& json, const std::filesystem::path& output) {
   for (const auto& c : json["claims"])
     fmt::print("{:<15} {:<22} {}: {}\n", c["verdict"].get<std::string>(), c["where"].get<std::string>(),
@@ -86,13 +96,9 @@ int bench_paper(Arguments& args) {
   const CommonOptions common = common_options(args);
   const auto output = args.path("output");
   std::optional<std::filesystem::path> head;
-  if (args.has("head")) {
-    head = args.path("head");
-    if (!is_volume_input(*head) || !std::filesystem::exists(file_of_volume(*head)))
-      throw InputError(fmt::format(
-          "--head: {} is not a volume that can be read; scripts/fetch-head makes head.mha", head->string()));
-  }
+  if (args.has("head")) head = args.path("head");
   OutputFolder folder(output, file_names(), common.force);
+  if (head) check_head(*head, common.max_memory);
   Device device = open_device(common);
   ProgressLine line(args.command(), common.quiet);
   const auto start = std::chrono::steady_clock::now();

@@ -11,7 +11,9 @@
 #include <map>
 #include <mutex>
 #include <tuple>
+#include <utility>
 
+#include "host/opencl/device_end.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::fft {
@@ -37,21 +39,43 @@ struct Library {
 };
 
 struct Plan {
+  Plan() = default;
+  ~Plan() {
+    if (handle != 0) clfftDestroyPlan(&handle);
+  }
+  Plan(Plan&& o) noexcept
+      : handle(std::exchange(o.handle, 0)), context(std::move(o.context)), scratch(std::move(o.scratch)) {}
+  Plan& operator=(Plan&&) = delete;
+
   clfftPlanHandle handle = 0;
   cl::Context context;  // keeps the context alive as long as the plan
   cl::Buffer scratch;
 };
 
-std::mutex& bake_lock() {
-  static std::mutex lock;
-  return lock;
-}
-
 using Key = std::tuple<cl_context, cl_command_queue, std::int64_t, std::int64_t, bool>;
 
+struct Cache {
+  Library library;
+  std::map<Key, Plan> plans;
+};
+
+std::mutex bake_lock;
+// Under the lock. There as long as a device has plans, since clFFT keeps kernels until it is torn down. Not a
+// static with a destructor: a static Device may end after that.
+constinit Cache* cache = nullptr;
+
+void forget(const opencl::State& state) noexcept {
+  const std::lock_guard guard(bake_lock);
+  if (!cache) return;
+  std::erase_if(cache->plans, [&](const auto& p) { return std::get<0>(p.first) == state.context(); });
+  if (cache->plans.empty()) delete std::exchange(cache, nullptr);
+}
+
 Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward) {
-  static Library library;
-  static std::map<Key, Plan> plans;
+  static const bool listening = (opencl::before_device_ends(forget), true);
+  (void)listening;
+  if (!cache) cache = new Cache;
+  auto& plans = cache->plans;
   const Key key{state.context(), state.queue(), length, batch, forward};
   if (const auto found = plans.find(key); found != plans.end()) return found->second;
 
@@ -79,7 +103,7 @@ Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bo
 
 void transform(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward,
                const cl::Buffer& in, const cl::Buffer& out) {
-  const std::lock_guard guard(bake_lock());
+  const std::lock_guard guard(bake_lock);
   const Plan& plan = plan_for(state, length, batch, forward);
   cl_mem source = in(), target = out();
   check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0,

@@ -1,6 +1,6 @@
 // The only includer of clFFT is fft.cpp: library lifetime, a plan cache, good lengths, errors with sizes.
 // clfftBakePlan is not thread-safe and takes 1 to 3 s cold on a CPU; plans are baked under a lock and kept
-// per device.
+// as long as their device.
 #pragma once
 
 #include <cstdint>

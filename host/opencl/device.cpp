@@ -4,13 +4,36 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cctype>
+#include <stdexcept>
 
+#include "host/opencl/device_end.hpp"
 #include "host/opencl/state.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace opencl {
+namespace {
+
+using Forget = void (*)(const State&) noexcept;
+constinit std::array<std::atomic<Forget>, 4> listeners{};
+
+void end(const State& state) noexcept {
+  for (const auto& listener : listeners)
+    if (const Forget forget = listener.load()) forget(state);
+}
+
+}  // namespace
+
+void before_device_ends(Forget forget) {
+  for (auto& listener : listeners) {
+    Forget none = nullptr;
+    if (listener.compare_exchange_strong(none, forget)) return;
+  }
+  throw std::logic_error("before_device_ends: no room for another cache");
+}
 
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
@@ -202,9 +225,17 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
   state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));
 }
 
-Device::~Device() = default;
+Device::~Device() {
+  if (state_) opencl::end(*state_);
+}
 Device::Device(Device&&) noexcept = default;
-Device& Device::operator=(Device&&) noexcept = default;
+Device& Device::operator=(Device&& other) noexcept {
+  if (this != &other) {
+    if (state_) opencl::end(*state_);
+    state_ = std::move(other.state_);
+  }
+  return *this;
+}
 
 const DeviceInfo& Device::info() const { return state_->info; }
 std::uint64_t Device::memory_left() const { return state_->memory.left(); }

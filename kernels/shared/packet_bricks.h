@@ -39,7 +39,7 @@ RAY_INLINE V high_of(I b, V low, int bricks) {
 
 RAY_INLINE OpenBrick no_brick(void) {
   OpenBrick b;
-  b.low = v3((V)(INFINITY), (V)(INFINITY), (V)(INFINITY));
+  b.low = b.high = v3((V)(INFINITY), (V)(INFINITY), (V)(INFINITY));
   return b;
 }
 

@@ -1,0 +1,131 @@
+// Runs the commands that plan, build, check and probe a certified volume: what they write, and what they
+// refuse.
+#define BOOST_TEST_MODULE cli_build
+#include <boost/test/unit_test.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/support/command_line.hpp"
+
+using namespace vdvr::support;
+namespace fs = std::filesystem;
+
+BOOST_AUTO_TEST_CASE(settings_that_exclude_each_other_are_refused) {
+  const std::vector<std::string> build{"build", "x.h5", "--epsilon", "3%", "-o", at("excluded.vdvr")};
+  const auto with = [&](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  check_refused(with(build, {"--closing", "paper"}), "--coefficients sampled");
+  check_refused(with(build, {"--paper", "--coefficients", "midrange"}), "--coefficients sampled");
+  check_refused({"run", "x.h5", "--epsilon", "3%", "-o", at("run"), "--paper"}, "use vdvr build");
+}
+
+BOOST_AUTO_TEST_CASE(info_shows_storage_beside_the_certificate) {
+  const std::string volume = small_volume();
+  const auto json = nlohmann::json::parse(run({"info", volume, "--json"}).out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  BOOST_TEST(json["certificate"]["holds"]["buffer"].get<bool>());
+  for (const std::string key : {"samples_ratio", "bytes_ratio", "file_bytes"}) {
+    BOOST_TEST(json["storage"].contains(key));
+    BOOST_TEST(json["storage"]["interior"].contains(key));
+  }
+  BOOST_TEST(json["storage"]["file_bytes"].get<std::uintmax_t>() == fs::file_size(volume));
+}
+
+BOOST_AUTO_TEST_CASE(verify_rejects_other_projections_with_code_1) {
+  const std::string other = at("other.h5");
+  BOOST_REQUIRE(
+      run({"simulate", "--phantom", "sphere", "--detector", "33x9", "--angles", "47", "-o", other}).code ==
+      0);
+  const Ended r = run({"verify", small_volume(), "--projections", other});
+  BOOST_TEST(r.code == 1);
+  BOOST_TEST(last_line(r.err).find("sha256") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(probe_answers_every_point_in_order) {
+  write(at("p.csv"), "x,y,z\n0,0,0\n1000,0,0\n-2.5,1.25,0.5\n");
+  const std::string volume = small_volume(), scan = small_scan();
+  BOOST_REQUIRE(run({"probe", volume, "--points", at("p.csv"), "-o", at("v.csv")}).code == 0);
+  BOOST_REQUIRE(
+      run({"probe", scan, "--exact", "--like", volume, "--points", at("p.csv"), "-o", at("f.csv")}).code ==
+      0);
+  std::ifstream certified(at("v.csv")), exact(at("f.csv"));
+  std::string v, f;
+  std::getline(certified, v);
+  std::getline(exact, f);
+  BOOST_TEST(v == "x,y,z,value,bound,level,covered");
+  BOOST_TEST(f == v);
+  for (int point = 0; point < 3; ++point) {
+    BOOST_REQUIRE(std::getline(certified, v));
+    BOOST_REQUIRE(std::getline(exact, f));
+    if (point == 1) {
+      BOOST_TEST(v == "1000,0,0,,,,0");
+      BOOST_TEST(f == v);
+      continue;
+    }
+    double x = 0, y = 0, z = 0, value = 0, bound = 0, truth = 0;
+    BOOST_REQUIRE(std::sscanf(v.c_str(), "%lf,%lf,%lf,%lf,%lf", &x, &y, &z, &value, &bound) == 5);
+    BOOST_REQUIRE(std::sscanf(f.c_str(), "%lf,%lf,%lf,%lf", &x, &y, &z, &truth) == 4);
+    BOOST_TEST(std::abs(value - truth) <= bound);
+  }
+  write(at("bad.csv"), "x,y,z\n1,2\n");
+  check_refused({"probe", volume, "--points", at("bad.csv"), "-o", at("bad-out.csv")}, "line 2");
+  check_refused({"probe", scan, "--points", at("p.csv"), "-o", at("bad-out.csv")}, "--exact");
+}
+
+BOOST_AUTO_TEST_CASE(plan_draws_pictures_and_overwrites_none_without_force) {
+  const fs::path output = at("plan-pictures");
+  const std::vector<std::string> words{"plan",       small_scan(),    "--epsilon", "20%",
+                                       "--pictures", output.string(), "--json"};
+  const Ended r = run(words);
+  BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
+  const auto json = nlohmann::json::parse(r.out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  BOOST_TEST(json["pictures"]["files"].size() == 7u);
+  for (const auto& [name, shows] : json["pictures"]["files"].items())
+    BOOST_TEST(bytes_of(output / name).substr(1, 3) == "PNG", name);
+  const auto numbers = nlohmann::json::parse(bytes_of(output / "pictures.json"), nullptr, false);
+  BOOST_REQUIRE(numbers.is_object());
+  for (const std::string spectrum : {"row", "projection", "volume"}) {
+    double before = std::numeric_limits<double>::infinity();
+    for (const auto& sum : numbers[spectrum]["sums"]) {
+      const double bound = sum["amplitude_bound"].get<double>();
+      BOOST_TEST(bound > 0);
+      BOOST_TEST(bound < before);
+      BOOST_TEST(bound >= sum["with_closed_form"].get<double>());
+      before = bound;
+    }
+  }
+
+  write(output / "row.png", "kept");
+  check_refused(words, "--force");
+  BOOST_TEST(bytes_of(output / "row.png") == "kept");
+  std::vector<std::string> forced = words;
+  forced.emplace_back("--force");
+  BOOST_TEST(run(forced).code == 0);
+  BOOST_TEST(bytes_of(output / "row.png").substr(1, 3) == "PNG");
+  check_refused({"plan", small_scan(), "--epsilon", "20%", "--pictures", small_scan()}, "not a folder");
+}
+
+BOOST_AUTO_TEST_CASE(run_writes_the_certificate_and_the_pictures) {
+  const std::string output = at("run");
+  const Ended r = run({"run", small_scan(), "--epsilon", "20%", "-o", output, "--json"});
+  BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
+  const auto json = nlohmann::json::parse(r.out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  for (const auto& [name, what] : json["files"].items())
+    BOOST_TEST(fs::exists(fs::path(output) / name), name);
+  const auto certificate =
+      nlohmann::json::parse(bytes_of(fs::path(output) / "certificate.json"), nullptr, false);
+  BOOST_REQUIRE(certificate.is_object());
+  BOOST_TEST(certificate["holds"]["buffer"].get<bool>());
+  BOOST_TEST(json["error_slice"]["max_error"].get<double>() <= certificate["epsilon_abs"].get<double>());
+}
