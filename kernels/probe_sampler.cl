@@ -48,8 +48,9 @@ __kernel void rate_buffer(__global const float* restrict samples, uint side, uin
     // One brick of the whole cube, at level 0: the arithmetic of the certified field, without the index.
     const int cells = (int)side - 1;
     const VdvrBrick cube = {0, side, side * side, 0, 0, 0, 0, VDVR_F32, 1.0f, 0.0f};
-    sum += vdvr_sample_in_brick(samples, cube, vdvr_local(c.x, 0, 0, cells, cells, 0),
-                                vdvr_local(c.y, 0, 0, cells, cells, 0), vdvr_local(c.z, 0, 0, cells, cells, 0));
+    sum +=
+        vdvr_sample_in_brick(samples, cube, vdvr_local(c.x, 0, 0, cells, cells, 0),
+                             vdvr_local(c.y, 0, 0, cells, cells, 0), vdvr_local(c.z, 0, 0, cells, cells, 0));
   }
   sums[i] = sum;
 }

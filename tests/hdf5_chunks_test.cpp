@@ -183,8 +183,8 @@ BOOST_AUTO_TEST_CASE(a_chunk_that_inflates_to_more_or_less_than_its_shape_is_ref
     BOOST_TEST(says(refusal_of(stored_as(under_checksum(deflated(Bytes(size))))),
                     {"/a", "chunk at [0]", "does not inflate to its 480 bytes"}),
                size);
-  // 64 kibibytes of stream for 64 mebibytes of zeros: more than any chunk of 480 bytes takes, so it is not even
-  // read.
+  // 64 kibibytes of stream for 64 mebibytes of zeros: more than any chunk of 480 bytes takes, so it is not
+  // even read.
   BOOST_TEST(says(refusal_of(stored_as(under_checksum(deflated(Bytes(std::size_t{1} << 26), 9)))),
                   {"/a", "chunk at [0] is", "480"}));
 }
