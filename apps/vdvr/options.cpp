@@ -220,7 +220,7 @@ void refuse(const Arguments& args, const std::vector<std::string>& names, const 
 
 void add_build(Arguments& args) {
   args.group("Build")
-      .value("granularity", "1|2|4|8", "base cells per brick and axis (default 4)")
+      .value("granularity", "1|2|4|8", "cells per brick and axis (default 4)")
       .value(
           "base", "auto|NxNxN",
           "cells of the grid per base sample in x, y, z: 1, 2, 4 or 8 each (default auto: what stores least)")
