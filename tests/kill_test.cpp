@@ -288,7 +288,8 @@ BOOST_AUTO_TEST_CASE(render_killed_leaves_the_old_picture_or_the_whole_new_one) 
   const fs::path volume = w.folder / "o.vdvr";
   fs::rename(w.volume(), volume);
   const auto words = [&](const std::string& azimuth) {
-    return std::vector<std::string>{"render", volume.string(), "--size", "256x192", "--azimuth", azimuth};
+    return std::vector<std::string>{"render",    volume.string(), "--size",    "256x192",
+                                    "--sampler", "buffer",        "--azimuth", azimuth};
   };
   auto old = words("0");
   old.insert(old.end(), {"-o", (w.out / "o.png").string()});
