@@ -42,7 +42,10 @@ void parallel_for(std::int64_t n, const Progress& progress, const std::string& s
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   const std::int64_t threads = std::min<std::int64_t>(cores, n);
   std::vector<std::thread> pool;
-  for (std::int64_t t = 1; t < threads; ++t) pool.emplace_back(work, false);
+  try {
+    for (std::int64_t t = 1; t < threads; ++t) pool.emplace_back(work, false);
+  } catch (const std::exception&) {  // no thread or memory to be had: those that run, and this one, do it all
+  }
   work(true);
   for (auto& t : pool) t.join();
   if (failure) std::rethrow_exception(failure);

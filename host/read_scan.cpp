@@ -125,9 +125,11 @@ void require_room(const io::RawScan& raw, const ScanOptions& options, const std:
 template <typename Work>
 void for_each_view(std::int64_t count, const Work& work) {
   const std::int64_t workers = std::clamp<std::int64_t>(std::thread::hardware_concurrency(), 1, count);
+  // Later, in this thread, where the system has no thread left.
+  constexpr auto thread_or_later = std::launch::async | std::launch::deferred;
   std::vector<std::future<void>> running;
   for (std::int64_t w = 0; w < workers; ++w)
-    running.push_back(std::async(std::launch::async, [&work, w, workers, count] {
+    running.push_back(std::async(thread_or_later, [&work, w, workers, count] {
       for (std::int64_t k = w; k < count; k += workers) work(k);
     }));
   for (auto& r : running) r.wait();

@@ -129,9 +129,11 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
-  // Fresh pages cost a core's time, which the device leaves between its kernels.
-  std::future<std::vector<float>> samples = std::async(
-      std::launch::async, [&] { return large_zeros(static_cast<std::size_t>(grid.sample_count())); });
+  // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
+  // left.
+  std::future<std::vector<float>> samples = std::async(std::launch::async | std::launch::deferred, [&] {
+    return large_zeros(static_cast<std::size_t>(grid.sample_count()));
+  });
   const auto kept = kept_columns(g, grid);
   if (std::none_of(kept.begin(), kept.end(), [](const auto& k) { return k[0] <= k[1]; }))
     throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");

@@ -201,7 +201,7 @@ OpacityNodes paraview_opacities(const json& preset) {
     if (!v.is_number()) throw FileError("'Points' must hold numbers only");
   check_count(values.size() / 4, "Points");
   // A length that both divide is read as fours wherever that makes sense.
-  for (const std::size_t width : {4, 3})
+  for (const std::size_t width : {std::size_t{4}, std::size_t{3}})
     if (auto nodes = paraview_opacities(values, width)) return *nodes;
   throw FileError(fmt::format(
       "'Points' ({} numbers) must be value, opacity, midpoint and sharpness of each node, values in "

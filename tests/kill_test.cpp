@@ -1,5 +1,6 @@
-// Kills `vdvr build` and `vdvr run` at random moments: --resume always ends in the same content, nothing
-// half-written is ever taken for a result, and nothing is left behind.
+// Kills build, run, render and reconstruct at random moments: the output is the old one or the whole new one,
+// --resume always ends in the same content, and nothing is left behind. VDVR_KILLS=N kills each of the four
+// N times, and reports how the kills fell (the long form); without it a few times.
 #define BOOST_TEST_MODULE kill
 #include <fcntl.h>
 #include <sys/wait.h>
@@ -9,6 +10,9 @@
 #include <boost/test/unit_test.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
 
@@ -109,15 +113,66 @@ void kill_after(pid_t child, double seconds) {
   ::kill(child, SIGKILL);
 }
 
+int kills(int otherwise) {
+  const char* asked = std::getenv("VDVR_KILLS");
+  return asked == nullptr ? otherwise : std::atoi(asked);
+}
+
+// A command that writes one file, killed while it replaces an old one.
+struct Replacement {
+  std::vector<std::string> words;  // of the command, without -o
+  std::string name;                // of the output
+  unsigned seed;
+  int times;
+
+  void check(Work& w, const std::string& old_bytes) const {
+    const fs::path output = w.out / name;
+    std::vector<std::string> all = words;
+    all.insert(all.end(), {"--force", "-o", output.string()});
+    const auto begin = Clock::now();
+    BOOST_REQUIRE_MESSAGE(w.run(all) == 0, w.said());
+    const std::chrono::duration<double> whole = Clock::now() - begin;
+    const std::string new_bytes = vdvr::support::bytes_of(output);
+    BOOST_REQUIRE((new_bytes != old_bytes));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    int old_ones = 0, new_ones = 0, torn = 0;
+    for (int i = 0; i < times; ++i) {
+      for (const auto& entry : fs::directory_iterator(w.out)) fs::remove(entry.path());
+      std::ofstream(output, std::ios::binary) << old_bytes;
+      const pid_t child = start(all, w.messages);
+      // Every other one near the end, where the file is written and renamed.
+      kill_after(child, (i % 2 == 0 ? unit(random) : 0.85 + 0.2 * unit(random)) * whole.count());
+      finish(child);
+      const std::string found = vdvr::support::bytes_of(output);
+      BOOST_TEST((found == old_bytes || found == new_bytes),
+                 "kill " << i << ": neither the old nor the new file");
+      ++(found == old_bytes ? old_ones : new_ones);
+      for (const auto& entry : fs::directory_iterator(w.out))
+        if (entry.path() != output) {
+          ++torn;
+          BOOST_TEST(entry.path().filename().string().starts_with("." + name + "."),
+                     entry.path() << " was left behind");
+        }
+      BOOST_TEST(w.run(all) == 0, w.said());
+      BOOST_TEST((vdvr::support::bytes_of(output) == new_bytes));
+    }
+    BOOST_TEST_MESSAGE(words[0] << ": " << times << " kills: " << old_ones << " left the old file, "
+                                << new_ones << " the new one, " << torn
+                                << " a hidden temporary file; a whole one takes " << whole.count() << " s");
+  }
+};
+
 }  // namespace
 
-BOOST_AUTO_TEST_CASE(build_killed_at_twenty_random_moments_and_resumed_has_the_same_content) {
+BOOST_AUTO_TEST_CASE(build_killed_at_random_moments_and_resumed_has_the_same_content) {
+  const int times = kills(20);
   Work w;
   w.build_whole();
   std::mt19937 random(20);
   std::uniform_real_distribution<double> unit(0, 1);
   int with_journal = 0;
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < times; ++i) {
     const pid_t child = start(w.build(), w.messages);
     // Half of the moments lie anywhere, half where the journal grows.
     const bool late = i % 2 == 1 && w.wait_for_journal();
@@ -133,8 +188,8 @@ BOOST_AUTO_TEST_CASE(build_killed_at_twenty_random_moments_and_resumed_has_the_s
     w.only_these_remain({w.volume()});
     fs::remove(w.volume());
   }
-  BOOST_TEST_MESSAGE(with_journal << " of 20 kills left a journal; a whole build takes " << w.whole.count()
-                                  << " s");
+  BOOST_TEST_MESSAGE("build: " << times << " kills: " << with_journal << " left a journal; a whole one takes "
+                               << w.whole.count() << " s");
   BOOST_TEST(with_journal > 0);
 }
 
@@ -173,6 +228,7 @@ BOOST_AUTO_TEST_CASE(interrupted_build_says_that_resume_continues) {
 }
 
 BOOST_AUTO_TEST_CASE(run_killed_and_resumed_has_the_same_content_and_all_its_files) {
+  const int times = kills(3);
   Work w;
   w.build_whole();
   const auto words = [&](const std::string& more) {
@@ -184,15 +240,70 @@ BOOST_AUTO_TEST_CASE(run_killed_and_resumed_has_the_same_content_and_all_its_fil
   const auto begin = Clock::now();
   BOOST_REQUIRE_MESSAGE(w.run(words("")) == 0, w.said());
   const std::chrono::duration<double> whole = Clock::now() - begin;
-  const auto files = std::distance(fs::directory_iterator(w.out), fs::directory_iterator());
-  for (const double share : {0.6, 0.9}) {
+  std::map<std::string, std::string> files;  // bytes of each, uninterrupted
+  for (const auto& entry : fs::directory_iterator(w.out))
+    files[entry.path().filename().string()] = vdvr::support::bytes_of(entry.path());
+  // What stands under its own name is whole: pictures to the bit, the volume by its hash, JSON to its end.
+  const auto is_whole = [&](const fs::path& path) {
+    const std::string name = path.filename().string();
+    if (!files.contains(name)) return false;
+    if (path.extension() == ".png") return vdvr::support::bytes_of(path) == files[name];
+    if (path.extension() == ".vdvr") return vdvr::content_sha256(vdvr::read_vdvr(path).volume) == w.hash;
+    return nlohmann::json::accept(vdvr::support::bytes_of(path));
+  };
+  std::mt19937 random(60);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int with_journal = 0, ended = 0;
+  for (int i = 0; i < times; ++i) {
     fs::remove_all(w.out);
     const pid_t child = start(words(""), w.messages);
-    kill_after(child, share * whole.count());
+    kill_after(child, unit(random) * whole.count());
     finish(child);
-    if (fs::exists(w.out / "certificate.json") && !fs::exists(w.out / "volume.vdvr.journal")) continue;
+    if (fs::exists(w.out))
+      for (const auto& entry : fs::directory_iterator(w.out)) {
+        const std::string name = entry.path().filename().string();
+        BOOST_TEST((name.starts_with(".") || name.ends_with(".journal") || is_whole(entry.path())),
+                   name << " is half-written after kill " << i);
+      }
+    with_journal += fs::exists(w.out / "volume.vdvr.journal") ? 1 : 0;
+    if (fs::exists(w.out / "certificate.json") && !fs::exists(w.out / "volume.vdvr.journal")) {
+      ++ended;
+      continue;
+    }
     BOOST_TEST(w.run(words("--resume")) == 0, w.said());
-    BOOST_TEST(vdvr::content_sha256(vdvr::read_vdvr(w.out / "volume.vdvr").volume) == w.hash);
-    BOOST_TEST(std::distance(fs::directory_iterator(w.out), fs::directory_iterator()) == files);
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator(w.out)) {
+      ++count;
+      BOOST_TEST(is_whole(entry.path()), entry.path() << " after kill " << i << " and --resume");
+    }
+    BOOST_TEST(count == files.size());
   }
+  BOOST_TEST_MESSAGE("run: " << times << " kills: " << with_journal << " left a journal, " << ended
+                             << " found it done; a whole one takes " << whole.count() << " s");
+}
+
+BOOST_AUTO_TEST_CASE(render_killed_leaves_the_old_picture_or_the_whole_new_one) {
+  Work w;
+  BOOST_REQUIRE_MESSAGE(w.run(w.build()) == 0, w.said());
+  const fs::path volume = w.folder / "o.vdvr";
+  fs::rename(w.volume(), volume);
+  const auto words = [&](const std::string& azimuth) {
+    return std::vector<std::string>{"render",    volume.string(), "--size",    "256x192",
+                                    "--sampler", "buffer",        "--azimuth", azimuth};
+  };
+  auto old = words("0");
+  old.insert(old.end(), {"-o", (w.out / "o.png").string()});
+  BOOST_REQUIRE_MESSAGE(w.run(old) == 0, w.said());
+  Replacement{words("30"), "o.png", 70, kills(4)}.check(w, vdvr::support::bytes_of(w.out / "o.png"));
+}
+
+BOOST_AUTO_TEST_CASE(reconstruct_killed_leaves_the_old_volume_or_the_whole_new_one) {
+  Work w;
+  const auto words = [&](const std::string& filter) {
+    return std::vector<std::string>{"reconstruct", w.scan.string(), "--filter", filter};
+  };
+  auto old = words("hann");
+  old.insert(old.end(), {"-o", (w.out / "o.mha").string()});
+  BOOST_REQUIRE_MESSAGE(w.run(old) == 0, w.said());
+  Replacement{words("ram-lak"), "o.mha", 80, kills(4)}.check(w, vdvr::support::bytes_of(w.out / "o.mha"));
 }

@@ -240,6 +240,29 @@ BOOST_AUTO_TEST_CASE(truncated_hdf5_is_refused_or_whole_at_every_length) {
   }
 }
 
+// The bytes to damage: all of them; under a sanitizer, where each reading's child process takes far longer,
+// the headers (HDF5's blocks begin with four capitals) and of the rest every 29th.
+std::vector<std::size_t> places_to_damage(const std::string& bytes) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  constexpr std::size_t stride = 29, header = 40;
+#else
+  constexpr std::size_t stride = 1, header = 0;
+#endif
+  std::vector<bool> wanted(bytes.size());
+  for (std::size_t at = 0; at < bytes.size(); at += stride) wanted[at] = true;
+  std::vector<std::size_t> starts{0};
+  for (const char* block :
+       {"OHDR", "OCHK", "FRHP", "FHDB", "FHIB", "BTHD", "BTLF", "BTIN", "FAHD", "FADB", "EAHD"})
+    for (std::size_t at = bytes.find(block); at != std::string::npos; at = bytes.find(block, at + 1))
+      starts.push_back(at);
+  for (const std::size_t start : starts)
+    for (std::size_t at = start; at < std::min(start + header, bytes.size()); ++at) wanted[at] = true;
+  std::vector<std::size_t> places;
+  for (std::size_t at = 0; at < bytes.size(); ++at)
+    if (wanted[at]) places.push_back(at);
+  return places;
+}
+
 // Only files of our own: their data and metadata carry checksums. HDF5 1.10 itself reads beyond its buffers
 // when an old layout, which has none, is damaged.
 BOOST_AUTO_TEST_CASE(scan_of_ours_with_a_damaged_byte_is_refused_or_unchanged) {
@@ -248,7 +271,9 @@ BOOST_AUTO_TEST_CASE(scan_of_ours_with_a_damaged_byte_is_refused_or_unchanged) {
   write_data_exchange(folder / "b.h5", scan);
   const ProjectionSet whole = read_scan(folder / "b.h5");
   const std::string bytes = support::bytes_of(folder / "b.h5");
-  for (std::size_t at = 0; at < bytes.size(); ++at) {
+  const std::vector<std::size_t> places = places_to_damage(bytes);
+  BOOST_TEST_MESSAGE(places.size() << " of " << bytes.size() << " bytes damaged");
+  for (const std::size_t at : places) {
     std::string damaged = bytes;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x55);
     try {

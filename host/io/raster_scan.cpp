@@ -20,7 +20,7 @@ std::vector<double> read_numbers(const std::filesystem::path& path) {
   std::vector<double> values;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
-    line = line.substr(0, line.find('#'));
+    line.erase(std::min(line.find('#'), line.size()));
     for (std::size_t start = line.find_first_not_of(" \t\r,;"); start != std::string::npos;) {
       const std::size_t end = std::min(line.find_first_of(" \t\r,;", start), line.size());
       const char* first = line.data() + start + (line[start] == '+' ? 1 : 0);

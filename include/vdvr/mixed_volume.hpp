@@ -84,7 +84,7 @@ struct MixedVolume {
   /// ceil(cells / granularity) per axis x, y, z.
   [[nodiscard]] Index3 bricks() const {
     Index3 b{};
-    for (int a = 0; a < 3; ++a) b[a] = (grid.cells[a] + granularity - 1) / granularity;
+    for (std::size_t a = 0; a < 3; ++a) b[a] = (grid.cells[a] + granularity - 1) / granularity;
     return b;
   }
   [[nodiscard]] std::int64_t brick_count() const {

@@ -22,6 +22,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"angles.txt", true, seeds, read};
+const Target fuzz_target{"angles.txt", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

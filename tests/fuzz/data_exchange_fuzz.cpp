@@ -37,6 +37,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"scan.h5", false, seeds, read};
+const Target fuzz_target{"scan.h5", Contents::hdf5, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -20,6 +20,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"phantom.json", true, seeds, read};
+const Target fuzz_target{"phantom.json", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -1,4 +1,6 @@
 // A volume in a dataset of an HDF5 file.
+#include <numeric>
+
 #include "tests/fuzz/seeds.hpp"
 #include "tests/fuzz/target.hpp"
 #include "tests/support/scan_files.hpp"
@@ -20,6 +22,13 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
     file.dataset("/data", {4, 3, 5}, std::vector<double>(60, 0.5));
   }
   all.push_back(support::bytes_of(path));
+  {
+    support::Hdf5Writer file(path);
+    std::vector<double> ramp(60);
+    std::iota(ramp.begin(), ramp.end(), 100);
+    write_compressed(file.id(), "/data", {4, 3, 5}, ramp, true);
+  }
+  all.push_back(support::bytes_of(path));
   return all;
 }
 
@@ -29,6 +38,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"volume.h5", false, seeds, read};
+const Target fuzz_target{"volume.h5", Contents::hdf5, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -41,6 +41,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"build.journal", false, seeds, read};
+const Target fuzz_target{"build.journal", Contents::binary, seeds, read};
 
 }  // namespace vdvr::fuzz

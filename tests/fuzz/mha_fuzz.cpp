@@ -25,6 +25,6 @@ void read(const std::filesystem::path& file) { read_raster(file, memory_limit); 
 
 }  // namespace
 
-const Target fuzz_target{"volume.mha", true, seeds, read};
+const Target fuzz_target{"volume.mha", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

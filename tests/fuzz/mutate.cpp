@@ -63,7 +63,7 @@ long peak_kib() {
                        Shared& shared, std::uint64_t end) {
   const long allowed = peak_kib() + static_cast<long>(memory_limit >> 10) + slack_kib;
   for (; shared.index < end; ++shared.index) {
-    const std::string bytes = mutant(seeds, fuzz_target.text, o.seed, shared.index);
+    const std::string bytes = mutant(seeds, fuzz_target.contents, o.seed, shared.index);
     std::string why;
     const auto begin = std::chrono::steady_clock::now();
     set_clock(limit_s, limit_wall_s);
@@ -87,7 +87,7 @@ long peak_kib() {
 void keep(const Options& o, const std::vector<std::string>& seeds, std::uint64_t index) {
   if (o.keep.empty()) return;
   fs::create_directories(o.keep);
-  const std::string bytes = mutant(seeds, fuzz_target.text, o.seed, index);
+  const std::string bytes = mutant(seeds, fuzz_target.contents, o.seed, index);
   const std::string name = std::to_string(o.seed) + "-" + std::to_string(index) + "-" + fuzz_target.file_name;
   std::ofstream(o.keep / name, std::ios::binary) << bytes;
 }

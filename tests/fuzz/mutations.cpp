@@ -114,6 +114,26 @@ class Damage {
     if (below(2) == 0) bytes_.erase(begin, std::min(line.size(), bytes_.size() - begin));
     else bytes_.insert(begin, line);
   }
+  // HDF5's old filter message holds, before each filter's name, its number, the name's length, flags and the
+  // count of parameters, two bytes each; the parameters follow the name.
+  void edit_filter() {
+    std::vector<std::pair<std::size_t, std::size_t>>
+        entries;  // where the message begins, where parameters do
+    for (const std::string name : {"shuffle", "deflate", "fletcher32"})
+      for (std::size_t at = bytes_.find(name); at != std::string::npos; at = bytes_.find(name, at + 1))
+        if (at >= 8) entries.emplace_back(at - 8, at + (name.size() + 8) / 8 * 8);
+    if (entries.empty()) return overwrite_size();
+    const auto [message, parameters] = entries[below(entries.size())];
+    // HDF5's own (0 is none, 4 needs a licence, 5 and 6 pack bits), then registered and reserved ones.
+    constexpr std::array<std::uint16_t, 12> numbers{0, 1, 2, 3, 4, 5, 6, 7, 305, 32000, 32004, 0xffff};
+    constexpr std::array<std::uint16_t, 8> edges{0, 1, 2, 0x10, 0xff, 0x100, 0x7fff, 0xffff};
+    const std::uint64_t field = below(5);
+    const std::uint16_t value = field == 0 ? numbers[below(numbers.size())] : edges[below(edges.size())];
+    const std::size_t at = field < 4 ? message + 2 * field : parameters + 2 * below(4);
+    if (at + sizeof(value) > bytes_.size()) return;
+    bytes_[at] = static_cast<char>(value & 0xff);
+    bytes_[at + 1] = static_cast<char>(value >> 8);
+  }
   void nest() {
     const std::size_t depth = 1 + below(100000);
     bytes_.insert(below(bytes_.size() + 1), std::string(depth, below(2) == 0 ? '[' : '{'));
@@ -132,11 +152,16 @@ class Damage {
 
 }  // namespace
 
-std::string mutant(const std::vector<std::string>& seeds, bool text, std::uint64_t seed,
+std::string mutant(const std::vector<std::string>& seeds, Contents contents, std::uint64_t seed,
                    std::uint64_t index) {
+  const bool text = contents == Contents::text;
   std::mt19937_64 pick(seed * 0x9e3779b97f4a7c15u + index);
   Damage d(seeds[pick() % seeds.size()], pick());
   for (std::uint64_t n = 1 + d.below(3); n-- > 0;) {
+    if (contents == Contents::hdf5 && d.below(8) == 0) {
+      d.edit_filter();
+      continue;
+    }
     switch (d.below(text ? 14 : 10)) {
       case 0:
       case 1:

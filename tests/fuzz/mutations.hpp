@@ -5,10 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/fuzz/target.hpp"
+
 namespace vdvr::fuzz {
 
 /// Bit flips, truncation, blocks moved, copied, cleared, removed or doubled, sizes overwritten with numbers
-/// at the edges of their types, a tail of another seed; `text`: numbers and words changed as text.
-std::string mutant(const std::vector<std::string>& seeds, bool text, std::uint64_t seed, std::uint64_t index);
+/// at the edges of their types, a tail of another seed; text: numbers and words changed as text; HDF5: the
+/// numbers, flags and parameters of filters changed.
+std::string mutant(const std::vector<std::string>& seeds, Contents contents, std::uint64_t seed,
+                   std::uint64_t index);
 
 }  // namespace vdvr::fuzz

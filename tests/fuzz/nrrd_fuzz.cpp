@@ -22,6 +22,6 @@ void read(const std::filesystem::path& file) { read_raster(file, memory_limit); 
 
 }  // namespace
 
-const Target fuzz_target{"volume.nrrd", true, seeds, read};
+const Target fuzz_target{"volume.nrrd", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

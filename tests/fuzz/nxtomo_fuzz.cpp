@@ -19,6 +19,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"scan.nxs", false, seeds, read};
+const Target fuzz_target{"scan.nxs", Contents::hdf5, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -12,7 +12,9 @@
 
 // A size that a damaged file claims makes malloc fail, as it does without the sanitizer.
 extern "C" const char* __asan_default_options();
-extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1:detect_leaks=0"; }
+extern "C" const char* __asan_default_options() {
+  return "allocator_may_return_null=1:detect_leaks=0:quarantine_size_mb=32";
+}
 
 namespace vdvr::fuzz {
 

@@ -31,6 +31,6 @@ void read(const fs::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"scan.json", true, seeds, read};
+const Target fuzz_target{"scan.json", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -59,16 +59,18 @@ inline std::string in_layout(const std::filesystem::path& from, bool latest) {
   });
 }
 
-/// A dataset in chunks of one plane, with Deflate.
+/// A dataset in chunks of one plane, with shuffle and Deflate; `all_filters`: checksum, packed integers too.
 inline void write_compressed(hid_t file, const char* name, const std::vector<hsize_t>& shape,
-                             const std::vector<double>& values) {
+                             const std::vector<double>& values, bool all_filters = false) {
   const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
   const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
   std::vector<hsize_t> chunk = shape;
   chunk[0] = 1;
   H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
+  if (all_filters) H5Pset_scaleoffset(properties, H5Z_SO_INT, H5Z_SO_INT_MINBITS_DEFAULT);
   H5Pset_shuffle(properties);
   H5Pset_deflate(properties, 4);
+  if (all_filters) H5Pset_fletcher32(properties);
   const hid_t data = H5Dcreate2(file, name, H5T_STD_U16LE, space, H5P_DEFAULT, properties, H5P_DEFAULT);
   H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
   H5Dclose(data);

@@ -13,11 +13,13 @@ namespace vdvr::fuzz {
 /// What a reader may take, beyond what the process holds: its --max-memory.
 constexpr std::uint64_t memory_limit = 64u << 20;
 
+/// What a file holds, for damage that hits more than single bytes.
+enum class Contents { binary, text, hdf5 };
+
 struct Target {
   /// The name under which the bytes are written.
   std::string file_name;
-  /// Numbers and words in the file are changed as text too.
-  bool text = false;
+  Contents contents = Contents::binary;
   /// Bytes of small valid files. `folder` is empty and may be used; what is left there lies beside the file.
   std::vector<std::string> (*seeds)(const std::filesystem::path& folder) = nullptr;
   /// Reads the file as a command would; every refusal is a vdvr::Error.

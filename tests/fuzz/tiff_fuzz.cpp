@@ -52,6 +52,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"image.tif", false, seeds, read};
+const Target fuzz_target{"image.tif", Contents::binary, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -22,6 +22,6 @@ void read(const std::filesystem::path& file) { static_cast<void>(read_transfer_f
 
 }  // namespace
 
-const Target fuzz_target{"transfer.json", true, seeds, read};
+const Target fuzz_target{"transfer.json", Contents::text, seeds, read};
 
 }  // namespace vdvr::fuzz

@@ -34,6 +34,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"volume.vdvr", false, seeds, read};
+const Target fuzz_target{"volume.vdvr", Contents::hdf5, seeds, read};
 
 }  // namespace vdvr::fuzz
