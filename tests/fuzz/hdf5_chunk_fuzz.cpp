@@ -42,6 +42,6 @@ void read(const std::filesystem::path& file) {
 
 }  // namespace
 
-const Target fuzz_target{"chunk.bin", false, seeds, read};
+const Target fuzz_target{"chunk.bin", Contents::binary, seeds, read};
 
 }  // namespace vdvr::fuzz
