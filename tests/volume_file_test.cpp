@@ -349,6 +349,16 @@ BOOST_AUTO_TEST_CASE(hdf5_datasets_that_are_no_volume_are_refused) {
   static_cast<void>(folder.file("v.h5", whole.substr(0, whole.size() / 2)));
   refused("/volume", "truncated");
   BOOST_CHECK_THROW(static_cast<void>(read_volume(path)), FileError);
+
+  // An axis longer than it may ever be, as damage leaves it: the dimensions stand before their maxima.
+  write_hdf5(path, H5T_STD_U8LE, {5, 4, 3});
+  std::string bytes = support::bytes_of(path);
+  const std::uint64_t dimensions[] = {5, 4, 3, 5, 4, 3};
+  const auto at = bytes.find(std::string(reinterpret_cast<const char*>(dimensions), sizeof dimensions));
+  BOOST_REQUIRE(at != std::string::npos);
+  bytes[at + 2] = 2;
+  static_cast<void>(folder.file("v.h5", bytes));
+  refused("/volume", "largest extent");
 }
 
 BOOST_AUTO_TEST_CASE(tiff_slices_are_stacked_along_z_in_natural_order) {

@@ -109,6 +109,18 @@ std::vector<hsize_t> unsigned_shape(std::span<const std::int64_t> shape) {
   return {shape.begin(), shape.end()};
 }
 
+// False when an axis is longer than it may ever be, or its chunks are: HDF5 never writes either, and
+// allocates by both.
+bool extents_fit(hid_t creation, hid_t space) {
+  std::vector<hsize_t> now(H5S_MAX_RANK), most(H5S_MAX_RANK), chunk(H5S_MAX_RANK);
+  const int rank = H5Sget_simple_extent_dims(space, now.data(), most.data());
+  const bool chunked = H5Pget_layout(creation) == H5D_CHUNKED;
+  if (chunked && H5Pget_chunk(creation, static_cast<int>(chunk.size()), chunk.data()) != rank) return false;
+  for (std::size_t a = 0; a < static_cast<std::size_t>(std::max(rank, 0)); ++a)
+    if (most[a] != H5S_UNLIMITED && (now[a] > most[a] || (chunked && chunk[a] > most[a]))) return false;
+  return true;
+}
+
 // False when stored chunks differ in length from what their shape needs: HDF5 1.10 trusts a damaged shape and
 // copies beyond the chunk it read. Only chunks without compression can be told so; a checksum adds four bytes
 // to each.
@@ -224,6 +236,9 @@ Hdf5Dataset Hdf5File::dataset(const std::string& object) const {
         fmt::format("{}: its numbers lie in other files; copy them into one with h5repack", data.name_));
   if (H5Sget_simple_extent_type(space.id()) == H5S_NULL || H5Dget_storage_size(id) == 0)
     throw FileError(fmt::format("{}: holds no data", data.name_));
+  if (!extents_fit(creation.id(), space.id()))
+    throw FileError(fmt::format("{}: is damaged: an axis, or its chunks, are longer than its largest extent",
+                                data.name_));
   if (H5Pget_layout(creation.id()) == H5D_CHUNKED && !chunks_fit(id, creation.id(), space.id(), type.id()))
     throw FileError(
         fmt::format("{}: is damaged: its chunks are not as long as their shape says", data.name_));

@@ -121,6 +121,7 @@ int run(const Options& o) {
   Shared& shared = *new (memory) Shared{};
   std::uint64_t failures = 0;
   const std::uint64_t end = o.from + o.count;
+  if (o.count == 1) keep(o, seeds, o.from);  // who asks for one wants to see it
   // A fresh process every so often: a leak in one library shows as its own trouble, not as the last mutant's.
   constexpr std::uint64_t batch = 500;
   for (shared.index = o.from; shared.index < end && failures < 100;) {
