@@ -127,8 +127,8 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   Index3 n{};
   for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
   std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
-  const std::int64_t side =
-      std::max<std::int64_t>(1, std::min<std::int64_t>(128, 1024 / gold) / (granularity * gold));
+  const std::int64_t side = std::max<std::int64_t>(
+      1, std::min<std::int64_t>(128, 1024 / gold) / (std::int64_t{granularity} * gold));
   for (const auto& [fx, fy, fz] :
        {std::array{0.5, 0.5, 0.5}, std::array{0.25, 0.5, 0.5}, std::array{0.5, 0.2, 0.5},
         std::array{0.72, 0.7, 0.5}, std::array{0.35, 0.35, 0.5}}) {

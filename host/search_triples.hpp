@@ -20,7 +20,7 @@ struct AxisErrors {
 class TripleSearch {
  public:
   /// Levels up to the gold rate's. Isotropic: the levels in turn.
-  TripleSearch(const GoldSettings& settings);
+  explicit TripleSearch(const GoldSettings& settings);
 
   /// One brick's search. Cost of next(): a look at each candidate.
   struct Brick {
