@@ -100,8 +100,7 @@ class Foresee {
     Index3 low{}, high{};
     for (std::size_t a = 0; a < 3; ++a) {
       low[a] =
-          number[a] * std::max(bricks[a] - patch, std::int64_t{0}) / std::max(count[a] - 1, std::int64_t{1});
-      if (number[a] > 0 && count[a] < most_patches) low[a] = number[a] * patch;
+          count[a] < most_patches ? number[a] * patch : number[a] * (bricks[a] - patch) / (most_patches - 1);
       high[a] = std::min(low[a] + patch, bricks[a]);
       p.first[a] = std::max(low[a] - rim, std::int64_t{0});
       p.size[a] = std::min(high[a] + rim, bricks[a]) - p.first[a];

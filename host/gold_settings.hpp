@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <optional>
 #include <string>
 #include <utility>
@@ -43,11 +42,7 @@ struct GoldSettings {
     return 0.5 * (kept_margin(grid, 1) + kept_margin(coarsened(grid, coarsening), 1));
   }
   /// The level whose samples are this gold, z, y, x.
-  [[nodiscard]] LevelTriple finest() const {
-    const int top = std::countr_zero(static_cast<unsigned>(rate));
-    return {static_cast<std::uint8_t>(top + coarsening[0]), static_cast<std::uint8_t>(top + coarsening[1]),
-            static_cast<std::uint8_t>(top + coarsening[2])};
-  }
+  [[nodiscard]] LevelTriple finest() const { return finest_level(rate, coarsening); }
 
   [[nodiscard]] int coarsest() const { return coarse_rate > 0 ? coarse_rate : rate; }
 };

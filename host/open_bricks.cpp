@@ -17,13 +17,6 @@ Index3 OpenBricks::counts() const {
   return n;
 }
 
-LevelTriple OpenBricks::finest() const {
-  LevelTriple top{};
-  for (std::size_t a = 0; a < 3; ++a)
-    top[a] = static_cast<std::uint8_t>(std::countr_zero(static_cast<unsigned>(rate)) + coarsening[a]);
-  return top;
-}
-
 Index3 OpenBricks::position(std::int64_t brick) const {
   const Index3 n = counts();
   return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
@@ -61,7 +54,7 @@ TileView::TileView(const OpenBricks& b, std::int64_t brick, const LevelTriple& l
 }
 
 float base_sample(const OpenBricks& b, const TileView& t, const Index3& i) {
-  const Index3 n = b.shape().base_samples();
+  const Index3 n = base_samples(b.grid, b.coarsening);
   Index3 c{};
   for (std::size_t a = 0; a < 3; ++a)
     c[a] = std::min((t.position[a] * b.granularity >> b.coarsening[2 - a]) + (i[a] >> t.level[a]), n[a] - 1);

@@ -29,7 +29,7 @@ struct OpenBricks {
   /// The same shape without samples: for sizes.
   [[nodiscard]] MixedVolume shape() const { return {grid, granularity, rate, coarsening, {}, {}, {}, {}, 0}; }
   /// The level of gold, z, y, x.
-  [[nodiscard]] LevelTriple finest() const;
+  [[nodiscard]] LevelTriple finest() const { return finest_level(rate, coarsening); }
   [[nodiscard]] Index3 position(std::int64_t brick) const;
 };
 

@@ -221,7 +221,7 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
     const TileKind l = kind_of(file, name);
     if (!is_within_rate(v, l.level))
       file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate,
-                                          fmt::join(finest_level(v), ", ")));
+                                          fmt::join(finest_level(v.rate, v.coarsening), ", ")));
     const auto side = v.tile_shape(l);
     c.tiles[l] = expect(file, path_of(l), kSampleElements, shape_of({0, side[0], side[1], side[2]}));
     c.counts[l] = c.tiles[l].shape.front();

@@ -78,15 +78,8 @@ std::string brick_text(const MixedVolume& v, std::size_t brick) {
 
 }  // namespace
 
-LevelTriple finest_level(const MixedVolume& v) {
-  const int rate = std::countr_zero(static_cast<unsigned>(v.rate));
-  LevelTriple finest{};
-  for (std::size_t a = 0; a < 3; ++a) finest[a] = static_cast<std::uint8_t>(rate + v.coarsening[a]);
-  return finest;
-}
-
 bool is_within_rate(const MixedVolume& v, const LevelTriple& l) {
-  const LevelTriple finest = finest_level(v);
+  const LevelTriple finest = finest_level(v.rate, v.coarsening);
   return l[0] <= finest[0] && l[1] <= finest[1] && l[2] <= finest[2];
 }
 
@@ -101,8 +94,9 @@ std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKi
     const LevelTriple l = v.level[i];
     const std::uint32_t t = v.tile[i];
     if (!is_within_rate(v, l))
-      return Problem{"/level", fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i),
-                                           l[0], l[1], l[2], v.rate, fmt::join(finest_level(v), ", "))};
+      return Problem{"/level",
+                     fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i), l[0], l[1],
+                                 l[2], v.rate, fmt::join(finest_level(v.rate, v.coarsening), ", "))};
     if (l == in_base) {
       if (t != 0)
         return Problem{"/tile",

@@ -24,8 +24,7 @@ struct Problem {
 std::string name_of(const LevelTriple& level);
 std::string path_of(const TileKind& kind);
 
-/// Levels of the gold rate, z, y, x.
-LevelTriple finest_level(const MixedVolume& volume);
+/// No axis is finer than gold.
 bool is_within_rate(const MixedVolume& volume, const LevelTriple& level);
 
 std::optional<Problem> grid_problem(const MixedVolume& volume);

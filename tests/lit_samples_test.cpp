@@ -163,6 +163,21 @@ void check_values(const MixedVolume& v) {
   BOOST_TEST(wrong == 0);
 }
 
+RenderOptions seen(const MixedVolume& v) {
+  RenderOptions o;
+  o.width = o.height = 65;
+  o.camera = orbit_camera(v.grid, 37, 21, 1);
+  o.transfer = transfer_preset("default", -1, 1);
+  o.sampler = SamplerKind::buffer;
+  return o;
+}
+
+bool same_colours(const std::vector<cl_float4>& a, const std::vector<cl_float4>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const cl_float4& p, const cl_float4& q) {
+    return p.s[0] == q.s[0] && p.s[1] == q.s[1] && p.s[2] == q.s[2] && p.s[3] == q.s[3];
+  });
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(values_are_the_stored_samples_to_the_bit) {
@@ -260,8 +275,9 @@ BOOST_AUTO_TEST_CASE(no_gradient_jumps_where_levels_meet) {
       }
     }
     BOOST_TEST(met > 10000);
-    // What is interpolated on edges and then on faces is rounded to the unit each time.
-    BOOST_TEST(worst <= lit.unit * (1 + 1e-12));
+    // What is interpolated on edges and then on faces is rounded to the unit each time. Weighted sums of
+    // eight gradients of up to 512 units, in double.
+    BOOST_TEST(worst <= lit.unit + tolerance::fp64_sum(16, 512 * lit.unit));
     BOOST_TEST(worst > 0);
   }
 }
@@ -269,11 +285,7 @@ BOOST_AUTO_TEST_CASE(no_gradient_jumps_where_levels_meet) {
 BOOST_AUTO_TEST_CASE(pictures_from_lit_samples_have_the_bits_of_the_field_in_everything_but_light) {
   for (const MixedVolume& v : waves()) {
     const ResidentVolume resident(device(), v);
-    RenderOptions o;
-    o.width = o.height = 65;
-    o.camera = orbit_camera(v.grid, 37, 21, 1);
-    o.transfer = transfer_preset("default", -1, 1);
-    o.sampler = SamplerKind::buffer;
+    RenderOptions o = seen(v);
     o.shading = false;
     for (const Classification classification : {Classification::post, Classification::preintegrated}) {
       o.classification = classification;
@@ -284,9 +296,7 @@ BOOST_AUTO_TEST_CASE(pictures_from_lit_samples_have_the_bits_of_the_field_in_eve
         RaycastTuning tuning;
         tuning.lanes = lanes;
         const auto lit = raycast_float(device(), resident, o, tuning).pixels;
-        BOOST_TEST(std::equal(stored.begin(), stored.end(), lit.begin(), [](const auto& a, const auto& b) {
-          return a.s[0] == b.s[0] && a.s[1] == b.s[1] && a.s[2] == b.s[2] && a.s[3] == b.s[3];
-        }));
+        BOOST_TEST(same_colours(stored, lit));
       }
     }
   }
@@ -295,11 +305,7 @@ BOOST_AUTO_TEST_CASE(pictures_from_lit_samples_have_the_bits_of_the_field_in_eve
 BOOST_AUTO_TEST_CASE(lanes_change_no_bit_of_the_light) {
   for (const MixedVolume& v : waves()) {
     const ResidentVolume resident(device(), v);
-    RenderOptions o;
-    o.width = o.height = 65;
-    o.camera = orbit_camera(v.grid, 37, 21, 1);
-    o.transfer = transfer_preset("default", -1, 1);
-    o.sampler = SamplerKind::buffer;
+    RenderOptions o = seen(v);
     o.gradient = GradientKind::stored;
     RaycastTuning tuning;
     tuning.lanes = 1;
@@ -307,9 +313,7 @@ BOOST_AUTO_TEST_CASE(lanes_change_no_bit_of_the_light) {
     for (const int lanes : {4, 8, 16}) {
       tuning.lanes = lanes;
       const auto many = raycast_float(device(), resident, o, tuning).pixels;
-      BOOST_TEST(std::equal(one.begin(), one.end(), many.begin(), [](const auto& a, const auto& b) {
-        return a.s[0] == b.s[0] && a.s[1] == b.s[1] && a.s[2] == b.s[2] && a.s[3] == b.s[3];
-      }));
+      BOOST_TEST(same_colours(one, many));
     }
   }
 }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -70,6 +71,19 @@ struct TileKind {
 /// As many as there are sample types.
 inline constexpr std::uint8_t most_parts = 3;
 
+/// Samples per axis x, y, z of a grid's base: one every 2^coarsening cells.
+inline Index3 base_samples(const Grid& grid, const LevelTriple& coarsening) {
+  return {(grid.cells[0] >> coarsening[2]) + 1, (grid.cells[1] >> coarsening[1]) + 1,
+          (grid.cells[2] >> coarsening[0]) + 1};
+}
+/// The level whose samples are gold, z, y, x. `rate` is a power of two.
+inline LevelTriple finest_level(int rate, const LevelTriple& coarsening) {
+  LevelTriple finest = coarsening;
+  for (std::uint8_t& level : finest)
+    level = static_cast<std::uint8_t>(level + std::countr_zero(static_cast<unsigned>(rate)));
+  return finest;
+}
+
 struct MixedVolume {
   Grid grid;
   int granularity = 4;
@@ -92,10 +106,7 @@ struct MixedVolume {
     return b[0] * b[1] * b[2];
   }
   /// Samples of the base per axis x, y, z.
-  [[nodiscard]] Index3 base_samples() const {
-    return {(grid.cells[0] >> coarsening[2]) + 1, (grid.cells[1] >> coarsening[1]) + 1,
-            (grid.cells[2] >> coarsening[0]) + 1};
-  }
+  [[nodiscard]] Index3 base_samples() const { return vdvr::base_samples(grid, coarsening); }
   /// Samples of one tile per axis z, y, x.
   [[nodiscard]] std::array<std::int64_t, 3> tile_shape(const LevelTriple& l) const {
     const auto side = [&](std::size_t axis) {

@@ -3,20 +3,13 @@
 // host wrote only the latest piece, and that at a wrong offset, and takes the rest for never written;
 // written_in_pieces.cpp shows it. The price: all of a buffer that the host wrote a part of counts as written.
 #include <CL/cl.h>
-#include <dlfcn.h>
 
 #include <cstring>
 #include <vector>
 
-namespace {
+#include "tests/support/next_function.hpp"
 
-template <typename Function>
-Function next(const char* name) {
-  void* found = ::dlsym(RTLD_NEXT, name);
-  Function function = nullptr;
-  std::memcpy(&function, &found, sizeof function);
-  return function;
-}
+namespace {
 
 size_t size_of(cl_mem buffer) {
   size_t bytes = 0;

@@ -6,7 +6,6 @@
 //   VDVR_SHIM_LAUNCH_FAILS=N                    from the N-th kernel launch on the device is lost
 //   VDVR_SHIM_BREAK_BUILD=1                     kernels are compiled with a define that breaks them
 #include <CL/cl.h>
-#include <dlfcn.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,20 +13,14 @@
 #include <cstring>
 #include <string>
 
+#include "tests/support/next_function.hpp"
+
 namespace {
 
 // 0: not set.
 cl_ulong setting(const char* name) {
   const char* text = std::getenv(name);
   return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
-}
-
-template <typename Function>
-Function next(const char* name) {
-  void* found = ::dlsym(RTLD_NEXT, name);
-  Function function = nullptr;
-  std::memcpy(&function, &found, sizeof function);
-  return function;
 }
 
 template <typename T>
