@@ -103,6 +103,7 @@ class Builder {
     settings.anisotropic = plan.settings.levels == "anisotropic" && closing_ != Closing::paper;
     settings.grid_only = plan.settings.terms == "grid";
     settings.coarsening = plan.coarsening;
+    settings.lattice = bricks_.lattice;
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     node_test_.emplace(state_, *gold_, bricks_, host_, journal_, progress_,
                        [this](float slack, double tolerance) { refuse(slack, tolerance); });

@@ -15,8 +15,9 @@ namespace {
 
 // Patches along an axis, bricks of one that count, and those around them, whose levels bear on their faces.
 constexpr std::int64_t most_patches = 4, patch = 4, rim = 1;
-// What saves less than this share of the samples is not worth tiles in place of a base that neighbours share.
-constexpr double worth = 0.1;
+// What saves less than this share of the samples is not worth the time: tiles in place of a base that
+// neighbours share are classified and verified each.
+constexpr double worth = 0.2;
 // Of a wave of half the Nyquist frequency the error between samples is that much more than an eighth of the
 // second difference; slower ones come nearer to 1.
 constexpr double between_samples = 1.2;

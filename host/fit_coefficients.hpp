@@ -20,9 +20,10 @@ struct GoldBlocks {
   std::int64_t z_first = 0, z_last = 0;  ///< tested nodes along z
 };
 
-/// Nodes of a block, across z, on which samples are wanted: closed.
-struct ColumnBox {
-  std::int64_t block = 0, first_x = 0, first_y = 0, last_x = 0, last_y = 0;
+/// Nodes first .. last of a block, x, y, z, on which samples are wanted: closed.
+struct NodeBox {
+  std::int64_t block = 0;
+  Index3 first{}, last{};
 };
 
 /// Every spacing-th node of blocks of gold per axis: float[block][cy][cx][cz], node n at n / spacing + reach.
@@ -44,30 +45,31 @@ class LatticeFit {
 
   /// `spacing` along x, y, z; `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many
   /// second differences below gold's interpolant, on average over a gold cell of the grid that is certified.
-  /// `margins`: the blocks' margins. Right on the boxes wanted, and undefined further out, where halo >=
+  /// `margin`: the blocks' margins. Right on the boxes wanted, and undefined further out, where halo >=
   /// steps * spacing; along an axis with less halo samples near the rim rest on the gold that is there. Valid
   /// until the next call. Cost: per step about two evaluations of the interpolant per gold node of the boxes,
   /// widened by as many spacings less a half. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the
   /// gold, and as much as the gold.
-  const LevelSamples& operator()(const opencl::DeviceArray<float>& gold, const std::vector<float>& margins,
-                                 const std::vector<ColumnBox>& wanted, const Index3& spacing, int steps,
-                                 float curvature);
+  const LevelSamples& operator()(const opencl::DeviceArray<float>& gold,
+                                 const opencl::DeviceArray<float>& margin, const std::vector<NodeBox>& wanted,
+                                 const Index3& spacing, int steps, float curvature);
   /// What the last call gave.
   [[nodiscard]] const LevelSamples& last() const { return level_; }
 
  private:
   void shape_for(const Index3& spacing);
-  void mark(const std::vector<float>& margins, const std::vector<ColumnBox>& wanted, int steps);
+  void mark(const std::vector<NodeBox>& wanted, int steps);
   void reserve(std::uint64_t gold, int steps);
-  void fit(const opencl::DeviceArray<float>& gold, float curvature);
+  void fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin, float curvature);
 
   opencl::State& state_;
   const GoldBlocks& blocks_;
   LevelSamples level_;
-  std::vector<float> host_margin_;
-  std::vector<std::uint8_t> host_needed_;
-  opencl::DeviceArray<float> margin_, errors_, low_, high_;
-  opencl::DeviceArray<std::uint8_t> needed_;
+  [[nodiscard]] cl_uint runs_between(std::int64_t low, std::int64_t high) const;
+
+  std::vector<cl_uint> host_wanted_, host_needed_;
+  opencl::DeviceArray<float> errors_, low_, high_;
+  opencl::DeviceArray<cl_uint> wanted_, needed_;
 };
 
 }  // namespace vdvr

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "host/quantise.hpp"
 #include "host/reconstruct_field.hpp"
 #include "vdvr/mixed_volume.hpp"
 
@@ -35,6 +36,7 @@ struct GoldSettings {
   float curvature = 0.0625f;
   int coarse_rate = 0;       ///< of a coarser gold that shares this one's bounds of base cells; 0: none
   bool grid_only = false;    ///< slack counts as 0: the paper's test, for comparison
+  Lattice lattice{};         ///< on which tiles will be stored; classification leaves room for it
   LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x
 
   /// How far outside the covered region samples are kept: as far as a base cell that meets it reaches.

@@ -76,6 +76,17 @@ std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, Sam
   return std::nullopt;
 }
 
+double rounding_of(std::span<const float> tile, const Lattice& lattice) {
+  if (lattice.step == 0 || tile.empty()) return 0;
+  const auto [lo, hi] = range_of(tile);
+  for (const SampleType type : {SampleType::u8, SampleType::u16}) {
+    if (type > lattice.least) continue;
+    if (const auto shift = fitting_shift(lo, hi, lattice, type, lattice.base_shift))
+      return std::ldexp(lattice.step, *shift - 1);
+  }
+  return 0;
+}
+
 SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size) {
   SampleBlock b;
   b.type = type;

@@ -44,6 +44,9 @@ inline float round_to(float value, double unit) {
 /// or where |value| reaches 2^24 steps.
 std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, SampleType type, int most);
 
+/// What rounding to its own step may move a sample of such a tile; 0 where it is stored in float32.
+double rounding_of(std::span<const float> tile, const Lattice& lattice);
+
 /// A block of `tiles` tiles of `tile_size` samples each, to be filled by pack().
 SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size);
 /// Stores one tile; rounds its samples to its own step. Integers: they fit, by fitting_shift.

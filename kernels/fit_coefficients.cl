@@ -4,12 +4,16 @@
 // middle of where F may lie between gold nodes: gold less `curvature` times its second differences. Layouts:
 // gold float[block][y + halo][x + halo][gold_stride], node z at z + halo; margin float[block][y + halo][x +
 // halo]; a lattice of every spacing-th gold node per axis, `reach` of them in the halo on every side: lattice
-// float[block][cy][cx][cz], node n at n / spacing + reach; needed uchar[block][cy][cx]; along, low and high
-// float[block][cy][cx][gold_stride], gold node z at z + halo. Called by host/fit_coefficients.cpp.
+// float[block][cy][cx][cz], node n at n / spacing + reach; needed uint[block][cy][cx] and
+// wanted uint[block][y + halo][x + halo], a bit for each run of 16 nodes along z, the last for all beyond it;
+// along, low and high float[block][cy][cx][gold_stride], gold node z at z + halo. Called by
+// host/fit_coefficients.cpp.
 #include "shared/lattice_shape.h"
 
+inline bool has_run(uint runs, int z) { return runs >> min(z / 16, 31) & 1u; }
+
 // The lattice as gold has it.
-__kernel void take_lattice(__global float* lattice, __global const float* gold, __global const uchar* needed,
+__kernel void take_lattice(__global float* lattice, __global const float* gold, __global const uint* needed,
                            VdvrLattice l, int nx, int ny, int halo, int gold_stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
@@ -23,7 +27,7 @@ __kernel void take_lattice(__global float* lattice, __global const float* gold, 
 
 // The lattice interpolated linearly along z at every gold node. One work-item fills one column.
 __kernel void interpolate_lattice(__global float* along, __global const float* lattice,
-                                  __global const uchar* needed, VdvrLattice l, int halo, int gold_stride,
+                                  __global const uint* needed, VdvrLattice l, int halo, int gold_stride,
                                   int blocks) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), block = (int)get_global_id(2);
   if (x >= l.cx || y >= l.cy || block >= blocks) return;
@@ -45,8 +49,9 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
 // Error of the interpolant at 16 gold nodes along z: errors float[block][y + halo][x + halo][gold_stride].
 // Columns with a margin below `lowest` do not count and are left out.
 __kernel void lattice_errors(__global float* errors, __global const float* along, __global const float* gold,
-                             __global const float* margin, float lowest, VdvrLattice l, int nx, int ny,
-                             int halo, int gold_stride, int blocks, float curvature) {
+                             __global const float* margin, float lowest, __global const uint* wanted,
+                             VdvrLattice l, int nx, int ny, int halo, int gold_stride, int blocks,
+                             float curvature) {
   const int z = (int)get_global_id(0) * 16,
             x = (int)get_global_id(1);  // from the lattice's rim
   const int deep = (l.cy - 1) * l.spacing_y + 1;
@@ -55,7 +60,7 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
   const int row = nx + 2 * halo, gx = x - l.reach_x * l.spacing_x + halo,
             gy = y - l.reach_y * l.spacing_y + halo;
   const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * row + gx;
-  if (margin[column] < lowest) return;
+  if (margin[column] < lowest || !has_run(wanted[column], z)) return;
   // The last column is no cell's lower end. The halo's outermost columns have no second
   // differences across; they lie outside what is asked for.
   const int ix = min(x / l.spacing_x, l.cx - 2), iy = min(y / l.spacing_y, l.cy - 2);
@@ -81,13 +86,14 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
 // Smallest and largest error over the gold columns within half a spacing of a lattice column, at 16 gold
 // nodes along z. Lattice columns on the rim have a cell on one side only, which has to do.
 __kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
-                          __global const float* margin, float lowest, __global const uchar* needed,
-                          VdvrLattice l, int nx, int ny, int halo, int gold_stride, int blocks) {
+                          __global const float* margin, float lowest, __global const uint* wanted,
+                          __global const uint* needed, VdvrLattice l, int nx, int ny, int halo,
+                          int gold_stride, int blocks) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
   if (z + 16 > gold_stride || x >= l.cx || block >= blocks) return;
   const size_t of_lattice = ((size_t)block * l.cy + y) * l.cx + x;
-  if (!needed[of_lattice]) return;
+  if (!has_run(needed[of_lattice], z)) return;
   float16 smallest = (float16)(INFINITY), largest = (float16)(-INFINITY);
   const int x0 = x > 0 ? -(l.spacing_x / 2) : 0, x1 = x + 1 < l.cx ? l.spacing_x / 2 : 0;
   const int y0 = y > 0 ? -(l.spacing_y / 2) : 0, y1 = y + 1 < l.cy ? l.spacing_y / 2 : 0;
@@ -96,7 +102,7 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
       const int gx = (x - l.reach_x) * l.spacing_x + halo + dx,
                 gy = (y - l.reach_y) * l.spacing_y + halo + dy;
       const size_t column = ((size_t)block * (ny + 2 * halo) + gy) * (nx + 2 * halo) + gx;
-      if (margin[column] < lowest) continue;
+      if (margin[column] < lowest || !has_run(wanted[column], z)) continue;
       const float16 e = vload16(0, errors + column * gold_stride + z);
       smallest = fmin(smallest, e);
       largest = fmax(largest, e);
@@ -107,8 +113,8 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
 
 // One step of the fit. Gold nodes outside [z_first, z_last] do not count, nor those beyond the lattice.
 __kernel void shift_lattice(__global float* lattice, __global const float* low, __global const float* high,
-                            __global const uchar* needed, VdvrLattice l, int halo, int gold_stride,
-                            int blocks, int z_first, int z_last, float share) {
+                            __global const uint* needed, VdvrLattice l, int halo, int gold_stride, int blocks,
+                            int z_first, int z_last, float share) {
   const int k = (int)get_global_id(0), x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
   if (k >= l.cz || x >= l.cx || block >= blocks) return;

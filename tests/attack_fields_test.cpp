@@ -79,7 +79,7 @@ BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
         const double angle = 0.26 * i, r = 12;
         const double z = rows == 1 ? 0.0 : i % 3 == 0 ? 1.5 : i % 3 == 1 ? -1.5 : 0.1;
         const Rates rates{8, "cubic", gold};
-        const Lattice l =
+        const GoldLattice l =
             stream_lattice(chain,
                            grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9,
                                    gold, Place::cell),

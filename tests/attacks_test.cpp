@@ -50,7 +50,7 @@ struct Cell {
   double above = INFINITY, below = INFINITY;
 };
 
-Cell cell_at(const Lattice& l, const Index3& low) {
+Cell cell_at(const GoldLattice& l, const Index3& low) {
   Cell c;
   c.low = low;
   for (std::size_t i = 0; i < 8; ++i) {
@@ -64,7 +64,7 @@ Cell cell_at(const Lattice& l, const Index3& low) {
 }
 
 // The cell around the target, and random ones.
-std::vector<Cell> some_cells(const Lattice& l, const Vec3& target, std::mt19937& random) {
+std::vector<Cell> some_cells(const GoldLattice& l, const Vec3& target, std::mt19937& random) {
   std::vector<Cell> out;
   Index3 at{};
   for (std::size_t a = 0; a < 3; ++a)
@@ -81,7 +81,7 @@ std::vector<Cell> some_cells(const Lattice& l, const Vec3& target, std::mt19937&
 }
 
 // |gold - F| at the nodes, and |trilinear - F| inside gold cells, for computed gold and for F itself.
-void check_gold(const Scan& scan, Chain& chain, const Lattice& l, const std::string& how,
+void check_gold(const Scan& scan, Chain& chain, const GoldLattice& l, const std::string& how,
                 std::mt19937& random) {
   Worst projection, slack, own;
   const auto positions = l.positions();
@@ -128,7 +128,7 @@ void check_gold(const Scan& scan, Chain& chain, const Lattice& l, const std::str
 }
 
 // The global bounds that `plan` prints beside the certificate's: amplitude and curvature.
-void check_global(const Scan& scan, Chain& chain, const Lattice& l, const Rates& rates,
+void check_global(const Scan& scan, Chain& chain, const GoldLattice& l, const Rates& rates,
                   const std::string& how, std::mt19937& random) {
   const ParallelGeometry& g = scan.data.geometry;
   constexpr double pi = std::numbers::pi;
@@ -204,7 +204,7 @@ void attack(const Scan& scan, Chain& chain, const Rates& rates, double spacing, 
   const std::string how =
       rates.name() + ", spacing " + std::to_string(spacing) + ", target " + name_of(place);
   std::mt19937 random(static_cast<unsigned>(fields_times_rates));
-  const Lattice l = stream_lattice(chain, grid, rates);
+  const GoldLattice l = stream_lattice(chain, grid, rates);
   check_gold(scan, chain, l, how, random);
   if (global) check_global(scan, chain, l, rates, how, random);
   ++fields_times_rates;

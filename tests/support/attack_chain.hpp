@@ -53,7 +53,7 @@ struct Chain {
 
 /// All gold nodes of a grid, x fastest, with what the certificate says of them. above, below: the smallest
 /// slack that any brick uses; negative: untested. p: of every base cell.
-struct Lattice {
+struct GoldLattice {
   Grid grid;
   int rate = 1;
   double arithmetic = 0;
@@ -94,10 +94,10 @@ struct Lattice {
 };
 
 /// Streams the grid in bricks of one base cell, so that P is known per base cell.
-inline Lattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
+inline GoldLattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
   GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
                     {grid, 1, rates.gold, rates.upsampling, rates.u_filter, {}});
-  Lattice out;
+  GoldLattice out;
   out.grid = grid;
   out.rate = rates.gold;
   out.arithmetic = stream.arithmetic();
