@@ -23,9 +23,9 @@
 
 #include "shared/raycast_dvr.h"
 
-__kernel void d2vr_points(FIELD, __global const float4* restrict views,
-                          __global const float4* restrict points, __global float* restrict values,
-                          int count) {
+__kernel PACKET_HINT void d2vr_points(FIELD, __global const float4* restrict views,
+                                      __global const float4* restrict points, __global float* restrict values,
+                                      int count) {
   const I i = (int)get_global_id(0) * VDVR_LANES + COLUMNS + ROWS * PACKET_X;
   if (LANE(i, 0) >= count) return;
   V3 c;

@@ -5,7 +5,8 @@
 #ifndef VDVR_RAYCAST_DVR_H
 #define VDVR_RAYCAST_DVR_H
 
-#define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X / PACKET_X, VDVR_GROUP_Y / PACKET_Y, 1)))
+#define VDVR_HINT \
+  PACKET_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X / PACKET_X, VDVR_GROUP_Y / PACKET_Y, 1)))
 
 // How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a
 // grid of 8192 cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration
