@@ -7,6 +7,9 @@
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
+#ifndef VDVR_KERNEL
+#error "VDVR_KERNEL (the kernel to build, shared/raycast_params.h) must be defined"
+#endif
 // 1: gradients are the derivative of the bilinear sum, 0: central differences over one base cell.
 #ifndef VDVR_D2VR_DERIVATIVE
 #define VDVR_D2VR_DERIVATIVE 0
@@ -23,6 +26,7 @@
 
 #include "shared/raycast_dvr.h"
 
+#if VDVR_KERNEL == VDVR_KERNEL_POINTS
 __kernel PACKET_HINT void d2vr_points(FIELD, __global const float4* restrict views,
                                       __global const float4* restrict points, __global float* restrict values,
                                       int count) {
@@ -44,3 +48,4 @@ __kernel PACKET_HINT void d2vr_points(FIELD, __global const float4* restrict vie
   EACH(PUT_VALUE)
 #undef PUT_VALUE
 }
+#endif

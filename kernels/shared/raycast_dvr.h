@@ -248,6 +248,7 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 #endif
 }
 
+#if VDVR_KERNEL == VDVR_KERNEL_DVR
 // Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
 // that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
@@ -289,5 +290,6 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);
 }
+#endif
 
 #endif
