@@ -125,7 +125,8 @@ BOOST_AUTO_TEST_CASE(full_disk_ends_every_writer_with_code_3_and_no_file) {
     };
     Ended r = program.run(words);
     r.err = messages.all();
-    check_failed(r, 3, words, {"disk", "space", "written", "added", "write failed"});
+    // A compiler that writes files (PoCL's) fails before our writers do: those are met by the next case.
+    check_failed(r, 3, words, {"disk", "space", "written", "added", "write failed", "does not build"});
     BOOST_TEST(joined(files_below(folder.path())) == "");
   }
 }
