@@ -155,8 +155,10 @@ bool D2vrField::covered(const Vec3& point) const {
 
 namespace {
 
-opencl::Defines defines_for(const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
-  return {{"VDVR_GRANULARITY", std::to_string(kGranularity)},
+opencl::Defines defines_for(const char* kernel, const RenderOptions& o, const RaycastTuning& tuning,
+                            int lanes) {
+  return {{"VDVR_KERNEL", kernel},
+          {"VDVR_GRANULARITY", std::to_string(kGranularity)},
           {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
           {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
@@ -176,7 +178,8 @@ class Evaluator {
       : p_(p),
         detector_(p.detector(grid)),
         views_(*p.state, std::span<const cl_float4>(p.views(grid)), "views"),
-        kernel_(*p.state, "d2vr", "d2vr_points", defines_for({}, {}, lanes_for(*p.state, {}))) {}
+        kernel_(*p.state, "d2vr", "d2vr_points",
+                defines_for("VDVR_KERNEL_POINTS", {}, {}, lanes_for(*p.state, {}))) {}
 
   // cell(i): the cell coordinate of point i.
   template <class Cell>
@@ -322,7 +325,7 @@ FloatPicture raycast_float(Device& device, const D2vrScene& scene, const RenderO
   const DvrFrame frame = prepare_dvr(v, o, tuning, lanes);
   opencl::Kernel<cl::Buffer, VdvrDetector, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast,
                  cl::Buffer, cl::Buffer>
-      kernel(*p.state, "d2vr", "raycast_dvr", defines_for(o, tuning, lanes));
+      kernel(*p.state, "d2vr", "raycast_dvr", defines_for("VDVR_KERNEL_DVR", o, tuning, lanes));
   opencl::finish(device.state(), "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
   kernel(frame.range, p.samples.buffer(), p.detector(v.grid), s.views.buffer(), v.field->grid,

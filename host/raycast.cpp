@@ -235,12 +235,33 @@ GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind 
   return o.gradient;
 }
 
+struct KernelName {
+  const char *name, *number;  // VDVR_KERNEL: the number
+};
+KernelName kernel_of(const RenderOptions& o) {
+  switch (o.mode) {
+    case RenderMode::iso:
+      return {"raycast_iso", "VDVR_KERNEL_ISO"};
+    case RenderMode::mip:
+      return {"raycast_mip", "VDVR_KERNEL_MIP"};
+    case RenderMode::slice:
+      return {"slice", "VDVR_KERNEL_SLICE"};
+    default:
+      break;
+  }
+  if (o.classification == Classification::preintegrated)
+    return {"raycast_preintegrated", "VDVR_KERNEL_PREINTEGRATED"};
+  if (o.step_mode == StepMode::level) return {"raycast_level", "VDVR_KERNEL_LEVEL"};
+  return {"raycast_dvr", "VDVR_KERNEL_DVR"};
+}
+
 opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind sampler, GradientKind gradient,
                             const RaycastTuning& tuning, int lanes) {
   const bool lit = gradient == GradientKind::stored;
   const bool uniform = lit ? v.lit_layout.is_uniform() : v.is_uniform;
   opencl::Defines defines = coarse_defines(v.field->grid);
   const opencl::Defines more{
+      {"VDVR_KERNEL", kernel_of(o).number},
       {"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
       {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
       {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
@@ -291,13 +312,6 @@ const BakedTransfer& baked(Impl& v, const RenderOptions& o) {
   return v.frame.baked;
 }
 
-std::string kernel_name(const RenderOptions& o) {
-  if (o.mode == RenderMode::iso) return "raycast_iso";
-  if (o.mode == RenderMode::mip) return "raycast_mip";
-  if (o.classification == Classification::preintegrated) return "raycast_preintegrated";
-  return o.step_mode == StepMode::level ? "raycast_level" : "raycast_dvr";
-}
-
 opencl::Range packet_range(const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
   // Pixels of one packet (shared/packet.h).
   const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
@@ -317,7 +331,7 @@ void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, con
   const auto& picture = v.frame.picture.buffer();
   if (o.mode == RenderMode::slice) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
-        *v.state, "raycast", "slice", defines);
+        *v.state, "raycast", kernel_of(o).name, defines);
     kernel(range, field..., bricks, grid, make_slice(v, o), picture, v.frame.row_samples.buffer());
     return;
   }
@@ -326,7 +340,7 @@ void launch(Impl& v, const RenderOptions& o, const opencl::Defines& defines, con
   const auto draw = [&](const auto&... bounds) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
                    cl::Buffer, std::remove_cvref_t<decltype(bounds)>...>
-        kernel(*v.state, "raycast", kernel_name(o), defines);
+        kernel(*v.state, "raycast", kernel_of(o).name, defines);
     kernel(range, field..., bricks, grid, guide, v.frame.table.buffer(), make_params(v, o, table, slack),
            picture, v.frame.row_samples.buffer(), bounds...);
   };

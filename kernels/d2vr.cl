@@ -7,6 +7,9 @@
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
+#ifndef VDVR_KERNEL
+#error "VDVR_KERNEL (the kernel to build, shared/raycast_params.h) must be defined"
+#endif
 // 1: gradients are the derivative of the bilinear sum, 0: central differences over one base cell.
 #ifndef VDVR_D2VR_DERIVATIVE
 #define VDVR_D2VR_DERIVATIVE 0
@@ -23,9 +26,10 @@
 
 #include "shared/raycast_dvr.h"
 
-__kernel void d2vr_points(FIELD, __global const float4* restrict views,
-                          __global const float4* restrict points, __global float* restrict values,
-                          int count) {
+#if VDVR_KERNEL == VDVR_KERNEL_POINTS
+__kernel PACKET_HINT void d2vr_points(FIELD, __global const float4* restrict views,
+                                      __global const float4* restrict points, __global float* restrict values,
+                                      int count) {
   const I i = (int)get_global_id(0) * VDVR_LANES + COLUMNS + ROWS * PACKET_X;
   if (LANE(i, 0) >= count) return;
   V3 c;
@@ -44,3 +48,4 @@ __kernel void d2vr_points(FIELD, __global const float4* restrict views,
   EACH(PUT_VALUE)
 #undef PUT_VALUE
 }
+#endif

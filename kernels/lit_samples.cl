@@ -34,8 +34,9 @@ RAY_INLINE U stored_gradient(V3 g, float per_gradient) {
 }
 
 // Samples VDVR_LANES at a time along x: global id (x / lanes, z * size_y + y, tile).
-__kernel void light_samples(FIELD, BRICKS, VdvrGrid grid, __global const uint* restrict tile_bricks,
-                            VdvrLitBlock block, __global uint2* restrict lit) {
+__kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
+                                        __global const uint* restrict tile_bricks, VdvrLitBlock block,
+                                        __global uint2* restrict lit) {
   const int first = (int)get_global_id(0) * VDVR_LANES, row = (int)get_global_id(1);
   const int tile = (int)get_global_id(2), z = row / block.size_y, y = row - z * block.size_y;
   if (first >= block.size_x || z >= block.size_z || tile >= max(block.tiles, 1)) return;

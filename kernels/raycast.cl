@@ -16,6 +16,9 @@
 #if defined(VDVR_SAMPLER_BUFFER) == defined(VDVR_SAMPLER_IMAGE3D)
 #error "define one of VDVR_SAMPLER_BUFFER and VDVR_SAMPLER_IMAGE3D"
 #endif
+#ifndef VDVR_KERNEL
+#error "VDVR_KERNEL (the kernel to build, shared/raycast_params.h) must be defined"
+#endif
 // 1: every brick reads a float32 base, whose cells are then addressed without records.
 #ifndef VDVR_UNIFORM
 #define VDVR_UNIFORM 0
@@ -32,9 +35,13 @@
 #include "shared/packet_sampler.h"
 
 #include "shared/raycast_dvr.h"
+#if VDVR_KERNEL == VDVR_KERNEL_PREINTEGRATED
 #include "shared/raycast_preintegrated.h"
+#elif VDVR_KERNEL == VDVR_KERNEL_LEVEL
 #include "shared/raycast_level.h"
+#elif VDVR_KERNEL == VDVR_KERNEL_ISO
 #include "shared/raycast_iso.h"
+#elif VDVR_KERNEL == VDVR_KERNEL_MIP
 
 // The largest sample along the ray; a brick that cannot raise it is leapt over. Geometry: where it lies; no
 // normal.
@@ -89,6 +96,8 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
 #endif
 }
 
+#elif VDVR_KERNEL == VDVR_KERNEL_SLICE
+
 // One orthogonal slice, grey; .w is the field itself, NaN outside the grid.
 __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice p, __global float4* restrict picture,
                               __global uint* restrict row_samples) {
@@ -104,3 +113,5 @@ __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice p, __globa
   put(p.width, p.height, picture, row_samples, px, py, v3(shown, shown, shown), PICK(inside, value, (V)(NAN)),
       (I)(0));
 }
+
+#endif

@@ -5,7 +5,8 @@
 #ifndef VDVR_RAYCAST_DVR_H
 #define VDVR_RAYCAST_DVR_H
 
-#define VDVR_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X / PACKET_X, VDVR_GROUP_Y / PACKET_Y, 1)))
+#define VDVR_HINT \
+  PACKET_HINT __attribute__((work_group_size_hint(VDVR_GROUP_X / PACKET_X, VDVR_GROUP_Y / PACKET_Y, 1)))
 
 // How far inside a brick's faces a leap ends, in cells. Larger than any rounding of a position (2^-10 in a
 // grid of 8192 cells), so that no sample of the brick behind is leapt over; smaller than costs an iteration
@@ -247,6 +248,7 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 #endif
 }
 
+#if VDVR_KERNEL == VDVR_KERNEL_DVR
 // Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
 // that brings the opacity to a half.
 __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
@@ -288,5 +290,6 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);
 }
+#endif
 
 #endif

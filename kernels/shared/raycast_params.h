@@ -4,6 +4,16 @@
 #ifndef VDVR_RAYCAST_PARAMS_H
 #define VDVR_RAYCAST_PARAMS_H
 
+// The kernels of raycast.cl and d2vr.cl, of which a program holds the one that VDVR_KERNEL says: most users
+// draw in one mode, and some compilers take seconds for each kernel, wanted or not.
+#define VDVR_KERNEL_DVR 1
+#define VDVR_KERNEL_PREINTEGRATED 2
+#define VDVR_KERNEL_LEVEL 3
+#define VDVR_KERNEL_ISO 4
+#define VDVR_KERNEL_MIP 5
+#define VDVR_KERNEL_SLICE 6
+#define VDVR_KERNEL_POINTS 7
+
 #define VDVR_SURFACES 8
 
 // An iso-surface; `opacity` of the surface itself.
