@@ -255,12 +255,16 @@ BOOST_AUTO_TEST_CASE(certificate_holds_to_the_edge_of_the_covered_region) {
   BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
 }
 
-BOOST_AUTO_TEST_CASE(grids_of_one_cell_take_granularity_one) {
+BOOST_AUTO_TEST_CASE(bricks_are_at_most_twice_as_thick_as_their_grid) {
   const ProjectionSet scan = noise_scan(14, 3, 25, 7);
-  const Wanted wanted{grid_of(scan, {8, 8, 1}, 1.0, Vec3{-4, -4, -0.5}), 0.1};
-  const Built built = build_of(scan, wanted);
-  BOOST_TEST(built.result.volume.granularity == 1);
-  check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 200, 3));
+  Wanted wanted{grid_of(scan, {8, 8, 1}, 1.0, Vec3{-4, -4, -0.5}), 0.1};
+  for (const int granularity : {1, 2, 4}) {
+    wanted.options.granularity = granularity;
+    const Built built = build_of(scan, wanted);
+    BOOST_TEST(built.result.volume.granularity == std::min(granularity, 2));
+    check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 200, 3));
+    BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
+  }
 }
 
 BOOST_AUTO_TEST_CASE(region_of_interest_is_certified_and_the_rest_left_at_level_0) {
