@@ -69,7 +69,8 @@ void LatticeFit::mark(const std::vector<NodeBox>& wanted, int steps) {
     for (std::int64_t y = y0; y <= y1; ++y)
       for (std::int64_t x = x0; x <= x1; ++x) host_wanted_[at((w.block * deep + y) * wide + x)] |= runs;
     // Of the lattice, whose first column need not lie on the halo's rim.
-    const std::int64_t from_x = b.halo - l.reach_x * l.spacing_x, from_y = b.halo - l.reach_y * l.spacing_y;
+    const std::int64_t from_x = b.halo - std::int64_t{l.reach_x} * l.spacing_x,
+                       from_y = b.halo - std::int64_t{l.reach_y} * l.spacing_y;
     const auto below = [](std::int64_t node, std::int64_t spacing) {
       return std::max<std::int64_t>(node / spacing - 1, 0);
     };

@@ -186,7 +186,8 @@ std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::in
   const std::vector<std::uint8_t> wanted = flags(bricks);
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
                                                     "bricks to look at");
-  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(6 * most), "errors along axes");
+  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(std::int64_t{6} * most),
+                                     "errors along axes");
   errors.fill(0);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
