@@ -10,6 +10,7 @@
 
 #define VDVR_DIALECT_HOST
 #define VDVR_SAMPLE_TYPES 7
+#define VDVR_RECORDS 2
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"  // the shared headers are C99
 #include "shared/mixed_sampler.h"
@@ -42,18 +43,25 @@ std::uint64_t sample_buffer_bytes(const MixedVolume& volume);
 VdvrBrick brick_record(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets,
                        std::int64_t bx, std::int64_t by, std::int64_t bz);
 
-/// Two words per brick, three where the volume holds integers (mixed_sampler.h), [bz][by][bx][words].
+/// What mixed_sampler.h has for records.
+enum class RecordKind { f32 = VDVR_RECORDS_F32, near = VDVR_RECORDS_NEAR, far = VDVR_RECORDS_FAR };
+/// The smallest that all of the volume's records fit; with texels for places, where integers occur, `far`.
+RecordKind record_kind(const MixedVolume& volume, bool texels = false);
+constexpr std::size_t words_of(RecordKind kind) { return kind == RecordKind::far ? 3 : 2; }
+
+/// [bz][by][bx][words].
 class PackedRecords {
  public:
-  PackedRecords(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets);
+  PackedRecords(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets, RecordKind kind);
   void set_base_around(std::size_t brick) { words_[brick * count_ + 1] |= 1u << 9; }
-  /// Puts something else in the place of the first sample: a texel. Below 2^47.
+  /// Puts something else in the place of the first sample: a texel. Below 2^47, in near records 2^32.
   void set_place(std::size_t brick, std::uint64_t place);
   [[nodiscard]] const std::vector<std::uint32_t>& words() const { return words_; }
-  [[nodiscard]] std::size_t words_per_brick() const { return count_; }
+  [[nodiscard]] RecordKind kind() const { return kind_; }
 
  private:
-  std::size_t count_;
+  RecordKind kind_;
+  std::size_t count_;  // words per brick
   std::vector<std::uint32_t> words_;
 };
 

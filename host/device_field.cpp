@@ -4,13 +4,14 @@
 namespace vdvr {
 
 DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
-    : DeviceField(state, v, PackedRecords(v, tile_offsets(v))) {}
+    : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v))) {}
 
 DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records)
     : samples(state, sample_buffer_bytes(v), "certified samples"),
       bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
       grid(sampler_grid(v)),
-      defines{{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))}} {
+      defines{{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))},
+              {"VDVR_RECORDS", std::to_string(static_cast<int>(records.kind()))}} {
   const auto put = [&](const SampleBlock& block, std::uint64_t first) {
     samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
   };

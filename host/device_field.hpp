@@ -13,7 +13,7 @@ struct DeviceField {
   opencl::DeviceArray<std::uint8_t> samples;  ///< host/brick_layout.hpp
   opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
   VdvrGrid grid;
-  opencl::Defines defines;  ///< VDVR_SAMPLE_TYPES
+  opencl::Defines defines;  ///< VDVR_SAMPLE_TYPES, VDVR_RECORDS
 };
 
 /// VDVR_COARSE_X, _Y, _Z, for kernels that read bricks through packet_sampler.h.

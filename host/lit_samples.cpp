@@ -102,7 +102,7 @@ LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const Lit
   defines.emplace_back("VDVR_GRANULARITY", std::to_string(field.grid.granularity));
   defines.emplace_back("VDVR_LANES", std::to_string(lanes));
   defines.emplace_back("VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0");
-  defines.push_back(field.defines.front());
+  defines.insert(defines.end(), field.defines.begin(), field.defines.end());
   opencl::Kernel<cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, VdvrLitBlock, cl::Buffer> light(
       state, "lit_samples", "light_samples", defines);
   opencl::Kernel<cl::Buffer, VdvrGrid, cl::Buffer, VdvrLitBlock, cl::Buffer> close(

@@ -140,6 +140,12 @@ std::uint64_t place_of(const MixedVolume& v, const std::map<TileKind, std::uint6
          std::uint64_t{tile.number} * static_cast<std::uint64_t>(v.tile_size(level));
 }
 
+// An offset is a multiple of 2^shift.
+bool fits_near(std::int32_t offset, int shift) {
+  const std::int32_t n = offset >> shift;
+  return -(1 << 14) <= n && n < 1 << 14;
+}
+
 }  // namespace
 
 VdvrBrick brick_record(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
@@ -147,12 +153,23 @@ VdvrBrick brick_record(const MixedVolume& v, const std::map<TileKind, std::uint6
   const Index3 b = v.bricks();
   const RecordBits r = record_bits(v, at((bz * b[1] + by) * b[0] + bx));
   const std::uint64_t place = place_of(v, offsets, bx, by, bz);
-  return vdvr_unpack(static_cast<std::uint32_t>(place),
-                     r.bits | static_cast<std::uint32_t>(place >> 32) << 17, r.offset, sampler_grid(v));
+  return vdvr_unpack(place, r.bits, r.offset, sampler_grid(v));
 }
 
-PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets)
-    : count_(sample_types(v) == 1 << VDVR_F32 ? 2 : 3), words_(v.level.size() * count_) {
+RecordKind record_kind(const MixedVolume& v, bool texels) {
+  if (sample_types(v) == 1 << VDVR_F32) return RecordKind::f32;
+  bool near = !texels && sample_buffer_bytes(v) >> 32 == 0;
+  const auto look = [&](const SampleBlock& b) {
+    for (std::size_t i = 0; near && i < b.offset.size(); ++i) near = fits_near(b.offset[i], b.shift[i]);
+  };
+  look(v.base);
+  for (const auto& [kind, block] : v.tiles) look(block);
+  return near ? RecordKind::near : RecordKind::far;
+}
+
+PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
+                             RecordKind kind)
+    : kind_(kind), count_(words_of(kind)), words_(v.level.size() * count_) {
   const Index3 b = v.bricks();
   std::size_t brick = 0;
   for (std::int64_t z = 0; z < b[2]; ++z)
@@ -160,17 +177,21 @@ PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std:
       for (std::int64_t x = 0; x < b[0]; ++x, ++brick) {
         const RecordBits r = record_bits(v, brick);
         words_[brick * count_ + 1] = r.bits;
-        if (count_ == 3) words_[brick * count_ + 2] = static_cast<std::uint32_t>(r.offset);
+        if (kind == RecordKind::near)
+          words_[brick * count_ + 1] |= static_cast<std::uint32_t>(r.offset >> (r.bits >> 12 & 31)) << 17;
+        if (kind == RecordKind::far) words_[brick * count_ + 2] = static_cast<std::uint32_t>(r.offset);
         set_place(brick, place_of(v, offsets, x, y, z));
       }
 }
 
 void PackedRecords::set_place(std::size_t brick, std::uint64_t place) {
-  if (place >> 47 != 0)
+  const int most = kind_ == RecordKind::near ? 32 : 47;
+  if (place >> most != 0)
     throw InputError(
-        fmt::format("a brick's samples lie at place {}, beyond 2^47: the volume is too large", place));
+        fmt::format("a brick's samples lie at place {}, beyond 2^{}: the volume is too large", place, most));
   std::uint32_t& bits = words_[brick * count_ + 1];
   words_[brick * count_] = static_cast<std::uint32_t>(place);
+  if (kind_ == RecordKind::near) return;
   bits = (bits & 0x1ffffu) | static_cast<std::uint32_t>(place >> 32) << 17;
 }
 
@@ -307,7 +328,7 @@ Storage storage_of(const MixedVolume& v, bool interior) {
   if (base == 0) return s;
   s.samples_ratio = (stored_base + index + tiles) / base;
   // Resident: samples, the bricks' records, and per brick a byte of distance by which rays leap.
-  const double record = sample_types(v) == 1 << VDVR_F32 ? 8 : 12;
+  const double record = 4 * static_cast<double>(words_of(record_kind(v)));
   const double bytes =
       static_cast<double>(v.base.sample_bytes()) * stored_base + tile_bytes + (record + 1) * index;
   s.bytes_ratio = bytes / (4 * base);

@@ -62,6 +62,9 @@ Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double
   } else {
     return {};
   }
+  // |sample| < 2^24 steps, so in these units an offset has 14 bits and a sign.
+  constexpr int short_offsets = 10;
+  if (lattice.base_shift >= short_offsets + 2) lattice.finest_shift = short_offsets;
   return lattice;
 }
 
@@ -69,7 +72,7 @@ std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, Sam
   const double largest = std::max(std::abs(static_cast<double>(lo)), std::abs(static_cast<double>(hi)));
   // Rounding to the coarsest step may add half of it.
   if (!(largest + std::ldexp(lattice.step, most) < kCodes * lattice.step)) return std::nullopt;
-  for (int shift = 0; shift <= most; ++shift) {
+  for (int shift = lattice.finest_shift; shift <= most; ++shift) {
     const double unit = std::ldexp(lattice.step, shift);
     if (code_of(hi, unit) - code_of(lo, unit) <= static_cast<double>(most_code(type))) return shift;
   }

@@ -20,6 +20,9 @@ struct Lattice {
   SampleType base = SampleType::f32;
   SampleType least = SampleType::f32;  ///< the smallest type that a tile may take
   int base_shift = 0;
+  /// No tile's own step is finer than step * 2^finest_shift, so that its offset fits a short brick record
+  /// (mixed_sampler.h): a 4096th of the base's largest sample, and a quarter of the base's step at most.
+  int finest_shift = 0;
   [[nodiscard]] double base_step() const { return std::ldexp(step, base_shift); }
 };
 
@@ -40,8 +43,8 @@ inline float round_to(float value, double unit) {
   return static_cast<float>(unit * std::nearbyint(static_cast<double>(value) / unit)) + 0.0f;
 }
 
-/// The smallest shift with which samples between lo and hi fit `type` after rounding; none beyond `most`,
-/// or where |value| reaches 2^24 steps.
+/// The smallest shift, from the lattice's finest, with which samples between lo and hi fit `type` after
+/// rounding; none beyond `most`, or where |value| reaches 2^24 steps.
 std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, SampleType type, int most);
 
 /// What rounding to its own step may move a sample of such a tile; 0 where it is stored in float32.

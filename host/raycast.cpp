@@ -260,7 +260,10 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
   const bool lit = gradient == GradientKind::stored;
   const bool uniform = lit ? v.lit_layout.is_uniform() : v.is_uniform;
   opencl::Defines defines = coarse_defines(v.field->grid);
-  const opencl::Defines more{
+  const auto add = [&](const opencl::Defines& more) {
+    defines.insert(defines.end(), more.begin(), more.end());
+  };
+  add({
       {"VDVR_KERNEL", kernel_of(o).number},
       {"VDVR_GRANULARITY", std::to_string(v.field->grid.granularity)},
       {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
@@ -273,8 +276,9 @@ opencl::Defines defines_for(const Impl& v, const RenderOptions& o, SamplerKind s
       {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
       {"VDVR_LANES", std::to_string(lanes)},
       {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
-      lit ? std::pair<std::string, std::string>{"VDVR_SAMPLE_TYPES", "1"} : v.field->defines.front()};
-  defines.insert(defines.end(), more.begin(), more.end());
+  });
+  if (lit) add({{"VDVR_SAMPLE_TYPES", "1"}});
+  else add(sampler == SamplerKind::image3d ? v.atlas_defines() : v.field->defines);
   return defines;
 }
 

@@ -255,15 +255,18 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
   offsets_ = tile_offsets(v);
   types_[{}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
-  PackedRecords records(v, offsets_);
+  PackedRecords records(v, offsets_, record_kind(v));
   mark_base_around(v, records);
   field.emplace(*state, v, records);
   ImageLimits left = limits;
   left.bytes = std::min(left.bytes, state->memory.left());
   layout = pack_atlas(v, left);
   if (layout.fits) {
-    set_texels(v, records);
-    texel_records_ = records.words();
+    PackedRecords texels(v, offsets_, record_kind(v, true));
+    set_texels(v, texels);
+    texel_records_ = texels.words();
+    atlas_defines_ = {field->defines.front(),
+                      {"VDVR_RECORDS", std::to_string(static_cast<int>(texels.kind()))}};
   }
   for (const auto& [triple, block] : v.tiles)
     for (std::size_t a = 0; a < 3; ++a)

@@ -70,6 +70,8 @@ struct ResidentVolume::Impl {
   /// The atlas by SampleType, built on first use; types that do not occur share another's image. Throws
   /// ResourceError when the device has no room for it any more.
   const std::array<cl::Image3D, 3>& atlas();
+  /// As DeviceField::defines, for kernels that read the atlas.
+  [[nodiscard]] const opencl::Defines& atlas_defines() const { return atlas_defines_; }
   /// Brick records whose places are texels; after atlas().
   const cl::Buffer& atlas_bricks() const { return atlas_bricks_.buffer(); }
   /// Samples with gradients, made on first use. Throws ResourceError when the device has no room for them.
@@ -111,6 +113,7 @@ struct ResidentVolume::Impl {
   std::map<TileKind, std::uint64_t> offsets_;
   std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
   std::vector<std::uint32_t> texel_records_;
+  opencl::Defines atlas_defines_;
   std::optional<std::array<cl::Image3D, 3>> atlas_;
   opencl::DeviceArray<std::uint32_t> atlas_bricks_;
   opencl::DeviceArray<cl_float2> ranges_;

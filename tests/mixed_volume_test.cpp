@@ -187,30 +187,30 @@ BOOST_AUTO_TEST_CASE(one_sampler_for_packed_records_and_for_single_points) {
     std::memcpy(samples.data(), v.base.data(), v.base.bytes());
     for (const auto& [triple, block] : v.tiles)
       std::memcpy(samples.data() + offsets.at(triple), block.data(), block.bytes());
-    const PackedRecords records(v, offsets);
     const Index3 bricks = v.bricks();
-    std::mt19937 random(4);
-    std::uniform_real_distribution<float> unit(0, 1);
-    int wrong = 0;
-    for (int i = 0; i < 5000; ++i) {
-      const float x = 8 * unit(random), y = 5 * unit(random), z = 7 * unit(random);
-      const VdvrGrid grid = sampler_grid(v);
-      const std::array<std::int32_t, 3> b{vdvr_brick_of(x, grid.granularity, grid.bricks_x),
-                                          vdvr_brick_of(y, grid.granularity, grid.bricks_y),
-                                          vdvr_brick_of(z, grid.granularity, grid.bricks_z)};
-      const std::uint32_t* words =
-          records.words().data() +
-          records.words_per_brick() * static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0]);
-      const VdvrBrick r = vdvr_unpack(
-          words[0], words[1], records.words_per_brick() == 3 ? static_cast<std::int32_t>(words[2]) : 0, grid);
-      const float packed = vdvr_sample_in_brick(
-          samples.data(), r, vdvr_local(x, b[0], r.level_x, grid.granularity, grid.cells_x, grid.coarse_x),
-          vdvr_local(y, b[1], r.level_y, grid.granularity, grid.cells_y, grid.coarse_y),
-          vdvr_local(z, b[2], r.level_z, grid.granularity, grid.cells_z, grid.coarse_z));
-      const Vec3 cell{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
-      if (packed != sample_at(v, world(v.grid, cell))) ++wrong;
+    const VdvrGrid grid = sampler_grid(v);
+    for (const RecordKind kind : {record_kind(v), record_kind(v, true)}) {
+      const PackedRecords records(v, offsets, kind);
+      std::mt19937 random(4);
+      std::uniform_real_distribution<float> unit(0, 1);
+      int wrong = 0;
+      for (int i = 0; i < 5000; ++i) {
+        const float x = 8 * unit(random), y = 5 * unit(random), z = 7 * unit(random);
+        const std::array<std::int32_t, 3> b{vdvr_brick_of(x, grid.granularity, grid.bricks_x),
+                                            vdvr_brick_of(y, grid.granularity, grid.bricks_y),
+                                            vdvr_brick_of(z, grid.granularity, grid.bricks_z)};
+        const auto brick = static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0]);
+        const VdvrBrick r =
+            vdvr_record(records.words().data() + words_of(kind) * brick, static_cast<int>(kind), grid);
+        const float packed = vdvr_sample_in_brick(
+            samples.data(), r, vdvr_local(x, b[0], r.level_x, grid.granularity, grid.cells_x, grid.coarse_x),
+            vdvr_local(y, b[1], r.level_y, grid.granularity, grid.cells_y, grid.coarse_y),
+            vdvr_local(z, b[2], r.level_z, grid.granularity, grid.cells_z, grid.coarse_z));
+        const Vec3 cell{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+        if (packed != sample_at(v, world(v.grid, cell))) ++wrong;
+      }
+      BOOST_TEST(wrong == 0);
     }
-    BOOST_TEST(wrong == 0);
   }
 }
 
@@ -316,12 +316,39 @@ BOOST_AUTO_TEST_CASE(integer_samples_are_decoded_exactly_on_the_host) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(storage_counts_integers_by_their_bytes_and_a_longer_record) {
-  const MixedVolume v =
+BOOST_AUTO_TEST_CASE(an_offset_of_15_bits_fits_a_near_record_and_one_of_16_does_not) {
+  MixedVolume v =
       support::in_types(support::random_mixed(grid_of({8, 8, 8}), 4, 2, {{1, 1, 1}}, 1), {SampleType::u8});
-  const Storage s =
-      storage_of(v, false);  // 9^3 base samples, 8 tiles, 8 records of 12 bytes and one of distance
-  BOOST_TEST(s.device_bytes == 729u + 8 * 729 + 8 * 13);
-  BOOST_TEST(s.bytes_ratio == (729.0 + 8 * 729 + 8 * 13) / (729.0 * 4));
+  SampleBlock& tiles = v.tiles.begin()->second;
+  const std::size_t brick = 3;
+  const auto kind_with = [&](std::int32_t units, int shift) {
+    tiles.shift[v.tile[brick]] = static_cast<std::uint8_t>(shift);
+    tiles.offset[v.tile[brick]] = units * (1 << shift);
+    return record_kind(v);
+  };
+  for (const int shift : {0, 7})
+    for (const std::int32_t units : {-(1 << 14), -1, 0, (1 << 14) - 1}) {
+      BOOST_TEST((kind_with(units, shift) == RecordKind::near));
+      const PackedRecords records(v, tile_offsets(v), RecordKind::near);
+      const VdvrBrick r = vdvr_record(records.words().data() + 2 * brick, VDVR_RECORDS_NEAR, sampler_grid(v));
+      BOOST_TEST(static_cast<double>(r.bias) == v.step * units * (1 << shift));
+      BOOST_TEST(static_cast<double>(r.scale) == v.step * (1 << shift));
+      BOOST_TEST(r.level_x == 1u);
+    }
+  BOOST_TEST((kind_with(-(1 << 14) - 1, 7) == RecordKind::far));
+  BOOST_TEST((kind_with(1 << 14, 0) == RecordKind::far));
+  BOOST_TEST((record_kind(v, true) == RecordKind::far));  // texels need more than 32 bits
+}
+
+BOOST_AUTO_TEST_CASE(storage_counts_integers_by_their_bytes_and_longer_records_only_where_needed) {
+  MixedVolume v =
+      support::in_types(support::random_mixed(grid_of({8, 8, 8}), 4, 2, {{1, 1, 1}}, 1), {SampleType::u8});
+  // 9^3 base samples, 8 tiles, 8 records and one byte of distance each
+  const Storage s = storage_of(v, false);
+  BOOST_TEST(s.device_bytes == 729u + 8 * 729 + 8 * 9);
+  BOOST_TEST(s.bytes_ratio == (729.0 + 8 * 729 + 8 * 9) / (729.0 * 4));
   BOOST_TEST(s.samples_ratio == (729.0 + 8 + 8 * 729) / 729.0);
+  v.tiles.begin()->second.offset.front() = 1 << 23;
+  v.tiles.begin()->second.shift.front() = 0;
+  BOOST_TEST(storage_of(v, false).device_bytes == 729u + 8 * 729 + 8 * 13);
 }

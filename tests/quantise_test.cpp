@@ -71,13 +71,24 @@ BOOST_AUTO_TEST_CASE(a_tile_takes_the_finest_step_that_fits_and_none_coarser_tha
   const auto fits = [&](float lo, float hi, SampleType type) {
     return fitting_shift(lo, hi, l, type, l.base_shift);
   };
-  BOOST_TEST(fits(0.5f, 0.5f, SampleType::u8).value() == 0);
-  BOOST_TEST(fits(0, static_cast<float>(255 * l.step), SampleType::u8).value() == 0);
-  BOOST_TEST(fits(0, static_cast<float>(257 * l.step), SampleType::u8).value() == 1);
-  BOOST_TEST(fits(0, static_cast<float>(257 * l.step), SampleType::u16).value() == 0);
+  const int finest = l.finest_shift;
+  const double unit = std::ldexp(l.step, finest);
+  BOOST_TEST(finest == 10);
+  BOOST_TEST(unit <= 0x1p-12);  // of the base's largest sample
+  BOOST_TEST(fits(0.5f, 0.5f, SampleType::u8).value() == finest);
+  BOOST_TEST(fits(0, static_cast<float>(255 * unit), SampleType::u8).value() == finest);
+  BOOST_TEST(fits(0, static_cast<float>(257 * unit), SampleType::u8).value() == finest + 1);
+  BOOST_TEST(fits(0, static_cast<float>(257 * unit), SampleType::u16).value() == finest);
   BOOST_TEST(fits(0, 1, SampleType::u8).value() <= l.base_shift);
   BOOST_TEST(!fits(-2, 2, SampleType::u8).has_value());  // 512 steps of the base
   BOOST_TEST(!fits(0, 8, SampleType::u16).has_value());  // 2^24 steps and more: not exact in fp32
+}
+
+BOOST_AUTO_TEST_CASE(a_fine_base_lets_tiles_have_steps_that_need_long_records) {
+  // 16 bits of samples about 0 leave fewer than two bits to a tile's step.
+  const Lattice l = choose_lattice(random_base(0, 1, 5), StorageChoice::u16, 0);
+  BOOST_TEST(l.finest_shift == 0);
+  BOOST_TEST(fitting_shift(0.5f, 0.5f, l, SampleType::u16, l.base_shift).value() == 0);
 }
 
 BOOST_AUTO_TEST_CASE(a_base_holds_every_value_within_its_limits) {

@@ -49,9 +49,21 @@ typedef std::int32_t vdvr_i32;
 #define VDVR_HOLDS(b, t) \
   (VDVR_SAMPLE_TYPES == (1 << (t)) || ((VDVR_SAMPLE_TYPES & (1 << (t))) != 0 && (b).type == (t)))
 
-// A brick's record is two words, three where integers occur: low word of its place; bits; offset on the
-// lattice. bits: level x 3, level y 3, level z 3, base_around 1, type 2, shift 5, high bits of its place 15.
-#define VDVR_BRICK_WORDS (VDVR_SAMPLE_TYPES == 1 ? 2 : 3)
+// A brick's record is two words, low word of its place and bits: level x 3, level y 3, level z 3, base_around
+// 1, type 2, shift 5, and 15 that the includer's VDVR_RECORDS gives a meaning. Of float32 samples they are
+// the high ones of the place. Integers have an offset on the lattice: NEAR has it in those 15 bits, signed,
+// in units of 2^shift, and places below 2^32 only; FAR has it in a third word, and the place's high bits
+// there.
+#define VDVR_RECORDS_F32 0
+#define VDVR_RECORDS_NEAR 1
+#define VDVR_RECORDS_FAR 2
+#ifndef VDVR_RECORDS
+#if VDVR_SAMPLE_TYPES != 1
+#error "VDVR_RECORDS (which records the bricks have) must be defined where integers occur"
+#endif
+#define VDVR_RECORDS VDVR_RECORDS_F32
+#endif
+#define VDVR_BRICK_WORDS (VDVR_RECORDS == VDVR_RECORDS_FAR ? 3 : 2)
 
 // A record, unpacked.
 typedef struct {
@@ -76,14 +88,14 @@ typedef struct {
 } VdvrGrid;
 
 // Scale and bias are a power of two and a multiple of step below 2^24 steps: exact, as is every sample.
-VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u32 low, vdvr_u32 bits, vdvr_i32 offset, VdvrGrid grid) {
+VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u64 place, vdvr_u32 bits, vdvr_i32 offset, VdvrGrid grid) {
   VdvrBrick b;
   b.level_x = bits & 7u;
   b.level_y = bits >> 3 & 7u;
   b.level_z = bits >> 6 & 7u;
   b.base_around = bits >> 9 & 1u;
   b.type = bits >> 10 & 3u;
-  b.place = (vdvr_u64)(bits >> 17) << 32 | low;
+  b.place = place;
   const int in_base = (bits & 511u) == 0u;
   b.stride_y =
       ((in_base ? (vdvr_u32)grid.cells_x : (vdvr_u32)grid.granularity << b.level_x) >> grid.coarse_x) + 1u;
@@ -95,9 +107,20 @@ VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u32 low, vdvr_u32 bits, vdvr_i32 offset, 
   return b;
 }
 
+// The offset of a near record: its 15 high bits, with their sign.
+VDVR_INLINE vdvr_i32 vdvr_near_offset(vdvr_u32 bits) {
+  return ((vdvr_i32)((bits >> 17) ^ 0x4000u) - 0x4000) * (1 << (bits >> 12 & 31u));
+}
+
+// The record r of the given kind.
+VDVR_INLINE VdvrBrick vdvr_record(VDVR_GLOBAL const vdvr_u32* r, int kind, VdvrGrid grid) {
+  if (kind == VDVR_RECORDS_NEAR) return vdvr_unpack(r[0], r[1], vdvr_near_offset(r[1]), grid);
+  return vdvr_unpack((vdvr_u64)(r[1] >> 17) << 32 | r[0], r[1], kind == VDVR_RECORDS_FAR ? (vdvr_i32)r[2] : 0,
+                     grid);
+}
+
 VDVR_INLINE VdvrBrick vdvr_brick(VDVR_GLOBAL const vdvr_u32* records, VdvrGrid grid, vdvr_u64 brick) {
-  VDVR_GLOBAL const vdvr_u32* r = records + brick * VDVR_BRICK_WORDS;
-  return vdvr_unpack(r[0], r[1], VDVR_BRICK_WORDS == 3 ? (vdvr_i32)r[VDVR_BRICK_WORDS - 1] : 0, grid);
+  return vdvr_record(records + brick * VDVR_BRICK_WORDS, VDVR_RECORDS, grid);
 }
 
 // A cell coordinate inside one brick along one axis: the sample below it and the fraction above that.

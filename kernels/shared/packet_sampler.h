@@ -83,14 +83,14 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
 #ifdef VDVR_SAMPLER_IMAGE3D
   b.record = vdvr_brick(bricks, grid, brick_index(grid, at));
 #elif !VDVR_UNIFORM
-  // vdvr_unpack, lane by lane.
+  // vdvr_record, lane by lane.
   const Offset word = brick_index(grid, at) * VDVR_BRICK_WORDS;
   __global const int* words = (__global const int*)bricks;
   const I bits = GATHER(I, words + 1, word);
   const I lx = bits & 7, ly = bits >> 3 & 7, lz = bits >> 6 & 7;
   const I in_base = (bits & 511) == 0;
 #if VDVR_LANES == 1
-  b.place = (ulong)((uint)bits >> 17) << 32 | bricks[word];
+  b.place = (ulong)(VDVR_RECORDS == VDVR_RECORDS_NEAR ? 0u : (uint)bits >> 17) << 32 | bricks[word];
 #else
   b.place = GATHER(I, words, word);
 #endif
@@ -112,8 +112,16 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
   open_axis(&b, lz, low.z, grid.cells_z, VDVR_COARSE_Z, &b.scale.z, &b.reach.z, &b.top.z, &b.first.z,
             &b.last.z);
   b.type = bits >> 10 & 3;
-  b.value_scale = grid.step * TO_V((I)(1) << (bits >> 12 & 31));
-  b.bias = grid.step * TO_V(VDVR_BRICK_WORDS == 3 ? GATHER(I, words + VDVR_BRICK_WORDS - 1, word) : (I)(0));
+  const I shift = bits >> 12 & 31;
+#if VDVR_RECORDS == VDVR_RECORDS_NEAR
+  const I offset = (bits >> 17) << shift;
+#elif VDVR_RECORDS == VDVR_RECORDS_FAR
+  const I offset = GATHER(I, words + 2, word);
+#else
+  const I offset = (I)(0);
+#endif
+  b.value_scale = grid.step * TO_V((I)(1) << shift);
+  b.bias = grid.step * TO_V(offset);
 #endif
   return b;
 }
