@@ -167,7 +167,7 @@ class Builder {
       const DeviceField field(state_, volume);
       node_test_->measure(field, tolerance, pending, round == 0 ? "verify" : "repair");
       watch_.lap("verify");
-      const std::vector<std::uint8_t> raised = raise_violating(pending);
+      const std::vector<std::uint8_t> raised = raise_violating();
       repaired_ += std::count(raised.begin(), raised.end(), 1);
       if (std::find(raised.begin(), raised.end(), 1) == raised.end()) {
         node_test_->sharpen(field, tolerance);
@@ -211,11 +211,12 @@ class Builder {
                     plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
   }
 
-  // Levels only rise.
-  std::vector<std::uint8_t> raise_violating(const std::vector<std::uint8_t>& pending) {
+  // Levels only rise. A brick that was found over the tolerance stays so until it changes: what was raised
+  // for it can have been a neighbour whose samples round to what they were.
+  std::vector<std::uint8_t> raise_violating() {
     std::vector<LevelTriple> to = bricks_.level;
-    for (std::size_t i = 0; i < pending.size(); ++i)
-      if (pending[i] && measures()[i].violated != 0 &&
+    for (std::size_t i = 0; i < to.size(); ++i)
+      if (bricks_.involved[i] && measures()[i].violated != 0 &&
           !raise_levels(bricks_, static_cast<std::int64_t>(i), measures()[i].violated,
                         gold_->fine().settings().anisotropic ? &node_test_->along()[i] : nullptr, to))
         refuse(measures()[i].total, plan_.epsilon_abs);

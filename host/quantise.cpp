@@ -62,9 +62,8 @@ Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double
   } else {
     return {};
   }
-  // |sample| < 2^24 steps, so in these units an offset has 14 bits and a sign.
-  constexpr int short_offsets = 10;
-  if (lattice.base_shift >= short_offsets + 2) lattice.finest_shift = short_offsets;
+  // |sample| < 2^24 steps, so an offset in units of 2^10 of them has 14 bits and a sign.
+  if (lattice.base_shift >= 12) lattice.finest_shift = lattice.base_shift - 2;
   return lattice;
 }
 

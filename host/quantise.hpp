@@ -20,8 +20,9 @@ struct Lattice {
   SampleType base = SampleType::f32;
   SampleType least = SampleType::f32;  ///< the smallest type that a tile may take
   int base_shift = 0;
-  /// No tile's own step is finer than step * 2^finest_shift, so that its offset fits a short brick record
-  /// (mixed_sampler.h): a 4096th of the base's largest sample, and a quarter of the base's step at most.
+  /// No tile's own step is finer than step * 2^finest_shift, a quarter of the base's. What lies below is lost
+  /// beside the base's rounding, does not compress, and would not let offsets fit a near brick record
+  /// (mixed_sampler.h). 0 where they fit none, or where the base itself is that fine.
   int finest_shift = 0;
   [[nodiscard]] double base_step() const { return std::ldexp(step, base_shift); }
 };
