@@ -44,17 +44,17 @@ VdvrBrick brick_record(const MixedVolume& volume, const std::map<TileKind, std::
                        std::int64_t bx, std::int64_t by, std::int64_t bz);
 
 /// What mixed_sampler.h has for records.
-enum class RecordKind { f32 = VDVR_RECORDS_F32, near = VDVR_RECORDS_NEAR, far = VDVR_RECORDS_FAR };
-/// The smallest that all of the volume's records fit; with texels for places, where integers occur, `far`.
+enum class RecordKind { f32 = VDVR_RECORDS_F32, compact = VDVR_RECORDS_COMPACT, wide = VDVR_RECORDS_WIDE };
+/// The smallest that all of the volume's records fit; with texels for places, where integers occur, `wide`.
 RecordKind record_kind(const MixedVolume& volume, bool texels = false);
-constexpr std::size_t words_of(RecordKind kind) { return kind == RecordKind::far ? 3 : 2; }
+constexpr std::size_t words_of(RecordKind kind) { return kind == RecordKind::wide ? 3 : 2; }
 
 /// [bz][by][bx][words].
 class PackedRecords {
  public:
   PackedRecords(const MixedVolume& volume, const std::map<TileKind, std::uint64_t>& offsets, RecordKind kind);
   void set_base_around(std::size_t brick) { words_[brick * count_ + 1] |= 1u << 9; }
-  /// Puts something else in the place of the first sample: a texel. Below 2^47, in near records 2^32.
+  /// Puts something else in the place of the first sample: a texel. Below 2^47, in compact records 2^32.
   void set_place(std::size_t brick, std::uint64_t place);
   [[nodiscard]] const std::vector<std::uint32_t>& words() const { return words_; }
   [[nodiscard]] RecordKind kind() const { return kind_; }

@@ -141,7 +141,7 @@ std::uint64_t place_of(const MixedVolume& v, const std::map<TileKind, std::uint6
 }
 
 // An offset is a multiple of 2^shift.
-bool fits_near(std::int32_t offset, int shift) {
+bool fits_compact(std::int32_t offset, int shift) {
   const std::int32_t n = offset >> shift;
   return -(1 << 14) <= n && n < 1 << 14;
 }
@@ -158,13 +158,14 @@ VdvrBrick brick_record(const MixedVolume& v, const std::map<TileKind, std::uint6
 
 RecordKind record_kind(const MixedVolume& v, bool texels) {
   if (sample_types(v) == 1 << VDVR_F32) return RecordKind::f32;
-  bool near = !texels && sample_buffer_bytes(v) >> 32 == 0;
+  bool compact = !texels && sample_buffer_bytes(v) >> 32 == 0;
   const auto look = [&](const SampleBlock& b) {
-    for (std::size_t i = 0; near && i < b.offset.size(); ++i) near = fits_near(b.offset[i], b.shift[i]);
+    for (std::size_t i = 0; compact && i < b.offset.size(); ++i)
+      compact = fits_compact(b.offset[i], b.shift[i]);
   };
   look(v.base);
   for (const auto& [kind, block] : v.tiles) look(block);
-  return near ? RecordKind::near : RecordKind::far;
+  return compact ? RecordKind::compact : RecordKind::wide;
 }
 
 PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std::uint64_t>& offsets,
@@ -177,21 +178,21 @@ PackedRecords::PackedRecords(const MixedVolume& v, const std::map<TileKind, std:
       for (std::int64_t x = 0; x < b[0]; ++x, ++brick) {
         const RecordBits r = record_bits(v, brick);
         words_[brick * count_ + 1] = r.bits;
-        if (kind == RecordKind::near)
+        if (kind == RecordKind::compact)
           words_[brick * count_ + 1] |= static_cast<std::uint32_t>(r.offset >> (r.bits >> 12 & 31)) << 17;
-        if (kind == RecordKind::far) words_[brick * count_ + 2] = static_cast<std::uint32_t>(r.offset);
+        if (kind == RecordKind::wide) words_[brick * count_ + 2] = static_cast<std::uint32_t>(r.offset);
         set_place(brick, place_of(v, offsets, x, y, z));
       }
 }
 
 void PackedRecords::set_place(std::size_t brick, std::uint64_t place) {
-  const int most = kind_ == RecordKind::near ? 32 : 47;
+  const int most = kind_ == RecordKind::compact ? 32 : 47;
   if (place >> most != 0)
     throw InputError(
         fmt::format("a brick's samples lie at place {}, beyond 2^{}: the volume is too large", place, most));
   std::uint32_t& bits = words_[brick * count_ + 1];
   words_[brick * count_] = static_cast<std::uint32_t>(place);
-  if (kind_ == RecordKind::near) return;
+  if (kind_ == RecordKind::compact) return;
   bits = (bits & 0x1ffffu) | static_cast<std::uint32_t>(place >> 32) << 17;
 }
 

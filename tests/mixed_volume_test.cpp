@@ -316,7 +316,7 @@ BOOST_AUTO_TEST_CASE(integer_samples_are_decoded_exactly_on_the_host) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(an_offset_of_15_bits_fits_a_near_record_and_one_of_16_does_not) {
+BOOST_AUTO_TEST_CASE(an_offset_of_15_bits_fits_a_compact_record_and_one_of_16_does_not) {
   MixedVolume v =
       support::in_types(support::random_mixed(grid_of({8, 8, 8}), 4, 2, {{1, 1, 1}}, 1), {SampleType::u8});
   SampleBlock& tiles = v.tiles.begin()->second;
@@ -328,16 +328,17 @@ BOOST_AUTO_TEST_CASE(an_offset_of_15_bits_fits_a_near_record_and_one_of_16_does_
   };
   for (const int shift : {0, 7})
     for (const std::int32_t units : {-(1 << 14), -1, 0, (1 << 14) - 1}) {
-      BOOST_TEST((kind_with(units, shift) == RecordKind::near));
-      const PackedRecords records(v, tile_offsets(v), RecordKind::near);
-      const VdvrBrick r = vdvr_record(records.words().data() + 2 * brick, VDVR_RECORDS_NEAR, sampler_grid(v));
+      BOOST_TEST((kind_with(units, shift) == RecordKind::compact));
+      const PackedRecords records(v, tile_offsets(v), RecordKind::compact);
+      const VdvrBrick r =
+          vdvr_record(records.words().data() + 2 * brick, VDVR_RECORDS_COMPACT, sampler_grid(v));
       BOOST_TEST(static_cast<double>(r.bias) == v.step * units * (1 << shift));
       BOOST_TEST(static_cast<double>(r.scale) == v.step * (1 << shift));
       BOOST_TEST(r.level_x == 1u);
     }
-  BOOST_TEST((kind_with(-(1 << 14) - 1, 7) == RecordKind::far));
-  BOOST_TEST((kind_with(1 << 14, 0) == RecordKind::far));
-  BOOST_TEST((record_kind(v, true) == RecordKind::far));  // texels need more than 32 bits
+  BOOST_TEST((kind_with(-(1 << 14) - 1, 7) == RecordKind::wide));
+  BOOST_TEST((kind_with(1 << 14, 0) == RecordKind::wide));
+  BOOST_TEST((record_kind(v, true) == RecordKind::wide));  // texels need more than 32 bits
 }
 
 BOOST_AUTO_TEST_CASE(storage_counts_integers_by_their_bytes_and_longer_records_only_where_needed) {

@@ -51,19 +51,19 @@ typedef std::int32_t vdvr_i32;
 
 // A brick's record is two words, low word of its place and bits: level x 3, level y 3, level z 3, base_around
 // 1, type 2, shift 5, and 15 that the includer's VDVR_RECORDS gives a meaning. Of float32 samples they are
-// the high ones of the place. Integers have an offset on the lattice: NEAR has it in those 15 bits, signed,
-// in units of 2^shift, and places below 2^32 only; FAR has it in a third word, and the place's high bits
-// there.
+// the high ones of the place. Integers have an offset on the lattice: COMPACT has it in those 15 bits,
+// signed, in units of 2^shift, and places below 2^32 only; WIDE has it in a third word, and the place's high
+// bits there.
 #define VDVR_RECORDS_F32 0
-#define VDVR_RECORDS_NEAR 1
-#define VDVR_RECORDS_FAR 2
+#define VDVR_RECORDS_COMPACT 1
+#define VDVR_RECORDS_WIDE 2
 #ifndef VDVR_RECORDS
 #if VDVR_SAMPLE_TYPES != 1
 #error "VDVR_RECORDS (which records the bricks have) must be defined where integers occur"
 #endif
 #define VDVR_RECORDS VDVR_RECORDS_F32
 #endif
-#define VDVR_BRICK_WORDS (VDVR_RECORDS == VDVR_RECORDS_FAR ? 3 : 2)
+#define VDVR_BRICK_WORDS (VDVR_RECORDS == VDVR_RECORDS_WIDE ? 3 : 2)
 
 // A record, unpacked.
 typedef struct {
@@ -107,16 +107,16 @@ VDVR_INLINE VdvrBrick vdvr_unpack(vdvr_u64 place, vdvr_u32 bits, vdvr_i32 offset
   return b;
 }
 
-// The offset of a near record: its 15 high bits, with their sign.
-VDVR_INLINE vdvr_i32 vdvr_near_offset(vdvr_u32 bits) {
+// The offset of a compact record: its 15 high bits, with their sign.
+VDVR_INLINE vdvr_i32 vdvr_compact_offset(vdvr_u32 bits) {
   return ((vdvr_i32)((bits >> 17) ^ 0x4000u) - 0x4000) * (1 << (bits >> 12 & 31u));
 }
 
 // The record r of the given kind.
 VDVR_INLINE VdvrBrick vdvr_record(VDVR_GLOBAL const vdvr_u32* r, int kind, VdvrGrid grid) {
-  if (kind == VDVR_RECORDS_NEAR) return vdvr_unpack(r[0], r[1], vdvr_near_offset(r[1]), grid);
-  return vdvr_unpack((vdvr_u64)(r[1] >> 17) << 32 | r[0], r[1], kind == VDVR_RECORDS_FAR ? (vdvr_i32)r[2] : 0,
-                     grid);
+  if (kind == VDVR_RECORDS_COMPACT) return vdvr_unpack(r[0], r[1], vdvr_compact_offset(r[1]), grid);
+  return vdvr_unpack((vdvr_u64)(r[1] >> 17) << 32 | r[0], r[1],
+                     kind == VDVR_RECORDS_WIDE ? (vdvr_i32)r[2] : 0, grid);
 }
 
 VDVR_INLINE VdvrBrick vdvr_brick(VDVR_GLOBAL const vdvr_u32* records, VdvrGrid grid, vdvr_u64 brick) {

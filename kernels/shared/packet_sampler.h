@@ -90,7 +90,7 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
   const I lx = bits & 7, ly = bits >> 3 & 7, lz = bits >> 6 & 7;
   const I in_base = (bits & 511) == 0;
 #if VDVR_LANES == 1
-  b.place = (ulong)(VDVR_RECORDS == VDVR_RECORDS_NEAR ? 0u : (uint)bits >> 17) << 32 | bricks[word];
+  b.place = (ulong)(VDVR_RECORDS == VDVR_RECORDS_COMPACT ? 0u : (uint)bits >> 17) << 32 | bricks[word];
 #else
   b.place = GATHER(I, words, word);
 #endif
@@ -113,9 +113,9 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
             &b.last.z);
   b.type = bits >> 10 & 3;
   const I shift = bits >> 12 & 31;
-#if VDVR_RECORDS == VDVR_RECORDS_NEAR
+#if VDVR_RECORDS == VDVR_RECORDS_COMPACT
   const I offset = (bits >> 17) << shift;
-#elif VDVR_RECORDS == VDVR_RECORDS_FAR
+#elif VDVR_RECORDS == VDVR_RECORDS_WIDE
   const I offset = GATHER(I, words + 2, word);
 #else
   const I offset = (I)(0);
