@@ -11,18 +11,15 @@
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
+#include "host/verify_cosines.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double u = 0x1p-24;            // rounding unit of fp32
-constexpr std::int64_t density = 12;     // fine columns per detector column
-constexpr std::int64_t sup_density = 3;  // points per pixel where sups are sampled
-constexpr std::int64_t halo = 2;         // of gold nodes: RADIUS of the kernel
-constexpr std::int64_t lanes = 8;        // rows summed side by side on the host
-constexpr std::int64_t room = 64;        // floats after a buffer's end that 16-lane reads may touch
+constexpr std::int64_t halo = 2;   // of gold nodes: RADIUS of the kernel
+constexpr std::int64_t room = 64;  // floats after a buffer's end that 16-lane reads may touch
 
 cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
 std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
@@ -45,184 +42,7 @@ class HostShare {
   std::uint64_t bytes_;
 };
 
-// line[m][row] = sum over l of a[m][l] cos(l y_row) weight(l), for rows (a multiple of `lanes`) given by the
-// cosines basis[l][row].
-void cosine_rows(const double* a, std::int64_t U, std::int64_t V, const std::vector<double>& basis,
-                 std::int64_t rows, std::vector<double>& line) {
-  for (std::int64_t m = 0; m < U; ++m)
-    for (std::int64_t r = 0; r < rows; r += lanes) {
-      std::array<double, lanes> sum{};
-      for (std::int64_t l = 0; l < V; ++l) {
-        const double c = a[m * V + l];
-        const double* b = basis.data() + l * rows + r;
-        for (std::size_t i = 0; i < lanes; ++i) sum[i] += c * b[i];
-      }
-      std::copy(sum.begin(), sum.end(), line.begin() + m * rows + r);
-    }
-}
-
-// Calls put(n, row, values of `lanes` rows) for 0 <= n <= steps * U: the sums over m of line[m][row] cos(m pi
-// n / (steps U)). cos(m (pi - x)) = (-1)^m cos(m x): odd and even m apart give two columns at once.
-template <class Put>
-void cosine_columns(const std::vector<double>& line, std::int64_t U, std::int64_t rows, std::int64_t steps,
-                    const std::vector<double>& cosine, Put&& put) {
-  const std::int64_t last = steps * U, period = 2 * last;
-  std::vector<double> c(at(U));
-  for (std::int64_t n = 0; 2 * n <= last; ++n) {
-    for (std::int64_t m = 0, i = 0; m < U; ++m) {
-      c[at(m)] = cosine[at(i)];
-      i += n;
-      if (i >= period) i -= period;
-    }
-    for (std::int64_t r = 0; r < rows; r += lanes) {
-      std::array<double, lanes> even{}, odd{}, low{}, high{};
-      const double* p = line.data() + r;
-      std::int64_t m = 0;
-      for (; m + 1 < U; m += 2, p += 2 * rows)
-        for (std::size_t i = 0; i < lanes; ++i) {
-          even[i] += c[at(m)] * p[i];
-          odd[i] += c[at(m + 1)] * p[at(rows) + i];
-        }
-      if (m < U)
-        for (std::size_t i = 0; i < lanes; ++i) even[i] += c[at(m)] * p[i];
-      for (std::size_t i = 0; i < lanes; ++i) {
-        low[i] = even[i] + odd[i];
-        high[i] = even[i] - odd[i];
-      }
-      put(n, r, low);
-      put(last - n, r, high);
-    }
-  }
-}
-
-// cos(pi i / half) for 0 <= i < 2 half.
-std::vector<double> cosine_period(std::int64_t half) {
-  std::vector<double> table(at(2 * half));
-  for (std::int64_t i = 0; i < 2 * half; ++i)
-    table[at(i)] = std::cos(pi * static_cast<double>(i) / static_cast<double>(half));
-  return table;
-}
-
 }  // namespace
-
-ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& g,
-                   const Progress& progress) {
-  const std::int64_t U = g.columns, V = g.rows, K = g.views();
-  // One row does not vary along v. Else rows at every third of a pixel, from edge to edge of the half period.
-  const std::int64_t heights = V == 1 ? 1 : sup_density * V + 1,
-                     rows = std::min<std::int64_t>(up(heights, lanes), 64);
-  const auto cosine_u = cosine_period(sup_density * U), cosine_v = cosine_period(sup_density * V);
-  const double factor_u = 1 / std::cos(pi / static_cast<double>(2 * sup_density)),
-               factor = (1 + 1e-9) * factor_u * (V == 1 ? 1 : factor_u);
-  const double wave_u = pi / (static_cast<double>(U) * g.pitch_u),
-               wave_v = pi / (static_cast<double>(V) * g.pitch_v);
-  ViewSups sups{std::vector<double>(at(K)), std::vector<double>(at(K)), std::vector<double>(at(K))};
-  parallel_for(K, progress, "sups", [&](std::int64_t k) {
-    const double* a = coefficients.data() + k * U * V;
-    std::vector<double> basis(at(V * rows)), basis_vv(at(V * rows)), line(at(U * rows));
-    const auto largest = [&](double sup) {
-      cosine_columns(line, U, rows, sup_density, cosine_u,
-                     [&](std::int64_t, std::int64_t, const std::array<double, lanes>& values) {
-                       for (const double v : values) sup = std::max(sup, std::abs(v));
-                     });
-      return sup;
-    };
-    for (std::int64_t first = 0; first < heights; first += rows) {
-      for (std::int64_t l = 0; l < V; ++l)
-        for (std::int64_t r = 0; r < rows; ++r) {
-          const std::int64_t j = std::min(first + r, heights - 1);
-          const double c = cosine_v[at(l * j % (2 * sup_density * V))], w = static_cast<double>(l) * wave_v;
-          basis[at(l * rows + r)] = c;
-          basis_vv[at(l * rows + r)] = c * w * w;
-        }
-      cosine_rows(a, U, V, basis_vv, rows, line);
-      sups.second_v[at(k)] = largest(sups.second_v[at(k)]);
-      cosine_rows(a, U, V, basis, rows, line);
-      sups.value[at(k)] = largest(sups.value[at(k)]);
-      for (std::int64_t m = 0; m < U; ++m) {
-        const double w = static_cast<double>(m) * wave_u;
-        for (std::int64_t r = 0; r < rows; ++r) line[at(m * rows + r)] *= w * w;
-      }
-      sups.second_u[at(k)] = largest(sups.second_u[at(k)]);
-    }
-    sups.value[at(k)] *= factor;
-    sups.second_u[at(k)] *= factor;
-    sups.second_v[at(k)] *= factor;
-  });
-  return sups;
-}
-
-FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
-                         double reach) {
-  const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
-  const std::size_t K = sups.value.size();
-  // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.
-  const auto derivative = [&](std::size_t k, int a, int b) {
-    double sup = INFINITY;
-    if (a >= 2) sup = sups.second_u[k] * std::pow(wu, a / 2 - 1) * std::pow(wv, b / 2);
-    if (b >= 2) sup = std::min(sup, sups.second_v[k] * std::pow(wu, a / 2) * std::pow(wv, b / 2 - 1));
-    return sup;
-  };
-  // Sum over the views of the sup of d_x^n0 d_y^n1 d_z^n2 q_k(t_k, z), times h^n.
-  const auto sup_of = [&](const std::array<int, 3>& n) {
-    double sum = 0;
-    for (std::size_t k = 0; k < K; ++k)
-      sum += std::pow(std::abs(std::cos(g.theta_rad[k])), n[0]) *
-             std::pow(std::abs(std::sin(g.theta_rad[k])), n[1]) * derivative(k, n[0] + n[1], n[2]);
-    return sum * std::pow(h[0], n[0]) * std::pow(h[1], n[1]) * std::pow(h[2], n[2]);
-  };
-  FieldBounds b;
-  double S = 0, S_uu = 0, S_6 = 0;
-  for (std::size_t k = 0; k < K; ++k) {
-    S += sups.value[k];
-    S_uu += sups.second_u[k];
-    S_6 += derivative(k, 6, 0);
-  }
-  const double d = g.pitch_u / static_cast<double>(density),
-               slope = std::min(pi / g.pitch_u * S, std::sqrt(2 * S * S_uu));
-  const double columns = static_cast<double>(density * (g.columns + 2));
-  b.arithmetic = u * (28 + 1.01 * static_cast<double>(K)) * S +
-                 (u * (4 * reach + 6) + 0x1p-48 * columns) * d * slope +
-                 3.515625 / 720 * std::pow(d, 6) * S_6 + host_rounding;
-  b.differences = 40 * u * S;
-  double plain = 0;
-  for (std::size_t j = 0; j < 3; ++j) {
-    std::array<int, 3> six{};
-    six[j] = 6;
-    b.second += sup_of(six) / 90;
-    for (std::size_t i = 0; i < 3; ++i) {
-      std::array<int, 3> four{};
-      four[j] += 2;
-      four[i] += 2;
-      b.everywhere[j][i] = sup_of(four);
-      const auto more = [&](std::size_t axis) {
-        std::array<int, 3> n = four;
-        n[axis] += 2;
-        return sup_of(n);
-      };
-      // From the difference to the derivative at a node, then from the nodes to all of the cell.
-      b.rise[j][i] = i == j ? more(j) / 6 : (more(j) + more(i)) / 12;
-      for (std::size_t axis = 0; axis < 3; ++axis) b.rise[j][i] += more(axis) / 8;
-    }
-    plain += b.everywhere[j][j] / 12;
-  }
-  // On coarse gold the sixth derivatives weigh more than what the fourth differences gain.
-  if (plain < b.second) {
-    b.second = plain;
-    b.correction = 0;
-  }
-  return b;
-}
-
-double brick_constant(const FieldBounds& b, const std::array<double, 6>& fourth) {
-  constexpr std::array<std::array<std::size_t, 3>, 3> place{{{0, 3, 4}, {3, 1, 5}, {4, 5, 2}}};
-  double rises = 0;
-  for (std::size_t j = 0; j < 3; ++j)
-    for (std::size_t i = 0; i < 3; ++i)
-      rises += std::min(fourth[place[j][i]] + 16 * b.arithmetic + b.differences + b.rise[j][i],
-                        b.everywhere[j][i]);
-  return (b.second + rises / 8) / 8 + 2 * b.arithmetic + b.differences;
-}
 
 /// How the selected bricks are cut into pieces that are computed at once.
 struct VerifyField::Shape {
@@ -253,9 +73,9 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
   // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on.
   const ParallelGeometry& g = field.geometry();
   pad_ = static_cast<std::int64_t>(
-             std::ceil(3.1 * std::hypot(h_[0], h_[1]) / g.pitch_u * static_cast<double>(density))) +
+             std::ceil(3.1 * std::hypot(h_[0], h_[1]) / g.pitch_u * static_cast<double>(fine_columns))) +
          4;
-  columns_ = density * g.columns + 1 + 2 * pad_;
+  columns_ = fine_columns * g.columns + 1 + 2 * pad_;
 }
 
 void VerifyField::run(const std::vector<std::uint8_t>& selected,
@@ -270,7 +90,7 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected,
   s.nx = s.width * s.cells + 1 + 2 * halo;
   s.error_padded = up(s.cells + 1, 16) + 16;
   s.words = (s.cells + 15) / 16;
-  const double scale = static_cast<double>(density) / field_.geometry().pitch_u;
+  const double scale = static_cast<double>(fine_columns) / field_.geometry().pitch_u;
   s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), h_,
                           scale * std::hypot(h_[0], h_[1]) * static_cast<double>(s.nx + 7));
 
@@ -332,8 +152,8 @@ struct VerifyField::Table {
 void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view) {
   if (table.first_view == first_view) return;
   const ParallelGeometry& g = field_.geometry();
-  const std::int64_t U = g.columns, V = g.rows, rows = up(shape.nz, lanes);
-  const std::int64_t views = std::min(table.views, g.views() - first_view), last = density * U;
+  const std::int64_t U = g.columns, V = g.rows, rows = up(shape.nz, verify_cosines::lanes);
+  const std::int64_t views = std::min(table.views, g.views() - first_view), last = fine_columns * U;
   const double first_z = volume_.grid.origin[2] +
                          static_cast<double>(shape.slab_z * volume_.granularity) * volume_.grid.spacing[2];
   std::vector<double> basis(at(V * rows));
@@ -342,18 +162,20 @@ void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view
     const double y = pi * (z / g.pitch_v + 0.5 * static_cast<double>(V)) / static_cast<double>(V);
     for (std::int64_t l = 0; l < V; ++l) basis[at(l * rows + r)] = std::cos(static_cast<double>(l) * y);
   }
-  const auto cosine = cosine_period(last);
+  const auto cosine = verify_cosines::cosine_period(last);
   parallel_for(views, {}, "", [&](std::int64_t k) {
     std::vector<double> line(at(U * rows));
-    cosine_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, rows, line);
+    verify_cosines::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, rows,
+                             line);
     float* out = table.host.data() + k * table.per_view;
-    cosine_columns(line, U, rows, density, cosine,
-                   [&](std::int64_t n, std::int64_t r, const std::array<double, lanes>& values) {
-                     for (std::int64_t i = 0; i < lanes; ++i)
-                       if (r + i < shape.z_padded)
-                         out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
-                             static_cast<float>(values[at(i)]);
-                   });
+    verify_cosines::sum_columns(
+        line, U, rows, fine_columns, cosine,
+        [&](std::int64_t n, std::int64_t r, const std::array<double, verify_cosines::lanes>& values) {
+          for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
+            if (r + i < shape.z_padded)
+              out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
+                  static_cast<float>(values[at(i)]);
+        });
     // Beyond the detector's edges the series is its own mirror image.
     for (std::int64_t n = 0; n < columns_; ++n) {
       std::int64_t m = std::abs(n - pad_) % (2 * last);
@@ -438,7 +260,7 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
                            opencl::DeviceArray<float>& values) {
   const ParallelGeometry& g = field_.geometry();
   const std::size_t K = g.theta_rad.size(), blocks = batch.first.size();
-  const double scale = static_cast<double>(density) / g.pitch_u;
+  const double scale = static_cast<double>(fine_columns) / g.pitch_u;
   std::vector<cl_float4> steps(blocks * K);
   for (std::size_t b = 0; b < blocks; ++b)
     for (std::size_t k = 0; k < K; ++k) {
@@ -452,7 +274,7 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
       // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
       // padding.
       const double column =
-          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(density) + static_cast<double>(pad_);
+          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(fine_columns) + static_cast<double>(pad_);
       const double along_x = c * h_[0] * scale, along_y = s_k * h_[1] * scale,
                    nodes = static_cast<double>(s.nx + 7);
       const double whole =

@@ -1,0 +1,49 @@
+// The bound on |V - F| as `verify` has it, but for what gold tells cell by cell: sups of the filtered
+// projections and the constants that follow from them (docs/error-bounds.md, "What verify does"). Called by
+// verify_field.cpp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "vdvr/grid.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+/// Fine columns per detector column, on which F is interpolated.
+constexpr std::int64_t fine_columns = 12;
+
+/// Per view: sups over the whole detector, view weight included.
+struct ViewSups {
+  std::vector<double> value, second_u, second_v;  ///< |q|, |q_uu|, |q_vv|
+};
+
+/// Cost: views * 18 rows * columns * (rows + columns) multiply-adds on the host. `coefficients` double
+/// [view][m][l].
+ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
+                   const Progress& progress);
+
+/// What does not depend on the gold cell. Axes x, y, z.
+struct FieldBounds {
+  using Pairs = std::array<std::array<double, 3>, 3>;
+  double arithmetic = 0;       ///< |computed F - F| at any node: rounding and interpolation in u
+  double differences = 0;      ///< rounding of second and fourth differences, and of the kernel's sums
+  float correction = 1;        ///< 1: second derivatives to fourth order in h, 0: plain second differences
+  double second = 0;           ///< what those err, summed over the axes: h^6 / 90 or h^4 / 12 times a sup
+  Pairs rise{}, everywhere{};  ///< of h_i^2 h_j^2 |F_iijj|: above its largest difference at nodes; anywhere
+};
+
+/// `reach`: the largest distance, in fine columns, of a node of a block from the block's first.
+/// `host_rounding`: what the table's double-precision values err.
+FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& geometry,
+                         const Vec3& gold_spacing, double reach);
+
+/// T's part that is constant over a brick, and 2 arithmetic: `fourth` are the largest computed fourth
+/// differences at its nodes, xx, yy, zz, xy, xz, yz.
+double brick_constant(const FieldBounds& bounds, const std::array<double, 6>& fourth);
+
+}  // namespace vdvr
