@@ -66,8 +66,8 @@ struct TileKind {
   TileKind(std::uint8_t z, std::uint8_t y, std::uint8_t x) : level{z, y, x} {}
   operator const LevelTriple&() const { return level; }
   // NOLINTEND(google-explicit-constructor)
-  auto operator<=>(const TileKind&) const =
-      default;  // NOLINT(modernize-use-nullptr): not what clang-tidy 14 takes it for
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the comparison with 0 for a pointer's
+  auto operator<=>(const TileKind&) const = default;
 };
 /// As many as there are sample types.
 inline constexpr std::uint8_t most_parts = 3;
