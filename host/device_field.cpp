@@ -3,6 +3,11 @@
 
 namespace vdvr {
 
+opencl::Defines field_defines(const MixedVolume& v, RecordKind records) {
+  return {{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))},
+          {"VDVR_RECORDS", std::to_string(static_cast<int>(records))}};
+}
+
 DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
     : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v))) {}
 
@@ -10,8 +15,7 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
     : samples(state, sample_buffer_bytes(v), "certified samples"),
       bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
       grid(sampler_grid(v)),
-      defines{{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))},
-              {"VDVR_RECORDS", std::to_string(static_cast<int>(records.kind()))}} {
+      defines(field_defines(v, records.kind())) {
   const auto put = [&](const SampleBlock& block, std::uint64_t first) {
     samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
   };

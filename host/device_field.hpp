@@ -7,13 +7,17 @@
 
 namespace vdvr {
 
+/// VDVR_SAMPLE_TYPES and VDVR_RECORDS: what kernels that read this volume through such records are compiled
+/// for.
+opencl::Defines field_defines(const MixedVolume& volume, RecordKind records);
+
 struct DeviceField {
   DeviceField(opencl::State& state, const MixedVolume& volume);
   DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records);
   opencl::DeviceArray<std::uint8_t> samples;  ///< host/brick_layout.hpp
   opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
   VdvrGrid grid;
-  opencl::Defines defines;  ///< VDVR_SAMPLE_TYPES, VDVR_RECORDS
+  opencl::Defines defines;  ///< field_defines()
 };
 
 /// VDVR_COARSE_X, _Y, _Z, for kernels that read bricks through packet_sampler.h.

@@ -62,8 +62,7 @@ Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double
   } else {
     return {};
   }
-  // |sample| < 2^24 steps, so an offset in units of 2^10 of them has 14 bits and a sign.
-  if (lattice.base_shift >= 12) lattice.finest_shift = lattice.base_shift - 2;
+  lattice.finest_shift = std::max(lattice.base_shift - 2, 0);
   return lattice;
 }
 

@@ -21,8 +21,8 @@ struct Lattice {
   SampleType least = SampleType::f32;  ///< the smallest type that a tile may take
   int base_shift = 0;
   /// No tile's own step is finer than step * 2^finest_shift, a quarter of the base's. What lies below is lost
-  /// beside the base's rounding, does not compress, and would not let offsets fit a compact brick record
-  /// (mixed_sampler.h). 0 where they fit none, or where the base itself is that fine.
+  /// beside the base's rounding and does not compress. |sample| < 2^24 steps, so that from 10 on, as u8 has
+  /// it, offsets fit a compact brick record (mixed_sampler.h).
   int finest_shift = 0;
   [[nodiscard]] double base_step() const { return std::ldexp(step, base_shift); }
 };

@@ -265,8 +265,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     PackedRecords texels(v, offsets_, record_kind(v, true));
     set_texels(v, texels);
     texel_records_ = texels.words();
-    atlas_defines_ = {field->defines.front(),
-                      {"VDVR_RECORDS", std::to_string(static_cast<int>(texels.kind()))}};
+    atlas_defines_ = field_defines(v, texels.kind());
   }
   for (const auto& [triple, block] : v.tiles)
     for (std::size_t a = 0; a < 3; ++a)

@@ -109,7 +109,7 @@ __kernel VDVR_HINT void slice(FIELD, BRICKS, VdvrGrid grid, VdvrSlice p, __globa
   const I inside = (point.x == nearest.x) & (point.y == nearest.y) & (point.z == nearest.z);
   const V value = sample_anywhere(THE_FIELD, bricks, grid, nearest).value, none = (V)(0.0f), one = (V)(1.0f);
   const V grey = clamp((value - p.window_lo) * p.window_scale, none, one);
-  const V shown = PICK(inside, grey, (V)(0.02f));
+  const V shown = PICK(inside, grey, (V)(VDVR_GREY_OUTSIDE));
   put(p.width, p.height, picture, row_samples, px, py, v3(shown, shown, shown), PICK(inside, value, (V)(NAN)),
       (I)(0));
 }

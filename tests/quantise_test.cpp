@@ -84,11 +84,14 @@ BOOST_AUTO_TEST_CASE(a_tile_takes_the_finest_step_that_fits_and_none_coarser_tha
   BOOST_TEST(!fits(0, 8, SampleType::u16).has_value());  // 2^24 steps and more: not exact in fp32
 }
 
-BOOST_AUTO_TEST_CASE(a_fine_base_lets_tiles_have_steps_that_need_long_records) {
-  // 16 bits of samples about 0 leave fewer than two bits to a tile's step.
-  const Lattice l = choose_lattice(random_base(0, 1, 5), StorageChoice::u16, 0);
-  BOOST_TEST(l.finest_shift == 0);
-  BOOST_TEST(fitting_shift(0.5f, 0.5f, l, SampleType::u16, l.base_shift).value() == 0);
+BOOST_AUTO_TEST_CASE(no_tile_has_a_step_finer_than_a_quarter_of_the_bases) {
+  for (const double far : {0.0, 7.0, 1e6})  // from 0: a base whose own step is the file's has nothing finer
+    for (const StorageChoice choice : {StorageChoice::u8, StorageChoice::u16}) {
+      const Lattice l = choose_lattice(random_base(far, far + 1, 5), choice, 0);
+      const auto at = static_cast<float>(far + 0.5);
+      BOOST_TEST(fitting_shift(at, at, l, SampleType::u16, l.base_shift).value() ==
+                 std::max(l.base_shift - 2, 0));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_base_holds_every_value_within_its_limits) {

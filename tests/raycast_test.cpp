@@ -6,6 +6,7 @@
 
 #include "host/raycast.hpp"
 #include "host/resident_volume.hpp"
+#include "shared/raycast_params.h"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/rendering.hpp"
@@ -263,25 +264,54 @@ BOOST_AUTO_TEST_CASE(samplers_agree_in_every_way_of_stepping_and_shading) {
   }
 }
 
+// The same less 1/2, so that offsets are negative.
+MixedVolume lowered(MixedVolume v) {
+  const auto lower = [&](SampleBlock& block) {
+    for (float& sample : block.f32) sample -= 0.5f;
+    for (std::int32_t& offset : block.offset) offset -= static_cast<std::int32_t>(0.5 / v.step);
+  };
+  lower(v.base);
+  for (auto& [kind, block] : v.tiles) lower(block);
+  return v;
+}
+
+// With one more tile, which no brick has, whose offset no compact record could hold.
+MixedVolume with_wide_records(MixedVolume v) {
+  auto& [kind, block] = *v.tiles.rbegin();  // no other part of its triple goes on behind it
+  const auto size = static_cast<std::size_t>(v.tile_size(kind));
+  if (block.type == SampleType::u8) block.u8.resize(block.u8.size() + size);
+  else block.u16.resize(block.u16.size() + size);
+  block.offset.push_back(1 << 20);
+  block.shift.push_back(0);
+  return v;
+}
+
+void check_picture_of_decoded_values(const MixedVolume& integers) {
+  MixedVolume floats = integers;
+  floats.base = decoded(integers.base, integers.step);
+  for (auto& [triple, block] : floats.tiles) block = decoded(block, integers.step);
+  const ResidentVolume a(device(), integers), b(device(), floats);
+  BOOST_TEST(a.bytes() < b.bytes());
+  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+    for (const int lanes : {1, 8}) {
+      RenderOptions o = options_for(a.grid(), mode);
+      o.surfaces = {{0.5}};
+      o.sampler = SamplerKind::buffer;
+      BOOST_TEST(same_bits(raycast_float(device(), a, o, {8, 8, lanes}).pixels,
+                           raycast_float(device(), b, o, {8, 8, lanes}).pixels));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(integer_samples_give_the_picture_of_their_decoded_values_to_the_bit) {
-  for (const auto& types : {std::vector{SampleType::u16}, std::vector{SampleType::u8},
-                            std::vector{SampleType::u8, SampleType::f32, SampleType::u16}}) {
-    const MixedVolume integers = types.size() > 1 ? support::in_types_by_tile(mixed_blob(), types)
-                                                  : support::in_types(coarse_blob(), types);
-    MixedVolume floats = integers;
-    floats.base = decoded(integers.base, integers.step);
-    for (auto& [triple, block] : floats.tiles) block = decoded(block, integers.step);
-    const ResidentVolume a(device(), integers), b(device(), floats);
-    BOOST_TEST(a.bytes() < b.bytes());
-    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
-      for (const int lanes : {1, 8}) {
-        RenderOptions o = options_for(a.grid(), mode);
-        o.surfaces = {{0.5}};
-        o.sampler = SamplerKind::buffer;
-        BOOST_TEST(same_bits(raycast_float(device(), a, o, {8, 8, lanes}).pixels,
-                             raycast_float(device(), b, o, {8, 8, lanes}).pixels));
-      }
-  }
+  for (const auto& types :
+       {std::vector{SampleType::u16}, std::vector{SampleType::u8, SampleType::f32, SampleType::u16}})
+    check_picture_of_decoded_values(types.size() > 1 ? support::in_types_by_tile(mixed_blob(), types)
+                                                     : support::in_types(coarse_blob(), types));
+  const MixedVolume u8 = support::in_types(coarse_blob(), {SampleType::u8});
+  const MixedVolume low = lowered(u8), wide = with_wide_records(low);
+  BOOST_TEST((record_kind(low) == RecordKind::compact));
+  BOOST_TEST((record_kind(wide) == RecordKind::wide));
+  for (const MixedVolume& v : {u8, low, wide}) check_picture_of_decoded_values(v);
 }
 
 BOOST_AUTO_TEST_CASE(refined_bricks_of_a_linear_field_leave_no_seam) {
@@ -379,7 +409,7 @@ BOOST_AUTO_TEST_CASE(slice_of_a_linear_field_is_exact_and_oriented) {
             std::abs(at[down]) * 2 > static_cast<double>(grid.cells[down]) * grid.spacing[down];
         const double truth = linear(at[0], at[1], at[2]);
         if (outside) {
-          BOOST_TEST(pixel.s[0] == 0.02f);
+          BOOST_TEST(pixel.s[0] == VDVR_GREY_OUTSIDE);
           BOOST_TEST(std::isnan(pixel.s[3]));
         } else {
           BOOST_TEST(!(std::abs(static_cast<double>(pixel.s[3]) - truth) > 14 * u * 8));

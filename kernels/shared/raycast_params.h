@@ -16,6 +16,9 @@
 
 #define VDVR_SURFACES 8
 
+// Of a slice's pixels outside the grid.
+#define VDVR_GREY_OUTSIDE 0.02f
+
 // An iso-surface; `opacity` of the surface itself.
 typedef struct {
   float value, opacity, rgb[3];
