@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "host/opencl/kernel.hpp"
 #include "host/reconstruct_field.hpp"
+#include "host/round_up.hpp"
 
 namespace vdvr {
 namespace {
@@ -44,7 +46,9 @@ BoundTable make_table(opencl::State& state, Upsampler& upsampler, const Filtered
       fill(state, "gold_bounds", "bound_table");
   const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(cells.rows.size()));
   for (const Term& term : terms) {
-    const std::vector<float> rise(term.view_rise.begin(), term.view_rise.end());
+    std::vector<float> rise;
+    for (const double r : term.view_rise) rise.push_back(round_up(r));
+    require_finite(rise, term.order_u + term.order_v);
     const opencl::DeviceArray<float> device_rise(state, std::span<const float>(rise), "rise of derivatives");
     for (std::int64_t first = 0; first < g.views(); first += chunk) {
       const std::int64_t n = std::min(chunk, g.views() - first);
@@ -52,12 +56,13 @@ BoundTable make_table(opencl::State& state, Upsampler& upsampler, const Filtered
       opencl::DeviceArray<float> sup(state, count(n * d.rows_padded), "row maxima");
       row_sup({{count(d.rows_padded), count(n), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(), to_int(n),
               to_int(columns.count), to_int(d.rows_padded));
+      require_finite(sup.to_host(), term.order_u + term.order_v);
       fill({{count(columns.count), count(n), count(cells.cells_z)}, {64, 1, 1}}, maxima.buffer(),
            d.values.buffer(), sup.buffer(), device_rise.buffer(), to_int(first), to_int(n), to_int(g.views()),
            to_int(columns.count), to_int(d.rows_padded), to_int(d.rows), to_int(cells.row_step),
            to_int(cells.row_count), to_int(cells.cells_z), term.below, term.above,
-           static_cast<cl_float>(term.remainder * (1 + 0x1p-20)),
-           static_cast<cl_float>(term.weight * (1 + 0x1p-20)), &term == terms.data() ? 1 : 0);
+           term.remainder > 0 ? round_up(term.remainder * (1 + 0x1p-20)) : 0.0f,
+           round_up(term.weight * (1 + 0x1p-20)), &term == terms.data() ? 1 : 0);
     }
   }
 
@@ -188,14 +193,15 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
     }
   const opencl::DeviceArray<cl_float4> device_steps(state, std::span<const cl_float4>(steps),
                                                     "cell positions");
+  // A table's entry is a sum of up to three products.
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_float>
+                 cl_float, cl_float>
       kernel(state, "gold_bounds", "project_bound");
   kernel({{count(cells.x), count(cells.y), count(cells.z) * blocks.first.size()}, {8, 8, 1}}, bound.buffer(),
          table.values.buffer(), device_steps.buffer(), to_int(g.views()), to_int(table.columns.count),
          to_int(cells.x), to_int(cells.y), to_int(cells.z),
          to_int(static_cast<std::int64_t>(blocks.first.size())), to_int(cells.first_z),
-         static_cast<cl_float>(table.factor));
+         round_up(table.factor), static_cast<cl_float>(g.views()) * std::numeric_limits<cl_float>::min() * 3);
 }
 
 std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,

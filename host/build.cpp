@@ -17,6 +17,7 @@
 #include "host/raise_levels.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
+#include "host/units.hpp"
 #include "host/worst_node.hpp"
 #include "vdvr/error.hpp"
 
@@ -60,11 +61,13 @@ std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b,
   return selected;
 }
 
+// All but the scan, and what is thrown, in `units`.
 class Builder {
  public:
-  Builder(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
-          const Progress& progress)
+  Builder(Device& device, const ProjectionSet& scan, const Units& units, const Plan& plan,
+          const BuildOptions& options, const Progress& progress)
       : state_(device.state()),
+        units_(units),
         plan_(plan),
         progress_(progress),
         journal_(options.journal),
@@ -92,8 +95,8 @@ class Builder {
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
       throw InputError("--roi meets no brick of the grid");
 
-    filtered_ = filter_projections(state_, scan, plan.field, progress);
-    measure_filter_error(filtered_, scan, plan.field);
+    filtered_ = filter_projections(state_, scan, plan.field, progress, FilterMethod::automatic, units);
+    measure_filter_error(filtered_, scan, plan.field, units);
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);
@@ -115,8 +118,9 @@ class Builder {
   /// Puts the base on the lattice of integer samples; before it is measured.
   void choose_storage(StorageChoice storage) {
     bricks_.base = plan_.fitted.empty() ? take_base(plan_.base, plan_.coarsening) : plan_.fitted;
-    bricks_.lattice = choose_lattice(
-        bricks_.base, storage, most_rounding(plan_.epsilon_abs, plan_.settings.levels == "anisotropic"));
+    bricks_.lattice = choose_lattice(bricks_.base, storage,
+                                     most_rounding(plan_.epsilon_abs, plan_.settings.levels == "anisotropic"),
+                                     units_.density());
     round_base(bricks_.base, bricks_.lattice);
   }
   bool rounds() const { return bricks_.lattice.step > 0; }
@@ -206,9 +210,10 @@ class Builder {
     throw ToleranceError(
         fmt::format("epsilon {:.4g} is out of reach at these rates: interpolating {} alone may err by {:.4g} "
                     "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
-                    plan_.epsilon_abs, projection ? "the projections" : "gold", slack, strict,
+                    to_world(plan_.epsilon_abs, units_), projection ? "the projections" : "gold",
+                    to_world(static_cast<double>(slack), units_), to_world(strict, units_),
                     projection ? "--upsampling, or take --u-filter cubic," : "--gold",
-                    plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict)));
+                    to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict), units_)));
   }
 
   // Levels only rise. A brick that was found over the tolerance stays so until it changes: what was raised
@@ -227,6 +232,7 @@ class Builder {
   }
 
   opencl::State& state_;
+  Units units_;
   const Plan& plan_;
   const Progress& progress_;
   Journal* journal_;
@@ -316,19 +322,16 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   return c;
 }
 
-}  // namespace
-
-BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
-                  const Progress& progress) {
-  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 &&
-      options.granularity != 8)
-    throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
-  Builder builder(device, scan, plan, options, progress);
+// All but the scan, and what is thrown, in `units`.
+BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Plan& plan,
+                           const BuildOptions& options, const Progress& progress) {
+  Builder builder(device, scan, units, plan, options, progress);
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
   // more if that was short.
   const FieldSlopes base_slopes = field_slopes(as_mixed(plan.base));
+  const double underflow = from_world(sampler_underflow(device.info()), units);
   SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), longest_atlas(device.info()),
-                                       plan.epsilon_abs, plan.gold_rate);
+                                       plan.epsilon_abs, plan.gold_rate, underflow);
   const auto scale = [](SamplerTerms& t, double f) {
     t.buffer.value *= f;
     if (t.image3d) t.image3d->value *= f;
@@ -339,7 +342,7 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
     if (!(tolerance > 0)) {
       throw ToleranceError(
           fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
-                      plan.epsilon_abs, plan.epsilon_abs - tolerance));
+                      to_world(plan.epsilon_abs, units), to_world(plan.epsilon_abs - tolerance, units)));
     }
     if (attempt == 0 && options.journal)
       options.journal->begin(journal_head(device, scan, plan, options, builder.stream(), tolerance));
@@ -357,9 +360,9 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
       builder.choose_storage(StorageChoice::f32);
       continue;
     }
-    const SamplerTerms sampler =
-        sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(),
-                      atlas_length(device.info(), result.volume), plan.epsilon_abs, plan.gold_rate);
+    const SamplerTerms sampler = sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(),
+                                               atlas_length(device.info(), result.volume), plan.epsilon_abs,
+                                               plan.gold_rate, underflow);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt >= 2 || is_comparison(plan.settings, options)) {
@@ -369,6 +372,27 @@ BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, c
     reserve = sampler;
     scale(reserve, 1.25);
   }
+}
+
+}  // namespace
+
+BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
+                  const Progress& progress) {
+  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 &&
+      options.granularity != 8)
+    throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
+  if (units.are_world()) return build_in_units(device, scan, units, plan, options, progress);
+  BuildOptions wanted = options;
+  if (options.roi) wanted.roi = from_world(*options.roi, units);
+  if (options.window)
+    wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
+  BuildResult result = build_in_units(device, scan, units, from_world(plan, units), wanted, progress);
+  scale(result.volume, units.density());
+  result.volume.grid = plan.grid;
+  result.certificate = to_world(std::move(result.certificate), units);
+  return result;
 }
 
 }  // namespace vdvr

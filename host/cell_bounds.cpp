@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host/reconstruct_field.hpp"
+#include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
@@ -84,6 +85,7 @@ void CellBounds::compute(const SlabShape& slab, const FirstBricks& first_brick) 
     if (p_[cell] >= 0) return;
     p_[cell] = p[i];
     remainder_[cell] = r[i];
+    if (!(p[i] >= 0 && r[i] >= 0)) throw InputError("a bound of the scan's derivatives is not a number");
   });
 }
 

@@ -19,7 +19,8 @@ Coverage::Coverage(const ParallelGeometry& g)
       inner_(std::min(-t_min_, t_max_)),
       half_height_(0.5 * static_cast<double>(g.rows - 1) * g.pitch_v),
       // A point exactly on the detector's edge counts as covered whatever the rounding of its t.
-      slack_(1e-9 * g.pitch_u) {
+      slack_(1e-9 * g.pitch_u),
+      slack_z_(1e-9 * g.pitch_v) {
   if (!(inner_ > 0))
     throw InputError(fmt::format("the centre {} does not fall on the detector's {} columns; correct --center",
                                  g.center, g.columns));
@@ -40,7 +41,7 @@ double Coverage::margin(double x, double y) const {
   return margin + slack_;
 }
 
-double Coverage::margin_z(double z) const { return half_height_ - std::abs(z) + slack_; }
+double Coverage::margin_z(double z) const { return half_height_ - std::abs(z) + slack_z_; }
 
 double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point) {
   ParallelGeometry g = geometry;

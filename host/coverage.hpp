@@ -24,7 +24,7 @@ class Coverage {
 
  private:
   std::vector<double> cosine_, sine_;
-  double t_min_, t_max_, inner_, half_height_, slack_;
+  double t_min_, t_max_, inner_, half_height_, slack_, slack_z_;
 };
 
 }  // namespace vdvr

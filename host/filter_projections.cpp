@@ -60,7 +60,7 @@ void copy_rows(const float* column, std::span<const std::int64_t> rows, std::siz
 }
 
 // What every view's error is bounded by, and the largest filtered samples; refuses what is not finite.
-void measure_views(FilteredScan& out, const ProjectionSet& scan, const ViewWeights& weights,
+void measure_views(FilteredScan& out, std::span<const float> data, const ViewWeights& weights,
                    const RowFilter& filter) {
   const ParallelGeometry& g = out.geometry;
   const std::size_t per_view = static_cast<std::size_t>(g.rows * g.columns);
@@ -70,7 +70,7 @@ void measure_views(FilteredScan& out, const ProjectionSet& scan, const ViewWeigh
     for (std::int64_t v = 0; v < g.rows; ++v) {
       double norm = 0;
       for (std::int64_t u = 0; u < g.columns; ++u) {
-        const double p = scan.data[k * per_view + static_cast<std::size_t>(v * g.columns + u)];
+        const double p = data[k * per_view + static_cast<std::size_t>(v * g.columns + u)];
         norm += p * p;
       }
       if (!(std::sqrt(norm) <= norms[k])) norms[k] = std::sqrt(norm);  // NaN stays
@@ -91,7 +91,8 @@ void measure_views(FilteredScan& out, const ProjectionSet& scan, const ViewWeigh
 }
 
 // The scan's geometry with the centre in use.
-ParallelGeometry centred(ParallelGeometry geometry, const FieldOptions& field) {
+ParallelGeometry used_geometry(const ProjectionSet& scan, const FieldOptions& field, const Units& units) {
+  ParallelGeometry geometry = from_world(scan.geometry, units);
   if (field.center) geometry.center = *field.center;
   return geometry;
 }
@@ -111,10 +112,16 @@ UpsampledSlab empty_slab(opencl::State& state, const UpsampledColumns& columns, 
 
 }  // namespace
 
+LineIntegrals::LineIntegrals(const ProjectionSet& scan, const Units& units) : scan_(&scan) {
+  if (units.line == 0) return;
+  scaled_ = scan.data;
+  scale(scaled_, -units.line);
+}
+
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                                const Progress& progress, FilterMethod method) {
+                                const Progress& progress, FilterMethod method, const Units& units) {
   FilteredScan out;
-  out.geometry = centred(scan.geometry, field);
+  out.geometry = used_geometry(scan, field, units);
   const ParallelGeometry& g = out.geometry;
   const ViewWeights weights = view_weights(g.theta_rad);
   out.limited_angle = weights.limited_angle;
@@ -124,18 +131,22 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
   const std::vector<float> view_weight(weights.weight.begin(), weights.weight.end());
   out.samples = large_zeros(static_cast<std::size_t>(scan.size()));
   out.view_max.assign(static_cast<std::size_t>(g.views()), 0.0);
-  (*filter)(scan.data, view_weight, out.samples, progress);
-  measure_views(out, scan, weights, *filter);
+  const LineIntegrals line_integrals(scan, units);
+  (*filter)(line_integrals.data(), view_weight, out.samples, progress);
+  measure_views(out, line_integrals.data(), weights, *filter);
   return out;
 }
 
-void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field) {
+void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field,
+                          const Units& units) {
   const ParallelGeometry& g = filtered.geometry;
   const double cost = static_cast<double>(scan.size()) * static_cast<double>(g.columns);
   if (cost > 4e9) return;
   const auto kernel = ramp_kernel(field, g.pitch_u, g.columns);
   const ViewWeights weights = view_weights(g.theta_rad);
   const std::size_t U = static_cast<std::size_t>(g.columns), V = static_cast<std::size_t>(g.rows);
+  const LineIntegrals line_integrals(scan, units);
+  const std::span<const float> data = line_integrals.data();
   std::vector<double> both(2 * U - 1),
       error(static_cast<std::size_t>(g.views()));  // the kernel at -(U-1) .. U-1
   for (std::size_t i = 0; i < both.size(); ++i) both[i] = kernel[i < U ? U - 1 - i : i - U + 1];
@@ -145,7 +156,7 @@ void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, con
     for (std::size_t v = 0; v < V; ++v) {
       std::fill(row.begin(), row.end(), 0.0);
       for (std::size_t m = 0; m < U; ++m) {
-        const double p = static_cast<double>(scan.data[(k * V + v) * U + m]);
+        const double p = static_cast<double>(data[(k * V + v) * U + m]);
         const double* shifted = both.data() + (U - 1 - m);
         for (std::size_t i = 0; i < U; ++i) row[i] += shifted[i] * p;
       }
@@ -157,7 +168,7 @@ void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, con
   filtered.ramp_error = 0;
   double kernel_sum = 0, largest = 0;
   for (const double g_i : both) kernel_sum += std::abs(g_i);
-  for (const float p : scan.data) largest = std::max(largest, std::abs(static_cast<double>(p)));
+  for (const float p : data) largest = std::max(largest, std::abs(static_cast<double>(p)));
   for (std::size_t k = 0; k < error.size(); ++k)  // the reference rounds too: U terms of double precision
     filtered.ramp_error +=
         error[k] + static_cast<double>(U) * 0x1p-52 * weights.weight[k] * kernel_sum * largest;
@@ -170,8 +181,9 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
          opencl::round_up(static_cast<std::uint64_t>(rows), lanes) * sizeof(float);
 }
 
-DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field)
-    : state_(&state), scan_(&scan), geometry_(centred(scan.geometry, field)) {
+DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                           const Units& units)
+    : state_(&state), data_(scan, units), geometry_(used_geometry(scan, field, units)) {
   const ViewWeights weights = view_weights(geometry_.theta_rad);
   weights_.assign(weights.weight.begin(), weights.weight.end());
   filter_ = make_row_filter(state, geometry_, ramp_kernel(field, geometry_.pitch_u, geometry_.columns),
@@ -185,7 +197,7 @@ std::optional<UpsampledSlab> DirectFilter::operator()(const UpsampledColumns& co
   const auto v = pixels_at(rows, g.rows, 0);
   if (columns.rate != 1 || columns.first != 0 || columns.pad > g.columns || v.empty()) return std::nullopt;
   UpsampledSlab slab = empty_slab(*state_, columns, v.size(), 0, g.views());
-  if (!filter_->to_device(scan_->data, weights_, {&slab.values, -columns.pad, columns.count, v}, progress))
+  if (!filter_->to_device(data_.data(), weights_, {&slab.values, -columns.pad, columns.count, v}, progress))
     return std::nullopt;
   return slab;
 }

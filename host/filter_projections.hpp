@@ -14,6 +14,7 @@
 #include "host/cosine_series.hpp"
 #include "host/filter_rows.hpp"
 #include "host/opencl/array.hpp"
+#include "host/units.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -22,7 +23,7 @@ namespace vdvr {
 
 /// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
 struct FilteredScan {
-  ParallelGeometry geometry;     ///< with the centre in use
+  ParallelGeometry geometry;     ///< with the centre in use, in the units of the samples
   std::vector<float> samples;    ///< [view][u][v]
   std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
   std::vector<double> view_max;  ///< max |q| of each view's samples
@@ -31,15 +32,31 @@ struct FilteredScan {
   bool limited_angle = false;
 };
 
-/// Cost: as RowFilter's. Memory: the filtered scan on the host, one chunk on
-/// the device.
+/// Geometry and samples are in `units`. Cost: as RowFilter's. Memory: the filtered scan on the host, one
+/// chunk on the device; where line integrals are scaled, those once more.
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                                const Progress& progress = {}, FilterMethod method = FilterMethod::automatic);
+                                const Progress& progress = {}, FilterMethod method = FilterMethod::automatic,
+                                const Units& units = {});
 
 /// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision,
 /// view by view, where that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps
 /// the bound.
-void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field);
+void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field,
+                          const Units& units = {});
+
+/// A scan's line integrals in other units: its own data, unless these have to be scaled.
+class LineIntegrals {
+ public:
+  /// Keeps a reference to the scan.
+  LineIntegrals(const ProjectionSet& scan, const Units& units);
+  [[nodiscard]] std::span<const float> data() const {
+    return scaled_.empty() ? std::span<const float>(scan_->data) : std::span<const float>(scaled_);
+  }
+
+ private:
+  const ProjectionSet* scan_;
+  std::vector<float> scaled_;
+};
 
 /// float values[row / 16][view][column][16]: one slab of rows, upsampled in u.
 struct UpsampledSlab {
@@ -56,8 +73,9 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
 /// products: the filtered scan stays on the device. The values are those of filter_projections and Upsampler.
 class DirectFilter {
  public:
-  /// Keeps references to the state and the scan.
-  DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field);
+  /// Keeps references to the state and the scan. Samples are in `units`.
+  DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+               const Units& units = {});
   DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
   DirectFilter& operator=(const DirectFilter&) = delete;
   /// Nothing where the slab needs upsampling. Cost: views * rows * columns^2 multiply-adds, or half of them.
@@ -67,7 +85,7 @@ class DirectFilter {
 
  private:
   opencl::State* state_;
-  const ProjectionSet* scan_;
+  LineIntegrals data_;
   ParallelGeometry geometry_;
   std::vector<float> weights_;
   std::unique_ptr<RowFilter> filter_;

@@ -27,6 +27,7 @@
 #include "host/opencl/kernel.hpp"
 #include "host/projection_bounds.hpp"
 #include "host/search_triples.hpp"
+#include "shared/untested.h"
 #include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -34,10 +35,10 @@
 namespace vdvr {
 
 /// How far F may lie above and below gold's interpolant in the gold cells around a node: T + P to either
-/// side. Negative where the node is not tested.
+/// side.
 struct Slack {
-  float above = -1, below = -1;
-  [[nodiscard]] bool tested() const { return above >= 0; }
+  float above = VDVR_UNTESTED, below = VDVR_UNTESTED;
+  [[nodiscard]] bool tested() const { return above != VDVR_UNTESTED; }
   /// The most that |V - F| may be around a node where V - gold is `difference`.
   [[nodiscard]] float total(float difference) const {
     return std::max(difference + below, above - difference);

@@ -8,6 +8,7 @@
 
 #include "host/gold_stream.hpp"
 #include "host/reconstruct_field.hpp"
+#include "host/units.hpp"
 
 namespace vdvr {
 namespace {
@@ -110,14 +111,13 @@ double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
   return worst;
 }
 
-}  // namespace
-
-Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
-                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
-                            const Progress& progress) {
+// All but the scan in `units`.
+Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+                           const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
+                           const Progress& progress) {
   opencl::State& state = device.state();
-  FilteredScan filtered = filter_projections(state, scan, field);
-  measure_filter_error(filtered, scan, field);
+  FilteredScan filtered = filter_projections(state, scan, field, {}, FilterMethod::automatic, units);
+  measure_filter_error(filtered, scan, field, units);
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto stream_at = [&](int up, const std::string& filter, int gold) {
@@ -174,6 +174,20 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
     report(progress, "truth", static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
   }
   return out;
+}
+
+}  // namespace
+
+Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
+                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
+                            const Progress& progress) {
+  const Units units = units_of(scan);
+  Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, upsampling, u_filter,
+                                 rate, progress);
+  for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_nodes, &t.projection_cells,
+                        &t.projection_error, &t.arithmetic})
+    *value = to_world(*value, units);
+  return t;
 }
 
 }  // namespace vdvr

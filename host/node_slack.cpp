@@ -5,6 +5,7 @@
 
 #include "host/back_project.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/round_up.hpp"
 
 namespace vdvr {
 namespace {
@@ -49,7 +50,7 @@ void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::in
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> expand(
       state_, "gold_bounds", "expand_bound");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float, cl_int, cl_float, cl_float>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_float, cl_float>
       cell_slack(state_, "gold_bounds", "cell_slack");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_int>
@@ -75,9 +76,8 @@ void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::in
   cell_slack({{count((b.nz + 15) / 16), count(b.nx - 1), count((b.ny - 1) * b.count)}, local},
              cells_above_.buffer(), cells_below_.buffer(), gold.buffer(), rows_.buffer(), nx, ny, nz,
              to_int(b.halo), to_int(b.gold_stride), stride, settings_.rate, cells_x, cells_y, blocks,
-             settings_.grid_only ? 0.0f : 1.0f, static_cast<cl_float>(1.5 * rounding_),
-             settings_.window ? 1 : 0, static_cast<cl_float>(window.first),
-             static_cast<cl_float>(window.second));
+             settings_.grid_only ? 0 : 1, round_up(1.5 * rounding_), settings_.window ? 1 : 0,
+             static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
   node_slack({{count((b.nz + 15) / 16), count(b.nx), count(b.ny * b.count)}, local}, above.buffer(),
              below.buffer(), cells_above_.buffer(), cells_below_.buffer(), margin.buffer(), last.buffer(), nx,
              ny, nz, to_int(b.halo), stride, blocks, b.lowest, to_int(b.z_first), to_int(b.z_last));
@@ -92,7 +92,7 @@ void NodeSlack::operator()(const GoldBlocks& blocks,
   cells_.look_up(slab_, first_brick, settings_.rate, of_cells, addend);
   // Second differences of computed gold miss by up to 1.5 P more than P itself (section 5).
   for (std::size_t i = 0; i < addend.size(); ++i)
-    addend[i] = (2.5f * of_cells[i] + std::min(addend[i], static_cast<float>(remainder_))) * (1 + 0x1p-22f);
+    addend[i] = (2.5f * of_cells[i] + std::min(addend[i], round_up(remainder_))) * (1 + 0x1p-22f);
   p.write(of_cells);
   addend_.write(addend);
   launch(blocks, first_brick, gold, margin, above, below);

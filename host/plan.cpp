@@ -17,6 +17,7 @@
 #include "host/paper_bounds.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
+#include "host/units.hpp"
 #include "host/volume_problem.hpp"
 #include "vdvr/error.hpp"
 
@@ -241,12 +242,16 @@ std::pair<double, double> covered_values(const Volume& volume, const Coverage& c
   return {low, high};
 }
 
-void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
+void check_tolerance(const Tolerance& tolerance) {
   if (tolerance.relative.has_value() == tolerance.absolute.has_value())
     throw InputError("give one of --epsilon and --epsilon-abs");
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   if (!(given > 0) || !std::isfinite(given))
     throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
+}
+
+void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
+  const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   plan.epsilon = given;
   plan.epsilon_abs = given * plan.reference_range;
   if (tolerance.absolute || tolerance.of_max) {
@@ -289,12 +294,10 @@ double largest_of_gold(opencl::State& state, const FilteredScan& filtered, Upsam
   return static_cast<double>(largest);
 }
 
-}  // namespace
-
-Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
-               const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
-               const Progress& progress) {
-  check_rates(rates);
+// All but the scan, and what is thrown, in `units`.
+Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+                   const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
+                   const PlanSettings& settings, const Progress& progress) {
   ParallelGeometry used = scan.geometry;
   if (field.center) used.center = *field.center;
   opencl::State& state = device.state();
@@ -310,14 +313,15 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   const auto now = [] { return std::chrono::steady_clock::now(); };
   const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
   auto start = now();
-  FilteredScan filtered = filter_projections(state, scan, field);
-  measure_filter_error(filtered, scan, field);
+  FilteredScan filtered = filter_projections(state, scan, field, {}, FilterMethod::automatic, units);
+  measure_filter_error(filtered, scan, field, units);
   double preparation = since(start);  // that build will repeat
   Upsampler upsampler(state, filtered);
   const Coverage coverage(filtered.geometry);
 
   // The reference range at rates whose own error cannot matter.
   plan.base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
+  check_densities(to_world(largest_magnitude(plan.base.samples), units));
   std::int64_t not_covered = 0;
   auto [low, high] = covered_values(plan.base, coverage, not_covered);
   plan.not_covered_count = not_covered;
@@ -386,9 +390,11 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     throw ToleranceError(fmt::format(
         "epsilon {:.4g} is out of reach: at upsampling {} {}, gold {}, {} may err by {:.4g} and rounding by "
         "{:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
-        plan.epsilon_abs, finest->first.upsampling, finest->first.u_filter, finest->first.gold,
-        t.projection > t.gold ? "interpolating the projections" : "interpolating gold", t.slack, t.arithmetic,
-        1.1 * t.slack + 4 * t.arithmetic, 100 * (1.1 * t.slack + 4 * t.arithmetic) / plan.reference_range));
+        to_world(plan.epsilon_abs, units), finest->first.upsampling, finest->first.u_filter,
+        finest->first.gold, t.projection > t.gold ? "interpolating the projections" : "interpolating gold",
+        to_world(t.slack, units), to_world(t.arithmetic, units),
+        to_world(1.1 * t.slack + 4 * t.arithmetic, units),
+        100 * (1.1 * t.slack + 4 * t.arithmetic) / plan.reference_range));
   }
   const auto& [r, t] = *chosen;
   plan.upsampling_u = r.upsampling;
@@ -427,6 +433,24 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan.base.samples.size();
   }
   report(progress, "plan", 1.0);
+  return plan;
+}
+
+}  // namespace
+
+Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
+               const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
+               const Progress& progress) {
+  check_rates(rates);
+  check_tolerance(tolerance);
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
+  Tolerance wanted = tolerance;
+  if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
+  Plan plan = to_world(
+      plan_in_units(device, scan, units, from_world(grid, units), field, rates, wanted, settings, progress),
+      units);
+  plan.grid = plan.base.grid = grid;
   return plan;
 }
 

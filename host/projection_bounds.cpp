@@ -2,6 +2,8 @@
 // (docs/error-bounds.md).
 #include "host/projection_bounds.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -37,12 +39,13 @@ double product_error(std::int64_t n) { return 18 + static_cast<double>(n) / 16; 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
 // The largest |d| of every view of a slab of derivatives.
-std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d) {
+std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
   RowSup row_sup(state, "gold_bounds", "row_sup");
   opencl::DeviceArray<float> sup(state, count(d.views * d.rows_padded), "row maxima");
   row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(),
           to_int(d.views), to_int(d.columns.count), to_int(d.rows_padded));
   const auto host = sup.to_host();
+  require_finite(host, order);
   std::vector<double> out(static_cast<std::size_t>(d.views));
   for (std::size_t k = 0; k < out.size(); ++k)
     for (std::int64_t z = 0; z < d.rows; ++z)
@@ -53,6 +56,13 @@ std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d) {
 }
 
 }  // namespace
+
+void require_finite(const std::vector<float>& sups, int order) {
+  if (std::all_of(sups.begin(), sups.end(), [](float s) { return std::isfinite(s); })) return;
+  throw InputError(fmt::format(
+      "the {} of the filtered projections is not finite in float32; check the scan's values and pitches",
+      order == 0 ? std::string("value") : fmt::format("{}{} derivative", order, order == 2 ? "nd" : "th")));
+}
 
 double lebesgue_constant(std::int64_t n) {
   // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
@@ -94,14 +104,14 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   };
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
-    sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n)));
-    for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n)))
+    sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
+    for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
       sups.view_second_u.push_back(rise * rise_v * m);
-    sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n)));
+    sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
     if (g.rows > 1) {
-      for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n)))
+      for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
         sups.view_second_v.push_back(rise * rise_v * m);
-      sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n)));
+      sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
     }
   }
   sups.view_second_v.resize(sups.view_second_u.size(), 0.0);  // a single row does not vary along v

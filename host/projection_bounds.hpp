@@ -29,6 +29,9 @@ struct FieldSups {
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max);
 
+/// Throws InputError where a derivative's sup is no finite number: no bound can be made of it.
+void require_finite(const std::vector<float>& sups, int order);
+
 /// Views per chunk so that slabs of derivatives stay near 64 MiB.
 std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows);
 

@@ -33,7 +33,7 @@ void put(std::span<const float> samples, double unit, double first, T* out) {
 
 }  // namespace
 
-Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding) {
+Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding, int density) {
   Lattice lattice;
   if (choice == StorageChoice::f32 || base.empty()) return lattice;
   const auto [lo, hi] = range_of(base);
@@ -42,7 +42,7 @@ Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double
   if (!(magnitude > 0)) magnitude = 1;
   // Two bits are left above the base's largest sample, for tiles that rise above it. Beyond these ends a
   // product would leave the normal numbers of fp32.
-  const int finest = std::clamp(ceil_log2(magnitude) - 22, -126, 103);
+  const int finest = std::clamp(ceil_log2(magnitude) - 22, -126 - density, 103 - density);
   // Room for tiles whose samples lie between the base's and exceed them.
   const double range = 1.125 * (static_cast<double>(hi) - static_cast<double>(lo));
   const auto finest_for = [&](SampleType type) {

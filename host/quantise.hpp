@@ -30,7 +30,9 @@ struct Lattice {
 /// The lattice for these base samples. u8, u16: the base's step is the finest with which 8 / 16 bits hold the
 /// range of the base and an eighth more. automatic: u8 if half of that step is at most `most_rounding`; else
 /// u16 with the coarsest step of which that holds; else float32.
-Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding);
+/// `density`: log2 of what a sample of 1 stands for in the file, whose step is a normal number of fp32.
+Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding,
+                       int density = 0);
 
 /// What `automatic` takes for `most_rounding`: a brick that coarse rounding raises by a level of one axis
 /// costs less than one raised by a level of all.

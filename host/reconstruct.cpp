@@ -18,6 +18,7 @@
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
 #include "host/reconstruct_field.hpp"
+#include "host/units.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -196,10 +197,12 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   if (options.u_filter != "linear" && options.u_filter != "cubic")
     throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
   opencl::State& state = device.state();
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;
-  if (options.upsampling == 1) direct.emplace(state, scan, options.field);
+  if (options.upsampling == 1) direct.emplace(state, scan, options.field, units);
   std::optional<FilteredScan> filtered;
   std::optional<Upsampler> upsampler;
   const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
@@ -209,7 +212,7 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
       if (slab) return std::move(*slab);
     }
     if (!filtered) {
-      filtered = filter_projections(state, scan, options.field, progress);
+      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic, units);
       watch.lap(state, "filter");
       upsampler.emplace(state, *filtered);
     }
@@ -217,10 +220,15 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
     watch.lap(state, "upsample");
     return slab;
   };
-  ParallelGeometry geometry = scan.geometry;
+  ParallelGeometry geometry = from_world(scan.geometry, units);
   if (options.field.center) geometry.center = *options.field.center;
-  return reconstruct_slabs(state, geometry, make_slab, grid, options.upsampling, options.u_filter, progress,
-                           watch);
+  Volume volume = reconstruct_slabs(state, geometry, make_slab, from_world(grid, units), options.upsampling,
+                                    options.u_filter, progress, watch);
+  if (units.are_world()) return volume;
+  volume.grid = grid;
+  check_densities(to_world(largest_magnitude(volume.samples), units));
+  scale(volume.samples, units.density());
+  return volume;
 }
 
 }  // namespace vdvr

@@ -55,7 +55,7 @@ FieldSlopes field_slopes(const MixedVolume& v) {
 }
 
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
-                           std::int64_t atlas_length, double node_error, int rate) {
+                           std::int64_t atlas_length, double node_error, int rate, double underflow) {
   constexpr double u = 0x1p-24;
   SamplerTerms terms;
   // Seven lerps of two rounded products and one rounded sum each, on three levels: 14 u of the largest sample
@@ -63,7 +63,7 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
   // the slope per cell, in whichever brick it ends. Where integer samples leave a step between bricks, it is
   // F whose slope counts beyond the face: at most V's and what the node error adds over a gold cell.
   const double seam = slopes.integers ? 6 * static_cast<double>(rate) * node_error : 0;
-  double coordinates = 0;
+  double coordinates = underflow;
   for (std::size_t a = 0; a < 3; ++a)
     coordinates += 2 * u * static_cast<double>(grid.cells[a]) * (slopes.per_cell[a] + seam);
   double magnitude = 0, image = 0;
@@ -88,6 +88,12 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
                     std::max({probe.delta, probe.u16.delta, probe.u8.delta}),
                     probe.largest_constant_error())};
   return terms;
+}
+
+double sampler_underflow(const DeviceInfo& device) {
+  // A sample as it is stored and decoded, and two products and a sum on each of three levels of
+  // interpolation.
+  return 16 * (device.subnormals ? 0x1p-149 : 0x1p-126);
 }
 
 std::int64_t longest_atlas(const DeviceInfo& device) {

@@ -29,9 +29,13 @@ FieldSlopes field_slopes(const MixedVolume& volume);
 /// The largest over the bricks. buffer: fp32 rounding of the coordinate and of seven interpolations. image3d:
 /// the texture unit's weights and products, as probed; absent where the device has no such sampler or
 /// `atlas_length` is 0. `node_error`: what |V - F| may be at the gold nodes, and `rate`: theirs; both are
-/// used where bricks meet with integer samples.
+/// used where bricks meet with integer samples. `underflow`: sampler_underflow() in the units of the samples.
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
-                           std::int64_t atlas_length, double node_error, int rate);
+                           std::int64_t atlas_length, double node_error, int rate, double underflow = 0);
+
+/// What a sampler may lose below the normal numbers of fp32, in world units, in which it works; on a device
+/// that flushes those to 0, more.
+double sampler_underflow(const DeviceInfo& device);
 
 /// The longest side of an image atlas that a volume may be packed into.
 std::int64_t longest_atlas(const DeviceInfo& device);

@@ -179,6 +179,16 @@ class Simulator {
     return *std::max_element(of_view.begin(), of_view.end());
   }
 
+  static float in_float32(double value) {
+    constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
+    if (!(std::abs(value) <= most))
+      throw InputError(
+          fmt::format("a line integral of {:.3g} does not fit float32, which ends at {:.3g}: lower the "
+                      "phantom's densities, or state lengths in another unit",
+                      value, most));
+    return static_cast<float>(value);
+  }
+
   void run(double noise, double from, const Progress& progress, std::vector<float>& data) {
     const auto size = static_cast<std::size_t>(options_.columns * options_.rows);
     ViewLoop(options_.angles, threads_)
@@ -186,8 +196,7 @@ class Simulator {
             [&](std::int64_t k, const ViewLoop& loop) {
               const View view = detected(project(k, loop), noise, k);
               std::transform(view.data.begin(), view.data.end(),
-                             data.begin() + static_cast<std::ptrdiff_t>(size) * k,
-                             [](double value) { return static_cast<float>(value); });
+                             data.begin() + static_cast<std::ptrdiff_t>(size) * k, in_float32);
             },
             [&](double done) { report(progress, "simulate", from + (1 - from) * done); });
   }

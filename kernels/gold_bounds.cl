@@ -7,8 +7,10 @@
 // cell z at z + 1; slack float[block][y][x][stride], node z at z. Called by host/node_slack.cpp and
 // host/bound_table.cpp.
 #include "shared/largest.h"
+#include "shared/untested.h"
 
-#define UNTESTED (-1e30f)
+// Maxima drop NaN: what is no number counts as infinite.
+inline float finite_or_infinite(float v) { return v <= FLT_MAX ? v : INFINITY; }
 
 // Largest |d| over the columns of every row: sup[view][z].
 __kernel void row_sup(__global float* sup, __global const float* d, int views, int columns, int z_padded) {
@@ -16,7 +18,7 @@ __kernel void row_sup(__global float* sup, __global const float* d, int views, i
   if (z >= z_padded || k >= views) return;
   __global const float* p = d + ((size_t)(z / 16) * views + k) * columns * 16 + z % 16;
   float largest = 0.0f;
-  for (int n = 0; n < columns; ++n) largest = fmax(largest, fabs(p[(size_t)n * 16]));
+  for (int n = 0; n < columns; ++n) largest = fmax(largest, finite_or_infinite(fabs(p[(size_t)n * 16])));
   sup[(size_t)k * z_padded + z] = largest;
 }
 
@@ -67,10 +69,11 @@ __kernel void dilate_table(__global float2* out, __global const float2* table, _
 
 // The bound of each cell: for each view the dilated table's entry under the cell's centre.
 // first_z: the table's cell that the blocks begin at.
-// steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}.
+// steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}. `lost`: what products
+// of all views can have lost below the normal numbers.
 __kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps,
                             int views, int columns, int cells_x, int cells_y, int cells_z, int blocks,
-                            int first_z, float factor) {
+                            int first_z, float factor, float lost) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / cells_z, z = (int)get_global_id(2) - block * cells_z;
   if (x >= cells_x || y >= cells_y || block >= blocks) return;
@@ -80,7 +83,8 @@ __kernel void project_bound(__global float* p, __global const float2* table, __g
     const int n = clamp((int)floor(step.z + step.x * (float)x + step.y * (float)y), 0, columns - 1);
     sum += table[((size_t)(first_z + z) * views + k) * columns + n];
   }
-  p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = factor * fmax(sum.x, sum.y);
+  const float bound = factor * (fmax(sum.x, sum.y) + lost) + FLT_MIN;
+  p[(((size_t)block * cells_z + z) * cells_y + y) * cells_x + x] = finite_or_infinite(bound);
 }
 
 // A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the
@@ -126,16 +130,16 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
 // lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
 // axis, / 8, `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by
 // base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
-// window, are UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
+// window, are VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
 // room.
 __kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
                          __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
-                         int stride, int rate, int cells_x, int cells_y, int blocks, float counted,
+                         int stride, int rate, int cells_x, int cells_y, int blocks, int counted,
                          float t_constant, int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
-    return;  // one cell more than there is: it must be marked UNTESTED
+    return;  // one cell more than there is: it must be marked VDVR_UNTESTED
   const int row = (nx + 2 * halo) * gold_stride;
   __global const float* at =
       gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row + (size_t)(x + halo) * gold_stride + z + halo;
@@ -153,16 +157,18 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
     // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
     out |= (low - below > window_high) | (high + above < window_low);
   }
-  // In this order: what is not counted must not make UNTESTED a tested 0.
-  above = select(above * counted, (float16)(UNTESTED), out);
-  below = select(below * counted, (float16)(UNTESTED), out);
+  // Whatever is no number here is no bound.
+  above = select((float16)(INFINITY), counted ? above : (float16)(0.0f), above <= FLT_MAX);
+  below = select((float16)(INFINITY), counted ? below : (float16)(0.0f), below <= FLT_MAX);
+  above = select(above, (float16)(VDVR_UNTESTED), out);
+  below = select(below, (float16)(VDVR_UNTESTED), out);
   const size_t column = (((size_t)block * ny + y) * nx + x) * stride;
   vstore16(above, 0, cells_above + column + z + 1);
   vstore16(below, 0, cells_below + column + z + 1);
-  if (z == 0) cells_above[column] = cells_below[column] = UNTESTED;
+  if (z == 0) cells_above[column] = cells_below[column] = VDVR_UNTESTED;
 }
 
-// Slack of each node: the largest of either of the cells around it, UNTESTED where no such cell meets the
+// Slack of each node: the largest of either of the cells around it, VDVR_UNTESTED where no such cell meets the
 // covered region. margin: per block and column the coverage margin across z; nodes with less than `lowest`
 // are untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
 __kernel void node_slack(__global float* above, __global float* below, __global const float* cells_above,
@@ -173,7 +179,7 @@ __kernel void node_slack(__global float* above, __global float* below, __global 
   const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
   if (z >= nz || x >= nx || block >= blocks) return;
   const size_t column = ((size_t)block * ny + y) * nx + x;
-  float16 a = (float16)(UNTESTED), b = a;
+  float16 a = (float16)(VDVR_UNTESTED), b = a;
   const int2 end = last[block];
   const size_t here = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
   if (margin[here] >= lowest && x <= end.x && y <= end.y) {
@@ -186,8 +192,8 @@ __kernel void node_slack(__global float* above, __global float* below, __global 
       }
     const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     const int16 out = (k < z_first) | (k > z_last) | (k > nz - 1);
-    a = select(a, (float16)(UNTESTED), out);
-    b = select(b, (float16)(UNTESTED), out);
+    a = select(a, (float16)(VDVR_UNTESTED), out);
+    b = select(b, (float16)(VDVR_UNTESTED), out);
   }
   vstore16(a, 0, above + column * stride + z);
   vstore16(b, 0, below + column * stride + z);

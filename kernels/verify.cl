@@ -5,6 +5,7 @@
 // gold_bounds.cl; results [block][brick z][brick y][brick x]. Called by host/gold_batch.cpp.
 #include "shared/largest.h"
 #include "shared/mixed_sampler.h"
+#include "shared/untested.h"
 
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
 inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
@@ -74,17 +75,20 @@ __kernel void verify_nodes(volatile __global int* total, volatile __global int* 
                          vload8(0, gold_column + first_node + i);  // vdvr_lerp, eight at once
         const float8 both = fmax(e + down, up - e);
         // Untested nodes have a slack far below zero: they drop out of every maximum. NaN fails the
-        // comparison.
-        if (any((up >= 0.0f) & !((e + down <= tolerance) & (up - e <= tolerance)))) break;
+        // comparisons, and is looked at below.
+        const int8 tested = up != VDVR_UNTESTED;
+        if (any(tested & !((up >= 0.0f) & (down >= 0.0f) & (e + down <= tolerance) & (up - e <= tolerance))))
+          break;
         largest_total = fmax(largest_total, largest_of_8(both));
         largest_slack = fmax(largest_slack, largest_of_8(fmax(up, down)));
-        largest_error = fmax(largest_error, largest_of_8(select((float8)(0.0f), fabs(e), up >= 0.0f)));
+        largest_error = fmax(largest_error, largest_of_8(select((float8)(0.0f), fabs(e), tested)));
       }
       for (; i < nodes; ++i) {
         const int k = first_node + i;
-        const float up = above_column[k], down = below_column[k];
-        if (!(up >= 0.0f)) continue;
+        if (above_column[k] == VDVR_UNTESTED) continue;
         // NaN would drop out of the maxima.
+        const float up = above_column[k] >= 0.0f ? above_column[k] : INFINITY,
+                    down = below_column[k] >= 0.0f ? below_column[k] : INFINITY;
         const float difference = vdvr_lerp(low, high, (float)i * interval) - gold_column[k],
                     e = isnan(difference) ? INFINITY : difference, both = fmax(e + down, up - e);
         largest_total = fmax(largest_total, both);

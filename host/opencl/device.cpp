@@ -133,6 +133,7 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int 
   d.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
   d.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
   d.max_work_group = static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+  d.subnormals = (device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>() & CL_FP_DENORM) != 0;
   d.images = device.getInfo<CL_DEVICE_IMAGE_SUPPORT>() == CL_TRUE;
   if (d.images) {
     d.image3d_max[0] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_WIDTH>();

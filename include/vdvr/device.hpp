@@ -16,6 +16,7 @@ struct DeviceInfo {
   int index = 0;  ///< what `--device INDEX` takes
   std::string platform, name, vendor, version, driver;
   bool is_gpu = false, is_cpu = false;
+  bool subnormals = false;          ///< float32 below 2^-126 is not flushed to 0
   bool images = false;              ///< 3D images at all
   bool linear_float_image = false;  ///< CL_R / CL_FLOAT 3D image readable with the linear filter
   bool linear_u16_image = false;    ///< the same for CL_R / CL_UNORM_INT16

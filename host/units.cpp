@@ -1,0 +1,182 @@
+#include "host/units.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "host/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+// Binary orders within which a length or a line integral is left as it is. A fourth derivative of what 1,000
+// views add up to is then below 2^10 (data) * 2^10 (views) * 2^7 (pi^4) * 2^20 (pitch^-5), and its square
+// still a number.
+constexpr int usual_pitch = 4, usual_line = 10;
+
+int exponent_of(double x, int usual) {
+  if (!(x > 0) || !std::isfinite(x)) return 0;
+  const int exponent = std::ilogb(x);
+  return std::abs(exponent) <= usual ? 0 : exponent;
+}
+
+// Calls body(first, last) for runs of samples, over all cores.
+template <class Body>
+void by_runs(std::size_t samples, Body&& body) {
+  constexpr std::size_t run = 1 << 18;
+  parallel_for(static_cast<std::int64_t>((samples + run - 1) / run), {}, "", [&](std::int64_t i) {
+    const std::size_t first = static_cast<std::size_t>(i) * run;
+    body(first, std::min(samples, first + run));
+  });
+}
+
+void scale(std::optional<double>& value, int exponent) {
+  if (value) value = std::ldexp(*value, exponent);
+}
+
+void scale(ErrorBudget& b, int exponent) {
+  for (ErrorTerm* term : {&b.grid, &b.gold, &b.projection, &b.arithmetic, &b.sampler.buffer})
+    term->value = std::ldexp(term->value, exponent);
+  if (b.sampler.image3d) b.sampler.image3d->value = std::ldexp(b.sampler.image3d->value, exponent);
+}
+
+void scale(std::vector<Bound>& bounds, int exponent) {
+  for (Bound& b : bounds) b.value = std::ldexp(b.value, exponent);
+}
+
+// What rounds below the normal numbers rounds up: a bound stays one.
+void scale_bounds(std::vector<float>& totals, int exponent) {
+  for (float& total : totals) {
+    if (total < 0) continue;  // not tested
+    const float scaled = std::ldexp(total, exponent);
+    total = std::ldexp(scaled, -exponent) < total ? std::nextafter(scaled, INFINITY) : scaled;
+  }
+}
+
+}  // namespace
+
+double largest_magnitude(const std::vector<float>& samples) {
+  float largest = 0;
+  std::mutex lock;
+  by_runs(samples.size(), [&](std::size_t first, std::size_t last) {
+    float own = 0;
+    for (std::size_t i = first; i < last; ++i) own = std::max(own, std::abs(samples[i]));
+    const std::lock_guard guard(lock);
+    largest = std::max(largest, own);
+  });
+  return static_cast<double>(largest);
+}
+
+Units units_of(const ProjectionSet& scan) {
+  Units units;
+  units.across = exponent_of(scan.geometry.pitch_u, usual_pitch);
+  units.along = exponent_of(scan.geometry.pitch_v, usual_pitch);
+  units.line = exponent_of(largest_magnitude(scan.data), usual_line);
+  return units;
+}
+
+void scale(std::vector<float>& samples, int exponent) {
+  if (exponent == 0) return;
+  by_runs(samples.size(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) samples[i] = std::ldexp(samples[i], exponent);
+  });
+}
+
+void scale(MixedVolume& volume, int exponent) {
+  if (exponent == 0) return;
+  scale(volume.base.f32, exponent);
+  for (auto& [kind, block] : volume.tiles) scale(block.f32, exponent);
+  volume.step = std::ldexp(volume.step, exponent);
+}
+
+double to_world(double density, const Units& units) { return std::ldexp(density, units.density()); }
+
+Vec3 to_world(const Vec3& point, const Units& units) {
+  return {std::ldexp(point[0], units.across), std::ldexp(point[1], units.across),
+          std::ldexp(point[2], units.along)};
+}
+
+ParallelGeometry to_world(ParallelGeometry geometry, const Units& units) {
+  geometry.pitch_u = std::ldexp(geometry.pitch_u, units.across);
+  geometry.pitch_v = std::ldexp(geometry.pitch_v, units.along);
+  return geometry;
+}
+
+Grid to_world(Grid grid, const Units& units) {
+  grid.origin = to_world(grid.origin, units);
+  grid.spacing = to_world(grid.spacing, units);
+  return grid;
+}
+
+std::array<double, 6> to_world(const std::array<double, 6>& box, const Units& units) {
+  const Vec3 low = to_world(Vec3{box[0], box[1], box[2]}, units),
+             high = to_world(Vec3{box[3], box[4], box[5]}, units);
+  return {low[0], low[1], low[2], high[0], high[1], high[2]};
+}
+
+Plan to_world(Plan plan, const Units& units) {
+  const int density = units.density();
+  plan.grid = to_world(plan.grid, units);
+  plan.base.grid = to_world(plan.base.grid, units);
+  scale(plan.base.samples, density);
+  scale(plan.fitted, density);
+  plan.epsilon_abs = to_world(plan.epsilon_abs, units);
+  plan.reference_range = to_world(plan.reference_range, units);
+  scale(plan.bounds, density);
+  scale(plan.budget, density);
+  return plan;
+}
+
+Certificate to_world(Certificate c, const Units& units) {
+  const int density = units.density();
+  for (double* value :
+       {&c.epsilon_abs, &c.reference_range, &c.total_buffer, &c.measured_max, &c.measured_total})
+    *value = to_world(*value, units);
+  scale(c.total_image3d, density);
+  scale(c.budget, density);
+  scale(c.bounds, density);
+  scale_bounds(c.brick_totals, density);
+  // The largest of the bricks' is the volume's: where they were rounded up, so is that.
+  double more = 0;
+  for (const float total : c.brick_totals)
+    more = std::max(more, static_cast<double>(total) * (1 - 0x1p-21) - c.measured_total);
+  c.measured_total += more;
+  c.total_buffer += more;
+  c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
+  if (c.total_image3d) {
+    *c.total_image3d += more;
+    c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
+  }
+  c.worst_at = to_world(c.worst_at, units);
+  if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
+  if (c.roi) c.roi = to_world(*c.roi, units);
+  return c;
+}
+
+namespace {
+
+constexpr double smallest = 0x1p-126, largest = 0x1p126;
+
+void check(double magnitude, const char* what, const char* remedy) {
+  if (magnitude == 0 || (magnitude >= smallest && magnitude <= largest)) return;
+  throw InputError(fmt::format(
+      "{} reach {:.3g}; float32, in which scans are read and volumes stored, holds {:.3g} to {:.3g}: {}",
+      what, magnitude, smallest, largest, remedy));
+}
+
+}  // namespace
+
+void check_line_integrals(const ProjectionSet& scan) {
+  const double magnitude = largest_magnitude(scan.data);
+  if (!std::isfinite(magnitude)) return;  // refused by view, after filtering
+  check(magnitude, "the line integrals", "scale them, or state lengths in another unit");
+}
+
+void check_densities(double magnitude) {
+  check(magnitude, "the densities", "state lengths (the pitch) in another unit, or scale the line integrals");
+}
+
+}  // namespace vdvr
