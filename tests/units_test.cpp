@@ -140,12 +140,13 @@ BOOST_AUTO_TEST_CASE(reconstructions_scale_with_the_units) {
   const ProjectionSet scan = noise_scan(24, 5, 15);
   const Grid grid = small_grid(scan, {9, 8, 5});
   for (const int upsampling : {1, 4}) {
-    const Volume reference = reconstruct(device(), scan, grid, {{}, upsampling, "linear"});
+    ReconstructOptions options;
+    options.upsampling = upsampling;
+    const Volume reference = reconstruct(device(), scan, grid, options);
     for (const Units& units : many_units) {
       Volume scaled = reference;
       scale(scaled.samples, units.density());
-      const Volume v = reconstruct(device(), in_other_units(scan, units), to_world(grid, units),
-                                   {{}, upsampling, "linear"});
+      const Volume v = reconstruct(device(), in_other_units(scan, units), to_world(grid, units), options);
       BOOST_TEST((v.samples == scaled.samples));
       BOOST_TEST((v.grid.origin == to_world(grid.origin, units)));
     }
