@@ -16,6 +16,7 @@
 #include "host/host_memory.hpp"
 #include "host/raise_levels.hpp"
 #include "host/reconstruct_field.hpp"
+#include "host/region_of_interest.hpp"
 #include "host/sampler_terms.hpp"
 #include "host/units.hpp"
 #include "host/worst_node.hpp"
@@ -39,27 +40,6 @@ class Stopwatch {
   std::map<std::string, double>& seconds_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
-
-// Bricks that meet the region of interest; all where there is none.
-std::vector<std::uint8_t> bricks_in_roi(const OpenBricks& b,
-                                        const std::optional<std::array<double, 6>>& roi) {
-  const std::int64_t g = b.granularity;
-  Index3 n{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (b.grid.cells[a] + g - 1) / g;
-  std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 1);
-  if (!roi) return selected;
-  for (std::size_t i = 0; i < selected.size(); ++i) {
-    const auto brick = static_cast<std::int64_t>(i);
-    const Index3 p{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double low = b.grid.origin[a] + static_cast<double>(p[a] * g) * b.grid.spacing[a];
-      const double high = b.grid.origin[a] +
-                          static_cast<double>(std::min(b.grid.cells[a], (p[a] + 1) * g)) * b.grid.spacing[a];
-      if (high < (*roi)[a] || low > (*roi)[a + 3]) selected[i] = 0;
-    }
-  }
-  return selected;
-}
 
 // All but the scan, and what is thrown, in `units`.
 class Builder {
@@ -88,7 +68,7 @@ class Builder {
     bricks_.sampled = plan.settings.coefficients == "sampled";
     choose_storage(options.storage);
     closing_ = options.closing;
-    selected_ = bricks_in_roi(bricks_, options.roi);
+    selected_ = bricks_of(options.roi, bricks_.grid, bricks_.granularity);
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
     bricks_.samples.resize(selected_.size());
@@ -128,7 +108,7 @@ class Builder {
   // The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
   double node_tolerance(const SamplerTerms& sampler) const {
     if (stream().settings().grid_only) return plan_.epsilon_abs;
-    return plan_.epsilon_abs - stream().arithmetic() -
+    return plan_.epsilon_abs - arithmetic() -
            std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
   }
 
@@ -137,7 +117,7 @@ class Builder {
     // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
     double largest = 0;
     for (const float v : bricks_.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
-    const double strict = tolerance - std::min(2 * stream().arithmetic(), 0x1p-15 * largest);
+    const double strict = tolerance - std::min(2 * arithmetic(), 0x1p-15 * largest);
     const DeviceField base(state_, as_mixed(bricks_.base, stream().settings()));
     node_test_->classify(base, strict, classified());
     watch_.lap("classify");
@@ -169,9 +149,9 @@ class Builder {
             bricks_.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
       watch_.lap("close");
       const DeviceField field(state_, volume);
-      node_test_->measure(field, tolerance, pending, round == 0 ? "verify" : "repair");
+      node_test_->measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
       watch_.lap("verify");
-      const std::vector<std::uint8_t> raised = raise_violating();
+      const std::vector<std::uint8_t> raised = raise_violating(tolerance);
       repaired_ += std::count(raised.begin(), raised.end(), 1);
       if (std::find(raised.begin(), raised.end(), 1) == raised.end()) {
         node_test_->sharpen(field, tolerance);
@@ -201,6 +181,7 @@ class Builder {
   const FilteredScan& filtered() const { return filtered_; }
   GoldStream& stream() { return gold_->fine(); }
   [[nodiscard]] const GoldStream& stream() const { return gold_->fine(); }
+  [[nodiscard]] double arithmetic() const { return gold_->arithmetic(); }
   std::map<std::string, double>& seconds() { return seconds_; }
   std::int64_t repaired() const { return repaired_; }
 
@@ -216,15 +197,34 @@ class Builder {
                     to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict), units_)));
   }
 
+  // At the gold rate V is gold, but for the rounding of what is stored and of gold computed in other blocks.
+  [[noreturn]] void refuse_stored(float total, double tolerance) const {
+    const std::string found = fmt::format(
+        "epsilon {:.4g} is out of reach: a brick at the gold rate may err by {:.4g} of the {:.4g} "
+        "left for it, ",
+        to_world(plan_.epsilon_abs, units_), to_world(static_cast<double>(total), units_),
+        to_world(tolerance, units_));
+    if (rounds())
+      throw ToleranceError(found +
+                           fmt::format("where integer samples round by up to {:.4g}; --storage auto or "
+                                       "f32 may do",
+                                       to_world(0.5 * bricks_.lattice.step, units_)));
+    throw ToleranceError(
+        found +
+        fmt::format("where rounding in fp32 moved gold; raise --gold or allow at least "
+                    "{:.4g}",
+                    to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(total) - tolerance), units_)));
+  }
+
   // Levels only rise. A brick that was found over the tolerance stays so until it changes: what was raised
   // for it can have been a neighbour whose samples round to what they were.
-  std::vector<std::uint8_t> raise_violating() {
+  std::vector<std::uint8_t> raise_violating(double tolerance) {
     std::vector<LevelTriple> to = bricks_.level;
     for (std::size_t i = 0; i < to.size(); ++i)
       if (bricks_.involved[i] && measures()[i].violated != 0 &&
           !raise_levels(bricks_, static_cast<std::int64_t>(i), measures()[i].violated,
                         gold_->fine().settings().anisotropic ? &node_test_->along()[i] : nullptr, to))
-        refuse(measures()[i].total, plan_.epsilon_abs);
+        refuse_stored(measures()[i].total, tolerance);
     std::vector<std::uint8_t> raised(bricks_.level.size(), 0);
     for (std::size_t i = 0; i < raised.size(); ++i) raised[i] = to[i] != bricks_.level[i];
     bricks_.level = std::move(to);
@@ -275,8 +275,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.budget.projection = {builder.slack().projection, plan.u_filter == "cubic"
                                                          ? "curvature: signed sums of |q_uuuu| maxima"
                                                          : "curvature: signed sums of |q_uu| maxima"};
-  c.budget.arithmetic = {builder.stream().arithmetic(),
-                         "rounding in fp32 from the ramp filter to back-projection"};
+  c.budget.arithmetic = {builder.arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
   c.comparison = is_comparison(plan.settings, options);
@@ -309,6 +308,8 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.driver = device.info().driver;
   c.version = VDVR_VERSION;
   c.notes = plan.notes;
+  for (const std::string& note : scan.report.notes)
+    if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
   if (c.comparison)
     c.notes.push_back(fmt::format("built for comparison with {}: nothing is certified",
                                   plan.settings.terms == "grid"
@@ -350,13 +351,9 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     BuildResult result;
     try {
       result.volume = builder.close_and_measure(tolerance);
-    } catch (ToleranceError& e) {
+    } catch (const ToleranceError&) {
       // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-      if (!builder.rounds()) throw;
-      if (options.storage != StorageChoice::automatic) {
-        e.add_context("integer samples round: --storage auto or f32 may do");
-        throw;
-      }
+      if (!builder.rounds() || options.storage != StorageChoice::automatic) throw;
       builder.choose_storage(StorageChoice::f32);
       continue;
     }

@@ -62,6 +62,15 @@ GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& 
   coarse_.emplace(state, scan, upsampler, sups, settings, fine_->cells());
 }
 
+double GoldRates::arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                             const FieldSups& sups, const GoldStream& fine) {
+  GoldSettings settings = with_coarse(fine.settings());
+  if (settings.coarse_rate == 0) return fine.arithmetic();
+  settings.rate = std::exchange(settings.coarse_rate, 0);
+  const GoldStream coarse(state, scan, upsampler, sups, settings, fine.cells());
+  return std::max(fine.arithmetic(), coarse.arithmetic());
+}
+
 Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   // Inside a coarse cell the error may rise by the slack; there the fine test adds its own, a quarter.
   const bool within = passes(m, tolerance) &&
@@ -282,14 +291,15 @@ void ClassifyBricks::measure_at(GoldStream& gold, const DeviceField& field, doub
            journal_, progress_, stage);
 }
 
-void ClassifyBricks::measure(const DeviceField& field, double tolerance,
-                             const std::vector<std::uint8_t>& pending, const std::string& stage) {
+void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
+                             double tolerance, const std::vector<std::uint8_t>& pending,
+                             const std::string& stage) {
   std::vector<std::uint8_t> rest = pending;
   if (GoldStream* coarse = gold_.coarse()) {
-    // The test needs V to be trilinear in every cell of gold.
+    // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && resolves(*coarse, bricks_.level[i]) && is_easy(i, tolerance);
+      easy[i] = easy[i] && resolves(*coarse, stored.at(i)) && is_easy(i, tolerance);
     measure_at(*coarse, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
       if (coarse_verdict(m, tolerance) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;

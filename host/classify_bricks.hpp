@@ -2,6 +2,7 @@
 // (docs/error-bounds.md, section 14). Called by build.cpp and foresee.cpp.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -25,6 +26,14 @@ class GoldRates {
   [[nodiscard]] const GoldStream& fine() const { return *fine_; }
   /// None where rate < 4, where slack does not count or where a window is given.
   [[nodiscard]] GoldStream* coarse() { return coarse_ ? &*coarse_ : nullptr; }
+
+  /// fp32 error bound of any gold sample of either rate: positions in blocks of coarse gold reach farther.
+  [[nodiscard]] double arithmetic() const {
+    return std::max(fine_->arithmetic(), coarse_ ? coarse_->arithmetic() : 0.0);
+  }
+  /// The same before there are two rates: of those that a build with the settings of `fine` will take.
+  static double arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                           const FieldSups& sups, const GoldStream& fine);
 
  private:
   std::optional<GoldStream> fine_, coarse_;
@@ -54,9 +63,9 @@ class ClassifyBricks {
   /// that stay at level 0 are measured on the stored base samples, which closing does not change.
   void classify(const DeviceField& base, double tolerance, const std::vector<std::uint8_t>& near);
 
-  /// Measures a stored field, of the levels in `bricks`, on the bricks `pending`.
-  void measure(const DeviceField& field, double tolerance, const std::vector<std::uint8_t>& pending,
-               const std::string& stage);
+  /// Measures a closed field, of the levels `stored`, on the bricks `pending`.
+  void measure(const DeviceField& field, const std::vector<LevelTriple>& stored, double tolerance,
+               const std::vector<std::uint8_t>& pending, const std::string& stage);
 
   /// Tiles anew for bricks whose level rose.
   void extract(const std::vector<std::uint8_t>& raised);

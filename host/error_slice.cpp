@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "host/bitmap_font.hpp"
+#include "host/region_of_interest.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 
@@ -134,8 +135,7 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
       const Vec3 point = pixels.grid.position(at);
       const double truth = static_cast<double>(
           f.samples[static_cast<std::size_t>((at[2] * samples[1] + at[1]) * samples[0] + at[0])]);
-      const bool compared = is_covered(geometry, center, point) &&
-                            (!c.roi || brick_inside(volume, *c.roi, brick_at(volume, point))) &&
+      const bool compared = is_covered(geometry, center, point) && is_inside(c.roi, point) &&
                             (!c.window || (truth >= c.window->first && truth <= c.window->second));
       if (!compared) {
         put(result.image, left + x, top + y, kNotCompared);
@@ -155,16 +155,6 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
 }
 
 }  // namespace
-
-bool brick_inside(const MixedVolume& v, const std::array<double, 6>& box, const Index3& brick) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t first = brick[a] * v.granularity,
-                       last = std::min(v.grid.cells[a], first + v.granularity);
-    if (v.grid.origin[a] + static_cast<double>(first) * v.grid.spacing[a] < box[a]) return false;
-    if (v.grid.origin[a] + static_cast<double>(last) * v.grid.spacing[a] > box[a + 3]) return false;
-  }
-  return true;
-}
 
 ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                        const Certificate& certificate, const ErrorSliceOptions& options,
@@ -188,15 +178,8 @@ std::vector<float> bounds_of(const MixedVolume& volume, const Certificate& c, bo
   if (image3d && !c.total_image3d)
     throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
   if (!c.brick_totals.empty()) return brick_bounds(c, image3d);
-  std::vector<float> bounds(volume.level.size(),
+  return std::vector<float>(volume.level.size(),
                             static_cast<float>(image3d ? *c.total_image3d : c.total_buffer));
-  const Index3 n = volume.bricks();
-  for (std::size_t i = 0; c.roi && i < bounds.size(); ++i) {
-    const auto k = static_cast<std::int64_t>(i);
-    if (!brick_inside(volume, *c.roi, {k % n[0], k / n[0] % n[1], k / (n[0] * n[1])}))
-      bounds[i] = std::numeric_limits<float>::infinity();
-  }
-  return bounds;
 }
 
 Colour bound_colour(float bound, double epsilon) {
@@ -226,8 +209,12 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
       at[axes.across] = x;
       at[axes.down] = y;
       at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
-      const Index3 brick = brick_at(volume, pixels.grid.position(at));
-      const float bound = bounds[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])];
+      const Vec3 point = pixels.grid.position(at);
+      const Index3 brick = brick_at(volume, point);
+      const float bound =
+          is_inside(c.roi, point)
+              ? bounds[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
+              : std::numeric_limits<float>::infinity();
       put(result.image, left + x, top + y, bound_colour(bound, c.epsilon_abs));
       if (!std::isfinite(bound)) continue;
       ++result.pixels;

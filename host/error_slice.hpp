@@ -31,9 +31,6 @@ struct ErrorSlice {
   std::int64_t pixels = 0;  ///< compared: covered and, where there is a region of interest, inside it
 };
 
-/// True when the brick (x, y, z) lies wholly inside the box x0,y0,z0,x1,y1,z1.
-bool brick_inside(const MixedVolume& volume, const std::array<double, 6>& box, const Index3& brick);
-
 /// Cost: views * pixels updates, twice (a reconstruction has at least one cell across the slice). F by
 /// `reconstruct` with cubic 16x upsampling, whose own error is far below any tolerance that a volume can be
 /// certified to. Throws InputError when the slice misses the volume or the picture is too small for its

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <future>
@@ -154,6 +155,7 @@ void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& p
   scan.data.resize(static_cast<std::size_t>(raw.projections.count * size));
   std::vector<double> block(static_cast<std::size_t>(step * size));
   std::vector<std::int64_t> dead(static_cast<std::size_t>(step));
+  std::atomic<bool> rounds = false;
   for (std::int64_t first = 0; first < raw.projections.count; first += step) {
     const std::int64_t n = std::min(step, raw.projections.count - first);
     raw.projections.read(first, n, block.data());
@@ -162,7 +164,12 @@ void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& p
       if (raw.counts)
         dead[static_cast<std::size_t>(k)] =
             to_line_integrals(view, raw.rows, raw.columns, field, raw.projections.name(first + k));
-      else require_finite(view, raw, first + k);
+      else {
+        require_finite(view, raw, first + k);
+        if (std::any_of(view.begin(), view.end(),
+                        [](double p) { return static_cast<double>(static_cast<float>(p)) != p; }))
+          rounds = true;
+      }
       if (!raw.air_columns.empty()) subtract_air_background(view, raw.rows, raw.columns, raw.air_columns);
       std::transform(view.begin(), view.end(), scan.data.begin() + (first + k) * size,
                      [](double p) { return static_cast<float>(p); });
@@ -171,6 +178,9 @@ void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& p
     report(progress, "read", static_cast<double>(first + n) / static_cast<double>(raw.projections.count));
   }
   scan.report.air_background = !raw.air_columns.empty();
+  if (rounds)
+    scan.report.notes.push_back(
+        "the scan holds float64 or wide integers: F is that of its values rounded to float32");
 }
 
 // --- report

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "host/region_of_interest.hpp"
 #include "host/sampler_terms.hpp"
 #include "host/verify_field.hpp"
 #include "host/verify_seams.hpp"
@@ -25,18 +26,6 @@ std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 Index3 place_of(const MixedVolume& v, std::int64_t brick) {
   const Index3 n = v.bricks();
   return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
-}
-
-bool meets(const MixedVolume& v, std::int64_t brick, const std::array<double, 6>& roi) {
-  const Index3 p = place_of(v, brick);
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double low = v.grid.origin[a] + static_cast<double>(p[a] * v.granularity) * v.grid.spacing[a];
-    const double high =
-        v.grid.origin[a] +
-        static_cast<double>(std::min(v.grid.cells[a], (p[a] + 1) * v.granularity)) * v.grid.spacing[a];
-    if (high < roi[a] || low > roi[a + 3]) return false;
-  }
-  return true;
 }
 
 // The layers of bricks a sample is drawn from: each costs the filtered rows of its heights, so they are few.
@@ -60,9 +49,7 @@ std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate&
                                         const VerifyOptions& options) {
   const std::size_t n = v.level.size();
   std::vector<std::uint8_t> selected(n, options.exhaustive ? 1 : 0);
-  const auto wanted_by_roi = [&](std::size_t i) {
-    return !stored.roi || meets(v, static_cast<std::int64_t>(i), *stored.roi);
-  };
+  const std::vector<std::uint8_t> by_roi = bricks_of(stored.roi, v.grid, v.granularity);
   if (!options.exhaustive) {
     const Index3 counts = v.bricks(), worst = brick_at(v, stored.worst_at);
     std::mt19937 random(options.seed);
@@ -70,7 +57,7 @@ std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate&
     std::map<LevelTriple, std::vector<std::size_t>> strata;
     for (const std::int64_t z : layers)
       for (std::int64_t i = z * counts[0] * counts[1]; i < (z + 1) * counts[0] * counts[1]; ++i)
-        if (wanted_by_roi(at(i))) strata[v.level[at(i)]].push_back(at(i));
+        if (by_roi[at(i)]) strata[v.level[at(i)]].push_back(at(i));
     const double share =
         options.fraction * static_cast<double>(counts[2]) / static_cast<double>(layers.size());
     for (auto& [level, members] : strata) {
@@ -82,13 +69,13 @@ std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate&
     selected[at((worst[2] * counts[1] + worst[1]) * counts[0] + worst[0])] = 1;
   }
   for (std::size_t i = 0; i < n; ++i)
-    if (!wanted_by_roi(i)) selected[i] = 0;
+    if (!by_roi[i]) selected[i] = 0;
   return selected;
 }
 
 // The corner of a gold cell where V is farthest from F, and the stored sample nearest to it.
 SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int64_t brick,
-                         const Index3& cell) {
+                         const Index3& cell, int rate) {
   const Index3 b = place_of(v, brick);
   const BrickSamples stored(v, b);
   SamplePlace p;
@@ -107,7 +94,7 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
     Index3 node{};
     for (std::size_t a = 0; a < 3; ++a) {
       node[a] = cell[a] + (corner >> a & 1);
-      const double c = static_cast<double>(b[a] * v.granularity) + static_cast<double>(node[a]) / v.rate;
+      const double c = static_cast<double>(b[a] * v.granularity) + static_cast<double>(node[a]) / rate;
       at_cell[a] = static_cast<float>(c);
       world[a] = v.grid.origin[a] + c * v.grid.spacing[a];
     }
@@ -123,7 +110,7 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
   p.value = values[worst];
   p.field = F[worst];
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t per_sample = std::int64_t{v.rate} << v.coarsening[2 - a] >> levels[a];
+    const std::int64_t per_sample = std::int64_t{rate} << v.coarsening[2 - a] >> levels[a];
     p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? in_base[a] : 0);
   }
   p.dataset = "/base";
@@ -159,6 +146,109 @@ void judge(const Certificate& stored, const SamplerTerms& sampler, VerifyResult&
   else r.holds = r.holds_buffer.value_or(true) && r.holds_image3d.value_or(true);
 }
 
+// The finest gold on which bricks are tested again: its T is a thousandth of that at 2x. Cell coordinates of
+// its nodes are exact in fp32.
+int finest_rate(const MixedVolume& v) {
+  constexpr int wanted = 64;
+  const std::int64_t cells = *std::max_element(v.grid.cells.begin(), v.grid.cells.end());
+  int rate = v.rate;
+  while (2 * rate <= std::max(wanted, 2 * v.rate) && cells * 2 * rate <= (1 << 24)) rate *= 2;
+  return rate;
+}
+
+// What is known of bricks from all rates of gold at which they were tested: every rate bounds |V - F|, and a
+// finer one by less (docs/error-bounds.md, "What verify does").
+class TestedBricks {
+ public:
+  struct Brick {
+    double total = -1;  // the smallest bound of all rates; negative: not tested
+    double error = 0;   // the largest |V - F| at a node of any rate
+    double least = 0;   // what |V - F| is at least: that, less what F was computed with
+    double finer = 0;   // the same at rates beyond the volume's own
+    Index3 cell{};      // where the bound is attained
+    int rate = 0;       // and at which rate
+    int tried = 0;      // the finest rate at which it was tested
+  };
+  TestedBricks(VerifyField& field, const MixedVolume& volume, const Progress& progress)
+      : field_(field), volume_(volume), progress_(progress), bricks_(volume.level.size()) {}
+
+  void test(const std::vector<std::uint8_t>& selected, int rate, VerifyResult& result) {
+    std::vector<Brick> now(bricks_.size());
+    field_.run(
+        selected, rate,
+        [&](const VerifyField::Piece& p) {
+          if (p.total < 0) return;
+          Brick& b = now[at(p.brick)];
+          b.error = std::max(b.error, p.error);
+          if (rate == volume_.rate) {
+            result.cells_tested += p.cells;
+            result.nodes_tested += p.nodes;
+          }
+          if (p.total <= b.total) return;
+          b.total = p.total;
+          b.cell = p.worst_cell;
+        },
+        progress_);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (!selected[i]) continue;
+      // Cells that only the coarser gold tested hold no point of which the certificate speaks.
+      if (rate > volume_.rate) now[i].total = std::max(0.0, now[i].total);
+      if (now[i].total >= 0) take(bricks_[i], now[i], rate);
+    }
+  }
+
+  /// Tests bricks again on finer gold, the worst first, until none may err by more than `limit`. Ends early
+  /// where one does so at a node, or still may at the finest rate.
+  void settle(double limit, VerifyResult& result) {
+    const int finest = finest_rate(volume_);
+    for (std::size_t most = 8;; most *= 2) {
+      std::vector<std::size_t> over;
+      for (std::size_t i = 0; i < bricks_.size(); ++i)
+        if (bricks_[i].total > limit) over.push_back(i);
+      const bool hopeless = std::any_of(over.begin(), over.end(), [&](std::size_t i) {
+        return !(bricks_[i].least <= limit) || bricks_[i].tried >= finest;
+      });
+      if (over.empty() || hopeless) return;
+      most = std::min(most, over.size());
+      std::partial_sort(over.begin(), over.begin() + static_cast<std::ptrdiff_t>(most), over.end(),
+                        [&](std::size_t a, std::size_t b) { return bricks_[a].total > bricks_[b].total; });
+      over.resize(most);
+      int rate = finest;
+      for (const std::size_t i : over) rate = std::min(rate, 2 * bricks_[i].tried);
+      std::vector<std::uint8_t> selected(bricks_.size(), 0);
+      for (const std::size_t i : over) selected[i] = bricks_[i].tried < rate;
+      test(selected, rate, result);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Brick>& bricks() const { return bricks_; }
+
+ private:
+  void take(Brick& known, const Brick& now, int rate) {
+    known.error = std::max(known.error, now.error);
+    known.tried = rate;
+    double& least = rate > volume_.rate ? known.finer : known.least;
+    least = std::max(least, now.error - field_.arithmetic());
+    if (known.total >= 0 && known.total <= now.total) return;
+    known.total = now.total;
+    known.cell = now.cell;
+    known.rate = rate;
+  }
+
+  VerifyField& field_;
+  const MixedVolume& volume_;
+  const Progress& progress_;
+  std::vector<Brick> bricks_;
+};
+
+// What the promised samplers that this device has leave of epsilon for |V - F| itself.
+double left_by_samplers(const Certificate& stored, const SamplerTerms& sampler) {
+  double taken = stored.holds_buffer ? sampler.buffer.value : 0;
+  if (stored.holds_image3d.value_or(false) && sampler.image3d)
+    taken = std::max(taken, sampler.image3d->value);
+  return stored.epsilon_abs - taken;
+}
+
 }  // namespace
 
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
@@ -182,37 +272,40 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   VerifyResult result;
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
+  VerifyField field(state, exact, volume, stored.window, progress);
+  TestedBricks tested(field, volume, progress);
+  tested.test(chosen_bricks(volume, stored, options), volume.rate, result);
+  result.arithmetic = field.arithmetic();
+  tested.settle(left_by_samplers(stored, sampler), result);
+  tested.settle(stored.measured_total + stored.budget.arithmetic.value, result);
+
   std::int64_t worst = -1, broken = -1;
-  Index3 worst_cell{}, broken_cell{};
-  {
-    VerifyField field(state, exact, volume, stored.window, progress);
-    field.run(
-        chosen_bricks(volume, stored, options),
-        [&](const VerifyField::Brick& b) {
-          if (b.total < 0) return;
-          ++result.bricks_tested;
-          result.cells_tested += b.cells;
-          result.nodes_tested += b.nodes;
-          result.measured_max = std::max(result.measured_max, b.error);
-          if (!stored.brick_totals.empty() &&
-              !(b.error - field.arithmetic() <=
-                static_cast<double>(stored.brick_totals[at(b.brick)]) + stored.budget.arithmetic.value)) {
-            broken = b.brick;
-            broken_cell = b.worst_cell;
-          }
-          if (b.total <= result.measured_total && worst >= 0) return;
-          result.measured_total = b.total;
-          worst = b.brick;
-          worst_cell = b.worst_cell;
-        },
-        progress);
-    result.arithmetic = field.arithmetic();
+  const std::vector<TestedBricks::Brick>& bricks = tested.bricks();
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const TestedBricks::Brick& b = bricks[i];
+    if (b.total < 0) continue;
+    ++result.bricks_tested;
+    result.measured_max = std::max(result.measured_max, b.error);
+    if (b.tried > volume.rate) ++result.bricks_finer;
+    result.finest_rate = std::max(result.finest_rate, b.tried);
+    if (!stored.brick_totals.empty()) {
+      const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
+      // Between gold nodes the certificate's bound holds with the sampler's rounding.
+      if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
+        broken = static_cast<std::int64_t>(i);
+    }
+    if (b.total <= result.measured_total && worst >= 0) continue;
+    result.measured_total = b.total;
+    worst = static_cast<std::int64_t>(i);
   }
   if (worst < 0) {
     result.failure = "no tested brick holds a covered gold cell";
     return result;
   }
-  result.worst = worst_sample(volume, exact, worst, worst_cell);
+  const auto place = [&](std::int64_t brick) {
+    return worst_sample(volume, exact, brick, bricks[at(brick)].cell, bricks[at(brick)].rate);
+  };
+  result.worst = place(worst);
   result.worst_at = result.worst.world;
   judge(stored, sampler, result);
   if (!result.holds && result.failure.empty())
@@ -228,8 +321,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   if (result.holds && broken >= 0) {
     result.holds = false;
     result.failure = fmt::format("|V - F| exceeds the certificate's bound {:.6g} of one brick, {}",
-                                 stored.brick_totals[at(broken)],
-                                 place_text(worst_sample(volume, exact, broken, broken_cell)));
+                                 stored.brick_totals[at(broken)], place_text(place(broken)));
   }
   if (options.exhaustive) {
     const Seams seams = compare_seams(volume);

@@ -69,7 +69,7 @@ ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry&
 }
 
 FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
-                         double reach) {
+                         double reach, std::int64_t run) {
   const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
   const std::size_t K = sups.value.size();
   // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.
@@ -97,8 +97,9 @@ FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const Paral
   const double d = g.pitch_u / static_cast<double>(fine_columns),
                slope = std::min(pi / g.pitch_u * S, std::sqrt(2 * S * S_uu));
   const double columns = static_cast<double>(fine_columns * (g.columns + 2));
-  b.arithmetic = u * (28 + 1.01 * static_cast<double>(K)) * S +
-                 (u * (4 * reach + 6) + 0x1p-48 * columns) * d * slope +
+  // A term is rounded within its run, and once per run from there on.
+  const auto roundings = static_cast<double>(run + (g.views() + run - 1) / run);
+  b.arithmetic = u * (28 + 1.01 * roundings) * S + (u * (4 * reach + 6) + 0x1p-48 * columns) * d * slope +
                  3.515625 / 720 * std::pow(d, 6) * S_6 + host_rounding;
   b.differences = 40 * u * S;
   double plain = 0;

@@ -17,6 +17,9 @@ namespace vdvr {
 /// Fine columns per detector column, on which F is interpolated.
 constexpr std::int64_t fine_columns = 12;
 
+/// Views that are summed by themselves before they are added to the others, where memory holds so many.
+constexpr std::int64_t views_per_run = 32;
+
 /// Per view: sups over the whole detector, view weight included.
 struct ViewSups {
   std::vector<double> value, second_u, second_v;  ///< |q|, |q_uu|, |q_vv|
@@ -38,11 +41,11 @@ struct FieldBounds {
 };
 
 /// `reach`: the largest distance, in fine columns, of a node of a block from the block's first.
-/// `host_rounding`: what the table's double-precision values err.
+/// `host_rounding`: what the table's double-precision values err. `run`: views summed by themselves.
 FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& geometry,
-                         const Vec3& gold_spacing, double reach);
+                         const Vec3& gold_spacing, double reach, std::int64_t run);
 
-/// T's part that is constant over a brick, and 2 arithmetic: `fourth` are the largest computed fourth
+/// T's part that is constant over a piece, and 2 arithmetic: `fourth` are the largest computed fourth
 /// differences at its nodes, xx, yy, zz, xy, xz, yz.
 double brick_constant(const FieldBounds& bounds, const std::array<double, 6>& fourth);
 

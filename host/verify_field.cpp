@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
@@ -25,6 +26,9 @@ cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
 std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
+
+// Gold cells of a piece's side at most: what is computed at once stays small whatever the rate.
+constexpr std::int64_t most_cells = 64;
 
 /// Host memory counted against --max-memory.
 class HostShare {
@@ -44,13 +48,28 @@ class HostShare {
 
 }  // namespace
 
-/// How the selected bricks are cut into pieces that are computed at once.
+/// How the selected bricks are cut into pieces, and these joined to blocks that are computed at once.
 struct VerifyField::Shape {
-  std::int64_t width = 1, height = 1;  // bricks per block across z, bricks per slab along z
-  std::int64_t cells = 1;              // gold cells of a brick's side
+  std::int64_t rate = 1;               // gold cells to a cell of the grid
+  Vec3 h{};                            // gold spacing
+  std::int64_t width = 1, height = 1;  // pieces per block across z, pieces per slab along z
+  std::int64_t cells = 1;              // gold cells of a piece's side
+  std::int64_t per_brick = 1;          // pieces of a brick's side
+  Index3 pieces{};                     // of the grid
   std::int64_t nx = 0, nz = 0, z_padded = 0, error_padded = 0, words = 0;
-  std::int64_t slab_z = 0;  // first brick layer
+  std::int64_t slab_z = 0;          // first layer of pieces
+  std::int64_t views = 1, run = 1;  // whose fine columns are held at once; that are summed by themselves
   FieldBounds bounds;
+
+  /// Where a piece begins along an axis.
+  [[nodiscard]] double begin(const Grid& grid, std::size_t axis, std::int64_t piece) const {
+    return grid.origin[axis] +
+           static_cast<double>(piece * cells) / static_cast<double>(rate) * grid.spacing[axis];
+  }
+  /// The brick that a piece belongs to, (z * bricks_y + y) * bricks_x + x.
+  [[nodiscard]] std::size_t brick(const Index3& n, std::int64_t x, std::int64_t y, std::int64_t z) const {
+    return at((z / per_brick * n[1] + y / per_brick) * n[0] + x / per_brick);
+  }
 };
 
 struct VerifyField::Batch {
@@ -66,35 +85,54 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
       volume_(volume),
       window_(window),
       coverage_(field.geometry()),
-      h_(volume.grid.spacing),
       sups_(view_sups(field.coefficients(), field.geometry(), progress)),
       stored_(state, volume) {
-  for (double& h : h_) h /= static_cast<double>(volume.rate);
-  // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on.
+  // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on;
+  // at no rate further than at the volume's own.
   const ParallelGeometry& g = field.geometry();
-  pad_ = static_cast<std::int64_t>(
-             std::ceil(3.1 * std::hypot(h_[0], h_[1]) / g.pitch_u * static_cast<double>(fine_columns))) +
-         4;
+  const double diagonal =
+      std::hypot(volume.grid.spacing[0], volume.grid.spacing[1]) / static_cast<double>(volume.rate);
+  pad_ =
+      static_cast<std::int64_t>(std::ceil(3.1 * diagonal / g.pitch_u * static_cast<double>(fine_columns))) +
+      4;
   columns_ = fine_columns * g.columns + 1 + 2 * pad_;
 }
 
-void VerifyField::run(const std::vector<std::uint8_t>& selected,
-                      const std::function<void(const Brick&)>& on_brick, const Progress& progress) {
-  const Index3 n = volume_.bricks();
+VerifyField::Shape VerifyField::shape_at(int rate, bool many) const {
   Shape s;
-  s.cells = std::int64_t{volume_.granularity} * volume_.rate;
+  s.rate = rate;
+  s.h = volume_.grid.spacing;
+  for (double& h : s.h) h /= static_cast<double>(rate);
+  const std::int64_t side = std::int64_t{volume_.granularity} * rate;
+  s.cells = std::min(side, most_cells);
+  s.per_brick = side / s.cells;
+  for (std::size_t a = 0; a < 3; ++a) s.pieces[a] = (volume_.grid.cells[a] * rate + s.cells - 1) / s.cells;
   // Few bricks are computed one by one, many in blocks with less halo.
-  const auto wanted = std::count(selected.begin(), selected.end(), 1);
-  if (2 * wanted > static_cast<std::int64_t>(selected.size()))
-    s.width = s.height = std::max<std::int64_t>(1, 64 / s.cells);
+  if (many) s.width = s.height = std::max<std::int64_t>(1, most_cells / s.cells);
   s.nx = s.width * s.cells + 1 + 2 * halo;
   s.error_padded = up(s.cells + 1, 16) + 16;
   s.words = (s.cells + 15) / 16;
+  const std::int64_t all = field_.geometry().views(),
+                     per_view = 4 * columns_ * up(s.height * s.cells + 1 + 2 * halo, 16);
+  s.views = std::clamp<std::int64_t>(
+      static_cast<std::int64_t>(std::min(state_.memory.left() / 4, state_.info.max_allocation)) / per_view, 1,
+      all);
+  s.run = std::min(views_per_run, s.views);
+  s.views -= s.views % s.run;
   const double scale = static_cast<double>(fine_columns) / field_.geometry().pitch_u;
-  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), h_,
-                          scale * std::hypot(h_[0], h_[1]) * static_cast<double>(s.nx + 7));
+  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), s.h,
+                          scale * std::hypot(s.h[0], s.h[1]) * static_cast<double>(s.nx + 7), s.run);
+  return s;
+}
 
+void VerifyField::run(const std::vector<std::uint8_t>& selected, int rate,
+                      const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
+  if (rate < volume_.rate || rate % volume_.rate != 0)
+    throw std::invalid_argument(fmt::format("V of rate {} cannot be tested at {}", volume_.rate, rate));
+  const auto wanted = std::count(selected.begin(), selected.end(), 1);
+  Shape s = shape_at(rate, 2 * wanted > static_cast<std::int64_t>(selected.size()));
   arithmetic_ = s.bounds.arithmetic;
+  const Index3 n = volume_.bricks();
 
   struct Slab {
     std::int64_t z;
@@ -102,15 +140,15 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected,
   };
   std::vector<Slab> slabs;
   double total = 0, done = 0;
-  for (std::int64_t z = 0; z < n[2]; z += s.height) {
+  for (std::int64_t z = 0; z < s.pieces[2]; z += s.height) {
     Slab slab{z, {}};
-    for (std::int64_t y = 0; y < n[1]; y += s.width)
-      for (std::int64_t x = 0; x < n[0]; x += s.width) {
+    for (std::int64_t y = 0; y < s.pieces[1]; y += s.width)
+      for (std::int64_t x = 0; x < s.pieces[0]; x += s.width) {
         bool any = false;
-        for (std::int64_t bz = z; bz < std::min(n[2], z + s.height); ++bz)
-          for (std::int64_t by = y; by < std::min(n[1], y + s.width); ++by)
-            for (std::int64_t bx = x; bx < std::min(n[0], x + s.width); ++bx)
-              any = any || selected[at((bz * n[1] + by) * n[0] + bx)] != 0;
+        for (std::int64_t bz = z; bz < std::min(s.pieces[2], z + s.height); ++bz)
+          for (std::int64_t by = y; by < std::min(s.pieces[1], y + s.width); ++by)
+            for (std::int64_t bx = x; bx < std::min(s.pieces[0], x + s.width); ++bx)
+              any = any || selected[s.brick(n, bx, by, bz)] != 0;
         if (any) slab.blocks.push_back({x, y});
       }
     total += static_cast<double>(slab.blocks.size());
@@ -118,12 +156,10 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected,
   }
   for (const Slab& slab : slabs) {
     s.slab_z = slab.z;
-    const std::int64_t layers = std::min(s.height, n[2] - slab.z);
-    s.nz = std::min(layers * volume_.granularity, volume_.grid.cells[2] - slab.z * volume_.granularity) *
-               volume_.rate +
-           1 + 2 * halo;
+    const std::int64_t layers = std::min(s.height, s.pieces[2] - slab.z);
+    s.nz = std::min(layers * s.cells, volume_.grid.cells[2] * s.rate - slab.z * s.cells) + 1 + 2 * halo;
     s.z_padded = up(s.nz, 16);
-    run_slab(s, slab.blocks, selected, on_brick, [&](std::size_t blocks) {
+    run_slab(s, slab.blocks, selected, on_piece, [&](std::size_t blocks) {
       done += static_cast<double>(blocks);
       report(progress, "verify", done / total);
     });
@@ -132,12 +168,9 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected,
 
 /// Fine columns of some views, on the host and on the device.
 struct VerifyField::Table {
-  Table(opencl::State& state, std::int64_t columns, std::int64_t z_padded, std::int64_t all_views)
+  Table(opencl::State& state, std::int64_t columns, std::int64_t z_padded, std::int64_t at_once)
       : per_view(columns * z_padded),
-        views(std::clamp<std::int64_t>(
-            static_cast<std::int64_t>(std::min(state.memory.left() / 4, state.info.max_allocation)) /
-                (4 * per_view),
-            1, all_views)),
+        views(at_once),
         share(state, count(4 * views * per_view), "fine columns of the filtered projections"),
         host(at(views * per_view)),
         device(state, count(views * per_view + room), "fine columns of the filtered projections") {}
@@ -154,11 +187,10 @@ void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view
   const ParallelGeometry& g = field_.geometry();
   const std::int64_t U = g.columns, V = g.rows, rows = up(shape.nz, verify_cosines::lanes);
   const std::int64_t views = std::min(table.views, g.views() - first_view), last = fine_columns * U;
-  const double first_z = volume_.grid.origin[2] +
-                         static_cast<double>(shape.slab_z * volume_.granularity) * volume_.grid.spacing[2];
+  const double first_z = shape.begin(volume_.grid, 2, shape.slab_z);
   std::vector<double> basis(at(V * rows));
   for (std::int64_t r = 0; r < rows; ++r) {
-    const double z = first_z + static_cast<double>(r - halo) * h_[2];
+    const double z = first_z + static_cast<double>(r - halo) * shape.h[2];
     const double y = pi * (z / g.pitch_v + 0.5 * static_cast<double>(V)) / static_cast<double>(V);
     for (std::int64_t l = 0; l < V; ++l) basis[at(l * rows + r)] = std::cos(static_cast<double>(l) * y);
   }
@@ -194,29 +226,27 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
                                            const std::vector<std::uint8_t>& selected) const {
   const Grid& grid = volume_.grid;
   const Index3 n = volume_.bricks();
-  const std::int64_t g = volume_.granularity, side = s.width * s.cells;
+  const std::int64_t side = s.width * s.cells;
   Batch batch;
   batch.tested.assign(blocks.size() * at(side * side), 0);
   // A cell that holds a covered point has its centre within half its diagonal of the region.
-  const double limit = -0.5 * std::hypot(h_[0], h_[1]) * (1 + 1e-9);
+  const double limit = -0.5 * std::hypot(s.h[0], s.h[1]) * (1 + 1e-9);
   parallel_for(static_cast<std::int64_t>(blocks.size()) * side, {}, "", [&](std::int64_t row) {
     const auto& b = blocks[at(row / side)];
-    const double y = grid.origin[1] + static_cast<double>(b[1] * g) * grid.spacing[1] +
-                     (static_cast<double>(row % side) + 0.5) * h_[1];
+    const double y = s.begin(grid, 1, b[1]) + (static_cast<double>(row % side) + 0.5) * s.h[1];
     for (std::int64_t i = 0; i < side; ++i) {
-      const double x = grid.origin[0] + static_cast<double>(b[0] * g) * grid.spacing[0] +
-                       (static_cast<double>(i) + 0.5) * h_[0];
+      const double x = s.begin(grid, 0, b[0]) + (static_cast<double>(i) + 0.5) * s.h[0];
       batch.tested[at(row * side + i)] = coverage_.margin(x, y) >= limit ? 1 : 0;
     }
   });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const auto& b = blocks[i];
     batch.first.push_back({{to_int(b[0]), to_int(b[1]), to_int(s.slab_z), 0}});
-    for (std::int64_t z = s.slab_z; z < std::min(n[2], s.slab_z + s.height); ++z)
-      for (std::int64_t y = b[1]; y < std::min(n[1], b[1] + s.width); ++y)
-        for (std::int64_t x = b[0]; x < std::min(n[0], b[0] + s.width); ++x) {
-          const std::int64_t brick = (z * n[1] + y) * n[0] + x;
-          if (!selected[at(brick)]) continue;
+    for (std::int64_t z = s.slab_z; z < std::min(s.pieces[2], s.slab_z + s.height); ++z)
+      for (std::int64_t y = b[1]; y < std::min(s.pieces[1], b[1] + s.width); ++y)
+        for (std::int64_t x = b[0]; x < std::min(s.pieces[0], b[0] + s.width); ++x) {
+          const std::size_t brick = s.brick(n, x, y, z);
+          if (!selected[brick]) continue;
           const std::uint8_t* mask = batch.tested.data() + i * at(side * side) +
                                      at((y - b[1]) * s.cells * side + (x - b[0]) * s.cells);
           bool any = false;
@@ -224,7 +254,7 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
             any = std::find(mask + j * side, mask + j * side + s.cells, 1) != mask + j * side + s.cells;
           if (!any) continue;
           batch.items.push_back({{to_int(x), to_int(y), to_int(z), to_int(static_cast<std::int64_t>(i))}});
-          batch.bricks.push_back(brick);
+          batch.bricks.push_back(static_cast<std::int64_t>(brick));
         }
   }
   return batch;
@@ -232,9 +262,9 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
 
 void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int64_t, 2>>& blocks,
                            const std::vector<std::uint8_t>& selected,
-                           const std::function<void(const Brick&)>& on_brick,
+                           const std::function<void(const Piece&)>& on_piece,
                            const std::function<void(std::size_t)>& tick) {
-  Table table(state_, columns_, s.z_padded, field_.geometry().views());
+  Table table(state_, columns_, s.z_padded, s.views);
   const std::int64_t per_block = s.nx * s.nx * s.z_padded,
                      per_item =
                          (s.cells + 1) * (s.cells + 1) * s.error_padded + s.cells * s.cells * (4 + s.words);
@@ -250,7 +280,7 @@ void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int
     const Batch batch = make_batch(s, part, selected);
     if (!batch.items.empty()) {
       field_of(batch, s, table, values);
-      measure(batch, s, values, on_brick);
+      measure(batch, s, values, on_piece);
     }
     tick(part.size());
   }
@@ -265,17 +295,15 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
   for (std::size_t b = 0; b < blocks; ++b)
     for (std::size_t k = 0; k < K; ++k) {
       const double c = std::cos(g.theta_rad[k]), s_k = std::sin(g.theta_rad[k]);
-      const auto node = [&](std::size_t axis, cl_int brick) {
-        return volume_.grid.origin[axis] +
-               static_cast<double>(brick) * volume_.granularity * volume_.grid.spacing[axis] -
-               static_cast<double>(halo) * h_[axis];
+      const auto node = [&](std::size_t axis, cl_int piece) {
+        return s.begin(volume_.grid, axis, piece) - static_cast<double>(halo) * s.h[axis];
       };
       const double t = node(0, batch.first[b].s[0]) * c + node(1, batch.first[b].s[1]) * s_k;
       // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
       // padding.
       const double column =
           (t / g.pitch_u + g.center + 0.5) * static_cast<double>(fine_columns) + static_cast<double>(pad_);
-      const double along_x = c * h_[0] * scale, along_y = s_k * h_[1] * scale,
+      const double along_x = c * s.h[0] * scale, along_y = s_k * s.h[1] * scale,
                    nodes = static_cast<double>(s.nx + 7);
       const double whole =
           std::floor(column + std::min(0.0, along_x * nodes) + std::min(0.0, along_y * nodes)) - 1;
@@ -285,21 +313,24 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
   const opencl::DeviceArray<cl_float4> device_steps(state_, std::span<const cl_float4>(steps),
                                                     "view positions");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int>
+                 cl_int, cl_int, cl_int>
       kernel(state_, "verify_field", "verify_field", stored_.defines);
   for (std::int64_t first = 0; first < g.views(); first += table.views) {
     fill(table, s, first);
-    kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
-            {count((s.nx + 7) / 8), 1, 1}},
-           values.buffer(), table.device.buffer(), device_steps.buffer(), first > 0 ? 1 : 0, to_int(first),
-           to_int(std::min(table.views, g.views() - first)), to_int(g.views()), to_int(columns_),
-           to_int(s.z_padded), to_int(s.nx), to_int(s.nx), to_int(static_cast<std::int64_t>(blocks)));
+    const std::int64_t end = std::min(first + table.views, g.views());
+    // In runs, whose sums round seldom.
+    for (std::int64_t run = first; run < end; run += s.run)
+      kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
+              {count((s.nx + 7) / 8), 1, 1}},
+             values.buffer(), table.device.buffer(), device_steps.buffer(), run > 0 ? 1 : 0, to_int(run),
+             to_int(run - first), to_int(std::min(s.run, end - run)), to_int(g.views()), to_int(columns_),
+             to_int(s.z_padded), to_int(s.nx), to_int(s.nx), to_int(static_cast<std::int64_t>(blocks)));
   }
 }
 
 namespace {
 
-/// Gold nodes of a brick that are corners of a tested cell. bits: 16 cells to a word, [y][x][words].
+/// Gold nodes of a piece that are corners of a tested cell. bits: 16 cells to a word, [y][x][words].
 std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::int64_t words) {
   std::int64_t nodes = 0;
   for (std::int64_t y = 0; y <= cells; ++y)
@@ -321,7 +352,7 @@ std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::in
 }  // namespace
 
 void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
-                          const std::function<void(const Brick&)>& on_brick) {
+                          const std::function<void(const Piece&)>& on_piece) {
   const std::int64_t n = static_cast<std::int64_t>(batch.items.size()), side = s.cells + 1;
   const VdvrGrid grid = sampler_grid(volume_);
   const opencl::DeviceArray<cl_int4> items(state_, std::span<const cl_int4>(batch.items), "bricks to verify"),
@@ -332,19 +363,20 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   opencl::DeviceArray<cl_float8> fourth(state_, count(n * side), "fourth differences");
   opencl::DeviceArray<cl_int4> columns(state_, count(n * s.cells * s.cells), "columns of gold cells");
   opencl::DeviceArray<cl_uint> bits(state_, count(n * s.cells * s.cells * s.words), "tested gold cells");
-  const cl_int rate = volume_.rate, nx = to_int(s.nx), z_padded = to_int(s.z_padded);
+  const cl_int rate = to_int(s.rate), cells_of_piece = to_int(s.cells), nx = to_int(s.nx),
+               z_padded = to_int(s.z_padded);
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
       errors(state_, "verify_field", "verify_errors", stored_.defines);
   errors({{count(side), count(side), count(n)}, {count(side), 1, 1}}, error.buffer(), values.buffer(),
-         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), rate, nx,
-         nx, z_padded, to_int(s.error_padded), to_int(n));
+         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), rate,
+         cells_of_piece, nx, nx, z_padded, to_int(s.error_padded), to_int(n));
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int,
-                 cl_int, cl_int>
+                 cl_int, cl_int, cl_int>
       fourths(state_, "verify_field", "verify_fourth", stored_.defines);
   fourths({{count(side), count(n), 1}, {1, 1, 1}}, fourth.buffer(), values.buffer(), tested.buffer(), grid,
-          items.buffer(), first.buffer(), rate, nx, nx, z_padded, to_int(n));
+          items.buffer(), first.buffer(), rate, cells_of_piece, nx, nx, z_padded, to_int(n));
 
   const std::vector<cl_float8> rows = fourth.to_host();
   std::vector<double> constants(at(n));
@@ -358,25 +390,24 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     widening[at(i)] = static_cast<float>(constants[at(i)] * (1 + 1e-6));
   }
   const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
-                                                   "constants of bricks");
+                                                   "constants of pieces");
 
   // Cells along z that meet the covered heights.
-  const double first_z =
-      volume_.grid.origin[2] + static_cast<double>(s.slab_z * volume_.granularity) * volume_.grid.spacing[2];
+  const double first_z = s.begin(volume_.grid, 2, s.slab_z);
   std::int64_t z_first = s.nz, z_last = -1;
   for (std::int64_t k = 0; k < s.nz - 1 - 2 * halo; ++k)
-    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * h_[2]) >= -0.5 * h_[2] * (1 + 1e-9)) {
+    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * s.h[2]) >= -0.5 * s.h[2] * (1 + 1e-9)) {
       z_first = std::min(z_first, k);
       z_last = k;
     }
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer,
-                 cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float,
-                 cl_float, cl_float, cl_int>
+                 cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
+                 cl_float, cl_float, cl_float, cl_int>
       cells(state_, "verify_field", "verify_cells", stored_.defines);
   cells({{count(s.cells), count(s.cells), count(n)}, {count(s.cells), 1, 1}}, columns.buffer(), bits.buffer(),
         error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
-        device_widening.buffer(), rate, nx, nx, z_padded, to_int(s.error_padded), to_int(s.words),
-        to_int(z_first), to_int(z_last), window_ ? 1 : 0,
+        device_widening.buffer(), rate, cells_of_piece, nx, nx, z_padded, to_int(s.error_padded),
+        to_int(s.words), to_int(z_first), to_int(z_last), window_ ? 1 : 0,
         window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
         window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f, s.bounds.correction,
         to_int(n));
@@ -391,8 +422,10 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   }
   const std::vector<cl_uint> host_bits = bits.to_host();
   for (std::int64_t i = 0; i < n; ++i) {
-    Brick b;
+    Piece b;
     b.brick = batch.bricks[at(i)];
+    const cl_int4 place = batch.items[at(i)];
+    for (int a = 0; a < 3; ++a) b.first_cell[at(a)] = place.s[a] % s.per_brick * s.cells;
     b.constant = constants[at(i)];
     b.columns = std::span<const Column>(host).subspan(at(i * s.cells * s.cells), at(s.cells * s.cells));
     const std::uint32_t* flags = host_bits.data() + i * s.cells * s.cells * s.words;
@@ -405,10 +438,11 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
       b.error = std::max(b.error, static_cast<double>(c.error));
       if (c.total <= best) continue;
       best = c.total;
-      b.worst_cell = {j % s.cells, j / s.cells, c.worst_z};
+      b.worst_cell = {b.first_cell[0] + j % s.cells, b.first_cell[1] + j / s.cells,
+                      b.first_cell[2] + c.worst_z};
     }
     if (best >= 0) b.total = static_cast<double>(best) + b.constant;
-    on_brick(b);
+    on_piece(b);
   }
 }
 

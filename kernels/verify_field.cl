@@ -1,9 +1,11 @@
 // What `verify` computes on the device, apart from everything build uses but the sampler header: F at gold
 // nodes by six-point interpolation in u, |V - F| at the nodes of every tested brick, fourth differences of F,
 // and per gold cell the bound on |V - F| (docs/error-bounds.md, "What verify does").
+// A piece is a cube of `cells` gold cells: a brick, or a part of one. Places of pieces count pieces from the
+// grid's first; `rate` gold cells to a cell of the grid.
 // Layouts: float table[view][z / 16][fine column][16]; float field[block][y + 2][x + 2][z_padded] with node z
 // at z + 2, two nodes of halo on every side; float error[item][y][x][error_padded], one item per tested
-// brick; int4 items[item] = brick x, y, z and its block; int4 first[block] = the block's first brick; uchar
+// piece; int4 items[item] = piece x, y, z and its block; int4 first[block] = the block's first piece; uchar
 // tested[block][cell y][cell x]: columns of gold cells that can hold a covered point.
 // Called by host/verify_field.cpp.
 #include "shared/largest.h"
@@ -15,9 +17,7 @@
 
 // Lane i of a float8 belongs to the node x + i.
 #define FOR_TILE(M) M(0, s0) M(1, s1) M(2, s2) M(3, s3) M(4, s4) M(5, s5) M(6, s6) M(7, s7)
-#define CLEAR(i, lane)              \
-  float16 sum##i = (float16)(0.0f); \
-  if (accumulate && x + i < nx) sum##i = vload16(0, target + (size_t)i * z_padded);
+#define CLEAR(i, lane) float16 sum##i = (float16)(0.0f);
 #define ADD(i, lane)                                    \
   {                                                     \
     __global const float* q = plane + at.lane * 16;     \
@@ -29,14 +29,18 @@
     v = fma((float16)(w5.lane), vload16(0, q + 80), v); \
     sum##i += v;                                        \
   }
-#define PUT(i, lane) \
-  if (x + i < nx) vstore16(sum##i, 0, target + (size_t)i * z_padded);
+#define PUT(i, lane)                                                \
+  if (x + i < nx) {                                                 \
+    __global float* to = target + (size_t)i * z_padded;             \
+    vstore16(accumulate ? vload16(0, to) + sum##i : sum##i, 0, to); \
+  }
 
-// steps: per block and view {columns per node along x, along y, the block's first node less a whole number
-// of columns, that whole number}. nx, ny count the halo.
+// Adds a run of views: first_view of all, in_table the first of them in the table. steps: per block and view
+// {columns per node along x, along y, the block's first node less a whole number of columns, that whole
+// number}. nx, ny count the halo.
 __kernel void verify_field(__global float* field, __global const float* table, __global const float4* steps,
-                           int accumulate, int first_view, int views, int all_views, int columns,
-                           int z_padded, int nx, int ny, int blocks) {
+                           int accumulate, int first_view, int in_table, int views, int all_views,
+                           int columns, int z_padded, int nx, int ny, int blocks) {
   // All columns of a block at 16 heights, then the next 16: what they read of the table stays in the cache.
   const int x = (int)get_global_id(0) * 8, y = (int)get_global_id(1), chunks = z_padded / 16;
   const int block = (int)get_global_id(2) / chunks, z = ((int)get_global_id(2) - block * chunks) * 16;
@@ -44,7 +48,7 @@ __kernel void verify_field(__global float* field, __global const float* table, _
   __global float* target = field + (((size_t)block * ny + y) * nx + x) * z_padded + z;
   FOR_TILE(CLEAR)
   const float8 tile_x = (float)x + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-  __global const float* plane = table + (size_t)z * columns;
+  __global const float* plane = table + ((size_t)in_table * z_padded + z) * columns;
   __global const float4* view = steps + (size_t)block * all_views + first_view;
   for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
     const float4 step = view[k];
@@ -72,34 +76,44 @@ inline __global const float* field_column(__global const float* field, int4 item
   return field + (((size_t)item.w * ny + by) * nx + bx) * z_padded + (item.z - first.z) * cells + RADIUS;
 }
 
+// The last node of a piece along an axis where the grid has `all` gold cells.
+inline int last_node(int piece, int cells, int all) { return min(cells, all - piece * cells); }
+
 __kernel void verify_errors(__global float* error, __global const float* field, __global const uchar* samples,
                             __global const uint* bricks, VdvrGrid grid, __global const int4* items,
-                            __global const int4* first, int rate, int nx, int ny, int z_padded,
+                            __global const int4* first, int rate, int cells, int nx, int ny, int z_padded,
                             int error_padded, int count) {
-  const int g = grid.granularity, cells = g * rate, side = cells + 1;
+  const int g = grid.granularity, per_brick = g * rate, side = cells + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
   if (x >= side || y >= side || i >= count) return;
   const int4 item = items[i];
-  if (x > min(g, grid.cells_x - item.x * g) * rate || y > min(g, grid.cells_y - item.y * g) * rate) return;
-  const int last_z = min(g, grid.cells_z - item.z * g) * rate;
-  const VdvrBrick b =
-      vdvr_brick(bricks, grid, ((ulong)item.z * grid.bricks_y + item.y) * grid.bricks_x + item.x);
+  if (x > last_node(item.x, cells, grid.cells_x * rate) || y > last_node(item.y, cells, grid.cells_y * rate))
+    return;
+  const int last_z = last_node(item.z, cells, grid.cells_z * rate);
+  const int bx = item.x * cells / per_brick, by = item.y * cells / per_brick, bz = item.z * cells / per_brick;
+  const int from_x = item.x * cells - bx * per_brick, from_y = item.y * cells - by * per_brick,
+            from_z = item.z * cells - bz * per_brick;
+  const VdvrBrick b = vdvr_brick(bricks, grid, ((ulong)bz * grid.bricks_y + by) * grid.bricks_x + bx);
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
-  const VdvrLocal lx = vdvr_local((float)(item.x * g) + (float)x / (float)rate, item.x, b.level_x, g,
+  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) / (float)rate, bx, b.level_x, g,
                                   grid.cells_x, grid.coarse_x),
-                  ly = vdvr_local((float)(item.y * g) + (float)y / (float)rate, item.y, b.level_y, g,
+                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) / (float)rate, by, b.level_y, g,
                                   grid.cells_y, grid.coarse_y);
   __global const float* f = field_column(field, item, first[item.w], x, y, cells, nx, ny, z_padded);
   __global float* out = error + (((size_t)i * side + y) * side + x) * error_padded;
   // vdvr_trilinear, its two faces kept for all nodes between them.
   const int per_interval = (rate << grid.coarse_z) >> b.level_z;
+  const int intervals = min(g, grid.cells_z - bz * g) * rate / per_interval;
   const float step = 1.0f / (float)per_interval;
-  float low = vdvr_sample_in_plane(samples, b, lx, ly, 0);
-  for (int index = 0, k = 0; index * per_interval < last_z; ++index) {
+  int index = from_z / per_interval;
+  float low = vdvr_sample_in_plane(samples, b, lx, ly, index);
+  for (int k = 0; k <= last_z; ++index) {
     const float high = vdvr_sample_in_plane(samples, b, lx, ly, index + 1);
-    const int nodes = k + per_interval == last_z ? per_interval + 1 : per_interval;
-    for (int n = 0; n < nodes; ++n, ++k) {
-      const float e = vdvr_lerp(low, high, (float)n * step) - f[k];
+    // A node between two intervals belongs to the second; the brick's last node to its last interval.
+    const int begin = index * per_interval - from_z,
+              end = min(last_z + 1, begin + per_interval + (index + 1 == intervals ? 1 : 0));
+    for (; k < end; ++k) {
+      const float e = vdvr_lerp(low, high, (float)(k - begin) * step) - f[k];
       out[k] = fabs(e) <= FLT_MAX ? e : INFINITY;  // NaN must not pass a maximum unseen
     }
     low = high;
@@ -122,19 +136,19 @@ inline float16 mixed(__global const float* p, int a, int b) {
   return (second(p - b, a) - c) + (second(p + b, a) - c);
 }
 
-// Per tested brick and row of nodes: the largest |fourth difference| xx, yy, zz, xy, xz, yz over the corners
+// Per tested piece and row of nodes: the largest |fourth difference| xx, yy, zz, xy, xz, yz over the corners
 // of its tested cells. float8 out[item][y].
 __kernel void verify_fourth(__global float8* out, __global const float* field, __global const uchar* tested,
                             VdvrGrid grid, __global const int4* items, __global const int4* first, int rate,
-                            int nx, int ny, int z_padded, int count) {
-  const int g = grid.granularity, cells = g * rate, side = cells + 1;
+                            int cells, int nx, int ny, int z_padded, int count) {
+  const int side = cells + 1;
   const int y = (int)get_global_id(0), i = (int)get_global_id(1);
   if (y >= side || i >= count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];
-  const int last_x = min(g, grid.cells_x - item.x * g) * rate,
-            last_y = min(g, grid.cells_y - item.y * g) * rate,
-            last_z = min(g, grid.cells_z - item.z * g) * rate;
+  const int last_x = last_node(item.x, cells, grid.cells_x * rate),
+            last_y = last_node(item.y, cells, grid.cells_y * rate),
+            last_z = last_node(item.z, cells, grid.cells_z * rate);
   const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
   __global const uchar* mask =
       tested + ((size_t)item.w * mask_y + (item.y - begin.y) * cells) * mask_x + (item.x - begin.x) * cells;
@@ -193,30 +207,30 @@ inline float16 curvature(__global const float* p, int stride, float correction) 
     lowest = fmin(lowest, ec);                                                                 \
   }
 
-// Per column of gold cells of a tested brick: int4 {largest bound of |V - F| less the brick's constant, the
+// Per column of gold cells of a tested piece: int4 {largest bound of |V - F| less the piece's constant, the
 // largest |V - F| at a corner, both as float bits; the cell that has the former, or -1; 0} and which cells
 // were tested, 16 bits to a word: int4 out[item][y][x], uint cells_tested[item][y][x][words]. `widening`:
 // per item what the range of a cell is widened by beside its own T (for the window only).
 __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __global const float* error,
                            __global const float* field, __global const uchar* tested, VdvrGrid grid,
                            __global const int4* items, __global const int4* first,
-                           __global const float* widening, int rate, int nx, int ny, int z_padded,
+                           __global const float* widening, int rate, int cells, int nx, int ny, int z_padded,
                            int error_padded, int words, int z_first, int z_last, int windowed,
                            float window_low, float window_high, float correction, int count) {
-  const int g = grid.granularity, cells = g * rate, side = cells + 1;
+  const int side = cells + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
   if (x >= cells || y >= cells || i >= count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];
   const size_t column = ((size_t)i * cells + y) * cells + x;
   const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
-  const bool inside = x < min(g, grid.cells_x - item.x * g) * rate &&
-                      y < min(g, grid.cells_y - item.y * g) * rate &&
+  const bool inside = x < last_node(item.x, cells, grid.cells_x * rate) &&
+                      y < last_node(item.y, cells, grid.cells_y * rate) &&
                       tested[((size_t)item.w * mask_y + (item.y - begin.y) * cells + y) * mask_x +
                              (item.x - begin.x) * cells + x];
   // Cells of the block's z range [z_first, z_last] meet the covered heights.
   const int z_begin = (item.z - begin.z) * cells,
-            end = min(min(g, grid.cells_z - item.z * g) * rate, z_last + 1 - z_begin);
+            end = min(last_node(item.z, cells, grid.cells_z * rate), z_last + 1 - z_begin);
   float best = -1.0f, worst_error = 0.0f;
   int best_z = -1;
   const int row = nx * z_padded;

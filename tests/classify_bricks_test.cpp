@@ -173,7 +173,7 @@ BOOST_AUTO_TEST_CASE(tiles_of_every_triple_pass_before_closing_and_take_less_tha
       samples[anisotropic] += static_cast<double>(c.bricks.samples[i].size());
     }
     const MixedVolume open = close_boundaries(c.bricks, Closing::none);
-    c.classify.measure(DeviceField(c.state, open), c.tolerance, refined, "verify");
+    c.classify.measure(DeviceField(c.state, open), open.level, c.tolerance, refined, "verify");
     for (std::size_t i = 0; i < refined.size(); ++i)
       if (refined[i] && *std::max_element(open.level[i].begin(), open.level[i].end()) < 3)
         BOOST_TEST(static_cast<double>(c.classify.measures()[i].total) <= c.tolerance + rounding(c));
@@ -255,8 +255,43 @@ BOOST_AUTO_TEST_CASE(tile_finer_than_coarse_gold_is_measured_on_fine_gold) {
   BOOST_REQUIRE(c.bricks.samples[brick].size() == 17u * 17u * 17u);
   c.bricks.samples[brick][(5 * 17 + 5) * 17 + 5] += static_cast<float>(3 * c.tolerance);
   const MixedVolume volume = close_boundaries(c.bricks, Closing::none);
-  c.classify.measure(DeviceField(c.state, volume), c.tolerance, raised, "verify");
+  c.classify.measure(DeviceField(c.state, volume), volume.level, c.tolerance, raised, "verify");
   BOOST_TEST(static_cast<double>(c.classify.measures()[brick].error) > 2 * c.tolerance);
+}
+
+// Closing `paper` raises a brick beside a finer one: coarse gold no longer resolves it.
+BOOST_AUTO_TEST_CASE(brick_that_closing_raised_is_measured_at_its_stored_level) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
+  std::size_t brick = 0;
+  while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
+  BOOST_REQUIRE(brick < c.decided.size());
+  c.bricks.level[brick] = {3, 3, 3};
+  std::vector<std::uint8_t> raised(c.bricks.level.size(), 0);
+  raised[brick] = 1;
+  c.classify.extract(raised);
+  const std::vector<LevelTriple> stored = c.bricks.level;
+  MixedVolume volume = close_boundaries(c.bricks, Closing::none);
+  // As if its own level were 1 and closing had raised it: the volume holds the tile of level 3.
+  c.bricks.level[brick] = {1, 1, 1};
+  c.classify.measure(DeviceField(c.state, volume), stored, c.tolerance, raised, "verify");
+  BOOST_TEST(c.classify.measures()[brick].rate == 8);
+  BOOST_TEST(static_cast<double>(c.classify.measures()[brick].total) <= c.tolerance);
+}
+
+BOOST_AUTO_TEST_CASE(arithmetic_is_that_of_the_gold_that_rounds_most) {
+  // Wide enough for the blocks of coarse gold to reach farther than those of the fine one.
+  const ProjectionSet scan = noise_scan(12, 9, 70, 7);
+  attacks::Chain chain(scan);
+  opencl::State& state = attacks::device().state();
+  const GoldSettings settings = Case::settings_of(grid_around_axis({40, 40, 6}, 1.0), 8);
+  GoldRates gold(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  BOOST_REQUIRE(gold.coarse() != nullptr);
+  BOOST_TEST(gold.coarse()->arithmetic() > gold.fine().arithmetic());
+  BOOST_TEST(gold.arithmetic() == gold.coarse()->arithmetic());
+  const GoldStream fine(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  BOOST_TEST(GoldRates::arithmetic(state, chain.filtered, chain.upsampler, chain.sups, fine) ==
+             gold.arithmetic());
 }
 
 BOOST_AUTO_TEST_CASE(comparison_without_slack_and_windows_take_the_fine_gold_alone) {

@@ -182,8 +182,8 @@ BOOST_AUTO_TEST_CASE(bound_of_every_column_of_cells_covers_the_interpolation_err
         magnitude = std::max(magnitude, std::abs(static_cast<double>(s)));
       const double sampler = 14 * tolerance::unit_roundoff * magnitude;  // docs/error-bounds.md, section 8
       std::int64_t compared = 0;
-      field.run(std::vector<std::uint8_t>(at(v.brick_count()), 1),
-                [&](const VerifyField::Brick& brick) {
+      field.run(std::vector<std::uint8_t>(at(v.brick_count()), 1), v.rate,
+                [&](const VerifyField::Piece& brick) {
                   bound = std::max(bound, brick.total);
                   const std::int64_t side = 2 * rate;
                   for (const auto& [key, error] : worst) {
@@ -234,8 +234,8 @@ BOOST_AUTO_TEST_CASE(tested_cells_and_nodes_are_counted_exactly) {
   }
   std::int64_t counted_cells = 0, counted_nodes = 0;
   VerifyField field(device.state(), exact, v, {}, {});
-  field.run(std::vector<std::uint8_t>(at(v.brick_count()), 1),
-            [&](const VerifyField::Brick& b) {
+  field.run(std::vector<std::uint8_t>(at(v.brick_count()), 1), v.rate,
+            [&](const VerifyField::Piece& b) {
               counted_cells += b.cells;
               counted_nodes += b.nodes;
             },
@@ -266,6 +266,54 @@ BOOST_AUTO_TEST_CASE(volumes_of_other_rates_windows_and_regions_hold) {
     const VerifyResult r = measured(m);
     BOOST_TEST(r.holds, r.failure);
   }
+}
+
+// At low rates of gold verify's own T takes more than build's: finer gold decides.
+BOOST_AUTO_TEST_CASE(right_certificates_of_coarse_gold_are_agreed_with) {
+  std::int64_t finer = 0;
+  for (const unsigned seed : {3u, 4u})
+    for (const char* filter : {"linear", "cubic"})
+      for (const int gold : {2, 4}) {
+        const Made m =
+            made(noise_scan(15, 7, 29, seed), {8, 7, 6}, gold == 2 ? 0.6 : 0.2, {16, filter, gold});
+        const VerifyResult r = measured(m);
+        BOOST_TEST(r.holds, r.failure);
+        BOOST_TEST(r.total <= m.certificate.epsilon_abs);
+        finer += r.bricks_finer;
+      }
+  BOOST_TEST(finer > 0);
+}
+
+// F at the nodes of a finer gold, V as it is stored, and bricks cut into pieces.
+BOOST_AUTO_TEST_CASE(finer_gold_bounds_the_same_bricks_by_less) {
+  Device device;
+  const Made& m = small();
+  const ExactField exact(m.scan, m.certificate.field);
+  VerifyField field(device.state(), exact, m.volume, {}, {});
+  std::vector<std::uint8_t> selected(m.volume.level.size(), 0);
+  selected[brick_with_tile(m.volume)] = 1;
+  std::vector<double> totals, errors;
+  for (const int factor : {1, 2, 4, 8}) {
+    double total = 0, error = 0;
+    std::int64_t cells = 0;
+    field.run(selected, m.volume.rate * factor,
+              [&](const VerifyField::Piece& p) {
+                total = std::max(total, p.total);
+                error = std::max(error, p.error);
+                cells += p.cells;
+              },
+              {});
+    const std::int64_t side = std::int64_t{m.volume.granularity} * m.volume.rate * factor;
+    BOOST_TEST(cells == side * side * side);
+    if (!totals.empty()) {
+      BOOST_TEST(total <= totals.back() + 2 * field.arithmetic());
+      BOOST_TEST(error >= errors.back() - 2 * field.arithmetic());
+    }
+    totals.push_back(total);
+    errors.push_back(error);
+    BOOST_TEST(error <= total);
+  }
+  BOOST_TEST(totals.back() - errors.back() < 0.1 * (totals.front() - errors.front()));
 }
 
 BOOST_AUTO_TEST_CASE(little_memory_gives_the_same_verdict) {

@@ -250,7 +250,7 @@ void print_certificate(const Certificate& c) {
     fmt::print("  window       only where F lies in [{:.6g}, {:.6g}]\n", c.window->first, c.window->second);
   if (c.roi) {
     const auto& r = *c.roi;
-    fmt::print("  roi          only bricks inside {} to {}\n", vec_text({r[0], r[1], r[2]}),
+    fmt::print("  roi          only the points from {} to {}\n", vec_text({r[0], r[1], r[2]}),
                vec_text({r[3], r[4], r[5]}));
   }
   fmt::print("  input        {} (sha256 {})\n  content      sha256 {}\n", c.input_name, c.input_sha256,

@@ -12,6 +12,7 @@
 #include "apps/vdvr/progress.hpp"
 #include "host/error_slice.hpp"
 #include "host/io/atomic_file.hpp"
+#include "host/region_of_interest.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
@@ -96,18 +97,6 @@ std::string level_text(const LevelTriple& l) {
   return l[0] == l[1] && l[1] == l[2] ? std::to_string(l[0]) : fmt::format("{}{}{}", l[0], l[1], l[2]);
 }
 
-/// Whether a brick is among those that a region of interest certifies: the ones that meet it.
-bool brick_meets(const MixedVolume& volume, const std::array<double, 6>& roi, const Index3& brick) {
-  const Grid& g = volume.grid;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t first = brick[a] * volume.granularity,
-                       last = std::min(g.cells[a], first + volume.granularity);
-    if (g.origin[a] + static_cast<double>(last) * g.spacing[a] < roi[a]) return false;
-    if (g.origin[a] + static_cast<double>(first) * g.spacing[a] > roi[a + 3]) return false;
-  }
-  return true;
-}
-
 std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
                                    const std::vector<Vec3>& points, const Progress& progress) {
   const VdvrFile file = read_vdvr(path, common_options(args).max_memory);
@@ -134,7 +123,7 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
         level_text(volume.level[static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0])]);
     // Outside the region of interest nothing is promised. With a window, what is promised depends on F, which
     // V alone does not tell: where nothing was tested V may lie in the window by mistake.
-    const bool promised = !c.window && (!c.roi || brick_meets(volume, *c.roi, b));
+    const bool promised = !c.window && is_inside(c.roi, p);
     if (promised) probe.bound = c.total_buffer;
   }
   return probes;

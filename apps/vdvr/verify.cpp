@@ -67,6 +67,8 @@ Json verification_json(const VerifyResult& m, const Certificate& c) {
           {"bricks", m.bricks},
           {"nodes_tested", m.nodes_tested},
           {"cells_tested", m.cells_tested},
+          {"bricks_finer", m.bricks_finer},
+          {"finest_rate", m.finest_rate},
           {"seams", m.seams},
           {"failure", m.failure}};
 }
@@ -74,6 +76,8 @@ Json verification_json(const VerifyResult& m, const Certificate& c) {
 void print_verification(const VerifyResult& m, const Certificate& c) {
   fmt::print("verification   {} of {} bricks, {} gold cells, {} gold nodes: {}\n", m.bricks_tested, m.bricks,
              m.cells_tested, m.nodes_tested, m.holds ? "holds" : "DOES NOT HOLD");
+  if (m.bricks_finer > 0)
+    fmt::print("    {} bricks again on finer gold, up to {}x\n", m.bricks_finer, m.finest_rate);
   const auto line = [](const char* what, double measured, double certified) {
     fmt::print("    {:<18} measured {:>11.5g}   certified {:>11.5g}\n", what, measured, certified);
   };

@@ -34,8 +34,8 @@ struct SamplePlace {
 struct VerifyResult {
   bool holds = false;
   double epsilon_abs = 0;
-  double measured_max = 0;    ///< largest |V - F| at a tested gold node
-  double measured_total = 0;  ///< largest bound of |V - F| over a tested gold cell, exact interpolation of V
+  double measured_max = 0;    ///< largest |V - F| at a tested node
+  double measured_total = 0;  ///< largest bound of |V - F| over a tested brick, exact interpolation of V
   double arithmetic = 0;      ///< what verify's own computation of F may err; contained in measured_total
   double total = 0;           ///< measured_total and the worst sampler that the certificate names
   double total_buffer = 0;
@@ -46,13 +46,16 @@ struct VerifyResult {
   std::int64_t bricks_tested = 0, bricks = 0;
   std::int64_t nodes_tested = 0;  ///< distinct gold nodes, counted once per brick that they belong to
   std::int64_t cells_tested = 0;  ///< gold cells
+  std::int64_t bricks_finer = 0;  ///< bricks tested again on finer gold, where the file's own decided nothing
+  int finest_rate = 0;            ///< of the gold used
   std::int64_t seams = 0;         ///< samples that two bricks store with different bits (exhaustive only)
   std::string failure;            ///< one line: what does not match, and where; empty when it holds
 };
 
 /// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
-/// cell, V through the sampler header. Requires the samplers that `stored` says hold and that this device
-/// has. Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on the
+/// cell, V through the sampler header; again on finer gold, up to 64x, in bricks whose bound at the file's own
+/// rate exceeds epsilon or the certificate's total. Requires the samplers that `stored` says hold and that
+/// this device has. Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on the
 /// host, then 7 * views multiply-adds per gold node on the device. Throws ResourceError when --max-memory is
 /// too small for one brick and one view.
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,

@@ -1,0 +1,24 @@
+// What a region of interest certifies: the points of its closed box (docs/error-bounds.md, section 1). Called
+// by build.cpp, verify.cpp, error_slice.cpp and the program's probe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "vdvr/grid.hpp"
+
+namespace vdvr {
+
+/// {x0, y0, z0, x1, y1, z1}; none: all of space.
+using RegionOfInterest = std::optional<std::array<double, 6>>;
+
+/// Whether a certificate with this region speaks of the point.
+bool is_inside(const RegionOfInterest& region, const Vec3& point);
+
+/// [bz][by][bx]: bricks that hold a point of the region, or that a sampler may read for one: its coordinate
+/// in fp32 can end in the next brick.
+std::vector<std::uint8_t> bricks_of(const RegionOfInterest& region, const Grid& grid, int granularity);
+
+}  // namespace vdvr
