@@ -12,6 +12,7 @@
 
 #include "host/region_of_interest.hpp"
 #include "host/sampler_terms.hpp"
+#include "host/units.hpp"
 #include "host/verify_field.hpp"
 #include "host/verify_seams.hpp"
 #include "vdvr/error.hpp"
@@ -126,7 +127,7 @@ SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int
 std::string place_text(const SamplePlace& p) {
   const std::string where = p.dataset == "/base" ? p.dataset : fmt::format("{} tile {}", p.dataset, p.tile);
   return fmt::format(
-      "at ({:.4f}, {:.4f}, {:.4f}), where V is {:.6g} and F {:.6g}: brick {} of level ({}, {}, {}), {} "
+      "at ({:.6g}, {:.6g}, {:.6g}), where V is {:.6g} and F {:.6g}: brick {} of level ({}, {}, {}), {} "
       "sample ({}, {}, {}) (z, y, x)",
       p.world[0], p.world[1], p.world[2], p.value, p.field, p.brick, p.level[0], p.level[1], p.level[2],
       where, p.sample[2], p.sample[1], p.sample[0]);
@@ -265,14 +266,14 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     ~Give() { state.memory.give(bytes); }
   } const give{state, bytes};
   const ExactField exact(scan, stored.field, progress);
-  const SamplerTerms sampler =
-      sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device),
-                    atlas_length(device.info(), volume), stored.epsilon_abs, volume.rate);
+  const SamplerTerms sampler = sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device),
+                                             atlas_length(device.info(), volume), stored.epsilon_abs,
+                                             volume.rate, sampler_underflow(device.info()));
 
   VerifyResult result;
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
-  VerifyField field(state, exact, volume, stored.window, progress);
+  VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
   TestedBricks tested(field, volume, progress);
   tested.test(chosen_bricks(volume, stored, options), volume.rate, result);
   result.arithmetic = field.arithmetic();
@@ -329,7 +330,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     if (seams.different > 0) {
       result.holds = false;
       result.failure += fmt::format(
-          "{}{} samples that two bricks share differ, first at ({:.4f}, {:.4f}, {:.4f}) between bricks {} "
+          "{}{} samples that two bricks share differ, first at ({:.6g}, {:.6g}, {:.6g}) between bricks {} "
           "and {}",
           result.failure.empty() ? "" : "; ", seams.different, seams.at[0], seams.at[1], seams.at[2],
           seams.bricks[0], seams.bricks[1]);

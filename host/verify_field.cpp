@@ -12,6 +12,7 @@
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
+#include "host/units.hpp"
 #include "host/verify_cosines.hpp"
 #include "vdvr/error.hpp"
 
@@ -78,15 +79,30 @@ struct VerifyField::Batch {
   std::vector<std::uint8_t> tested;  // [block][y][x] gold cell columns
 };
 
+namespace {
+
+// The stored field times 2^exponent.
+DeviceField upload(opencl::State& state, const MixedVolume& volume, int exponent) {
+  if (exponent == 0) return {state, volume};
+  const HostShare copy(state, volume.base.bytes(), "the stored field in other units");
+  MixedVolume scaled = volume;
+  scale(scaled, exponent);
+  return {state, scaled};
+}
+
+}  // namespace
+
 VerifyField::VerifyField(opencl::State& state, const ExactField& field, const MixedVolume& volume,
-                         const std::optional<std::pair<double, double>>& window, const Progress& progress)
+                         const std::optional<std::pair<double, double>>& window, const Progress& progress,
+                         int density)
     : state_(state),
       field_(field),
       volume_(volume),
-      window_(window),
+      unit_(std::ldexp(1.0, density)),
       coverage_(field.geometry()),
       sups_(view_sups(field.coefficients(), field.geometry(), progress)),
-      stored_(state, volume) {
+      stored_(upload(state, volume, -density)) {
+  if (window) window_ = {window->first / unit_, window->second / unit_};
   // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on;
   // at no rate further than at the volume's own.
   const ParallelGeometry& g = field.geometry();
@@ -206,7 +222,7 @@ void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view
           for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
             if (r + i < shape.z_padded)
               out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
-                  static_cast<float>(values[at(i)]);
+                  static_cast<float>(values[at(i)] / unit_);
         });
     // Beyond the detector's edges the series is its own mirror image.
     for (std::int64_t n = 0; n < columns_; ++n) {
@@ -354,7 +370,7 @@ std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::in
 void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
                           const std::function<void(const Piece&)>& on_piece) {
   const std::int64_t n = static_cast<std::int64_t>(batch.items.size()), side = s.cells + 1;
-  const VdvrGrid grid = sampler_grid(volume_);
+  const VdvrGrid& grid = stored_.grid;
   const opencl::DeviceArray<cl_int4> items(state_, std::span<const cl_int4>(batch.items), "bricks to verify"),
       first(state_, std::span<const cl_int4>(batch.first), "blocks to verify");
   const opencl::DeviceArray<std::uint8_t> tested(state_, std::span<const std::uint8_t>(batch.tested),
@@ -385,9 +401,9 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     std::array<double, 6> largest{};
     for (std::int64_t y = 0; y < side; ++y)
       for (std::size_t q = 0; q < 6; ++q)
-        largest[q] = std::max(largest[q], static_cast<double>(rows[at(i * side + y)].s[q]));
+        largest[q] = std::max(largest[q], unit_ * static_cast<double>(rows[at(i * side + y)].s[q]));
     constants[at(i)] = brick_constant(s.bounds, largest) + s.bounds.arithmetic;
-    widening[at(i)] = static_cast<float>(constants[at(i)] * (1 + 1e-6));
+    widening[at(i)] = static_cast<float>(constants[at(i)] / unit_ * (1 + 1e-6));
   }
   const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
                                                    "constants of pieces");
@@ -435,13 +451,13 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     for (std::int64_t j = 0; j < s.cells * s.cells; ++j) {
       const Column& c = b.columns[at(j)];
       if (c.total < 0) continue;
-      b.error = std::max(b.error, static_cast<double>(c.error));
+      b.error = std::max(b.error, unit_ * static_cast<double>(c.error));
       if (c.total <= best) continue;
       best = c.total;
       b.worst_cell = {b.first_cell[0] + j % s.cells, b.first_cell[1] + j / s.cells,
                       b.first_cell[2] + c.worst_z};
     }
-    if (best >= 0) b.total = static_cast<double>(best) + b.constant;
+    if (best >= 0) b.total = unit_ * static_cast<double>(best) + b.constant;
     on_piece(b);
   }
 }

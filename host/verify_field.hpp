@@ -23,7 +23,7 @@ namespace vdvr {
 
 class VerifyField {
  public:
-  /// One column of gold cells, as verify_cells writes it.
+  /// One column of gold cells, as verify_cells writes it, in the device's unit.
   struct Column {
     float total, error;
     std::int32_t worst_z, pad;
@@ -42,9 +42,11 @@ class VerifyField {
     std::span<const Column> columns;    ///< [y][x] of the piece's side; total < 0: untested
   };
 
-  /// `field` outlives this object. Throws ResourceError when memory does not suffice.
+  /// `field` outlives this object. All it is given and gives is in world units, but for columns: the device
+  /// works in densities of 2^density (units.hpp). Throws ResourceError when memory does not suffice.
   VerifyField(opencl::State& state, const ExactField& field, const MixedVolume& volume,
-              const std::optional<std::pair<double, double>>& window, const Progress& progress);
+              const std::optional<std::pair<double, double>>& window, const Progress& progress,
+              int density = 0);
 
   /// Measures the selected bricks on gold of `rate`, a multiple of the volume's by a power of two; calls back
   /// once for each of their pieces, in no particular order.
@@ -72,7 +74,8 @@ class VerifyField {
   opencl::State& state_;
   const ExactField& field_;
   const MixedVolume& volume_;
-  std::optional<std::pair<double, double>> window_;
+  double unit_;                                      // of densities on the device
+  std::optional<std::pair<double, double>> window_;  // in it
   Coverage coverage_;
   ViewSups sups_;
   DeviceField stored_;

@@ -16,6 +16,7 @@
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/simulate.hpp"
+#include "vdvr/verify.hpp"
 
 namespace vdvr {
 namespace {
@@ -104,6 +105,11 @@ BOOST_AUTO_TEST_CASE(the_same_scan_in_other_units_has_the_same_certificate) {
   options.roi = {-3, -4, -2, 4, 3, 1};
   const Built reference = built(scan, grid, 0.05, {}, options);
   BOOST_TEST(reference.result.certificate.holds_buffer);
+  VerifyOptions exhaustive;
+  exhaustive.exhaustive = true;
+  const VerifyResult verified =
+      verify(device(), scan, reference.result.volume, reference.result.certificate, exhaustive);
+  BOOST_TEST(verified.holds);
   for (const Units& units : many_units) {
     BOOST_TEST_CONTEXT("units " << units.across << ", " << units.along << ", " << units.line) {
       BuildOptions other = options;
@@ -112,6 +118,11 @@ BOOST_AUTO_TEST_CASE(the_same_scan_in_other_units_has_the_same_certificate) {
       check_same_volume(reference.result.volume, b.result.volume, units);
       check_same_terms(reference.result.certificate, b.result.certificate, units);
       BOOST_TEST((b.result.volume.grid.spacing == to_world(grid.spacing, units)));
+      const VerifyResult v =
+          verify(device(), in_other_units(scan, units), b.result.volume, b.result.certificate, exhaustive);
+      BOOST_TEST(v.holds, v.failure);
+      BOOST_TEST(v.cells_tested == verified.cells_tested);
+      BOOST_TEST(std::abs(v.measured_total / to_world(verified.measured_total, units) - 1) < 1e-6);
       BOOST_TEST(to_world(reference.plan.budget.grid.value, units) == b.plan.budget.grid.value);
     }
   }
