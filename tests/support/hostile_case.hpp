@@ -17,6 +17,7 @@
 #include "tests/support/attack_scans.hpp"
 #include "vdvr/build.hpp"
 #include "vdvr/exact_field.hpp"
+#include "vdvr/reconstruct.hpp"
 #include "vdvr/simulate.hpp"
 
 namespace vdvr::hostile {
@@ -302,7 +303,7 @@ inline void draw_options(Random& random, Case& c) {
   c.epsilon = 0.005 * std::pow(60.0, unit(random));  // .5 to 30 %
   c.against = one_of(random, {Against::range, Against::range, Against::absolute, Against::largest});
   if (chance(random, 0.5)) c.rates.upsampling = one_of(random, {2, 4, 8, 16, 32, 64});
-  if (chance(random, 0.7)) c.rates.gold = one_of(random, {2, 4, 4, 8, 8, 16, 32});
+  if (chance(random, 0.7)) c.rates.gold = one_of(random, {2, 2, 4, 4, 8, 8, 16, 32});
   c.rates.u_filter = one_of<const char*>(random, {"auto", "auto", "linear", "cubic"});
   c.settings.coefficients = one_of<const char*>(random, {"midrange", "midrange", "sampled"});
   c.settings.levels = one_of<const char*>(random, {"anisotropic", "anisotropic", "isotropic"});
@@ -320,8 +321,18 @@ inline void draw_options(Random& random, Case& c) {
   if (chance(random, 0.15)) c.field.cutoff = one_of(random, {0.5, 0.8});
 }
 
+/// The whole covered cylinder, in cells of a pixel.
+inline bool draw_whole_grid(Random& random, Case& c) {
+  const ParallelGeometry& g = c.scan.geometry;
+  if (!chance(random, 0.1) || g.columns > 17 || c.rates.gold.value_or(32) > 8) return false;
+  c.grid = make_grid(g, {});
+  c.options.granularity = c.settings.granularity = std::max(2, c.options.granularity);
+  return true;
+}
+
 /// A few cells near the target, in the middle, at the rim of the covered disk, or beyond it.
 inline void draw_grid(Random& random, Case& c) {
+  if (draw_whole_grid(random, c)) return;
   const ParallelGeometry& g = c.scan.geometry;
   const int gold = c.rates.gold.value_or(16), views = static_cast<int>(g.views());
   // 7 multiply-adds a node and view are verify's: a few tens of millions in all.
@@ -377,7 +388,9 @@ inline void draw_grid(Random& random, Case& c) {
 
 inline double draw_factor(Random& random, double decades, bool exact) {
   if (chance(random, 1.0 / 3)) return 1;
-  const double tens = (2 * unit(random) - 1) * decades;
+  // A third at the outermost sixth of the decades, where the first products leave float32.
+  const double reach = chance(random, 1.0 / 3) ? (5 + unit(random)) / 6 : unit(random);
+  const double tens = (chance(random, 0.5) ? 1 : -1) * reach * decades;
   return exact ? std::exp2(std::round(tens * std::log2(10.0))) : std::pow(10.0, tens);
 }
 
@@ -410,10 +423,12 @@ inline Case draw_case(std::uint64_t seed) {
   draw_grid(random, c);
   find_range(c);
   if (chance(random, 2.0 / 3)) {
-    const bool exact = chance(random, 0.4);
+    const bool exact = chance(random, 0.5);
     c.scale.pitch_u = draw_factor(random, 12, exact);
     c.scale.pitch_v = c.scale.pitch_u * draw_factor(random, 12, exact);
     c.scale.density = draw_factor(random, 36, exact);
+    // A lattice of integers has steps of powers of two: at other factors only float32 can be compared.
+    if (!exact && chance(random, 0.5)) c.options.storage = StorageChoice::f32;
   }
   return c;
 }
