@@ -451,7 +451,8 @@ inline void compare_scales(const Case& c, const Inputs& in, const Outcome& one, 
   if (scaled.kind == "built") return;
   if (!r.excuse.empty()) {
     if (one.kind != "built" && scaled.kind != "other") return;
-    if (scaled.kind != "input" || scaled.message.find("float32") == std::string::npos)
+    const auto names = [&](const char* type) { return scaled.message.find(type) != std::string::npos; };
+    if (scaled.kind != "input" || !(names("float32") || names("fp32")))
       r.fail("unclear refusal", r.excuse + ", but: " + scaled.message);
   } else if (one.kind == "built") {
     r.fail("refused", "builds at scale 1, but: " + scaled.message);
