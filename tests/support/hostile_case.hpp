@@ -184,7 +184,10 @@ inline ProjectionSet noisy_sphere(const ParallelGeometry& g, double sigma, std::
 /// there.
 inline void draw_wave(Random& random, ParallelGeometry g, Case& c) {
   const auto U = static_cast<std::size_t>(g.columns), V = static_cast<std::size_t>(g.rows);
-  const std::size_t m = chance(random, 0.6) ? U - 1 - (random() % 2) : random() % U, l = random() % V;
+  // Near Nyquist along u, along v, or both.
+  const bool along_v = chance(random, 0.3), along_u = !along_v || chance(random, 0.3);
+  const std::size_t m = along_u ? (chance(random, 0.7) ? U - 1 - random() % 2 : random() % U) : 0,
+                    l = along_v && V > 1 ? V - 1 - random() % 2 : random() % V;
   const int upsampling = one_of(random, {2, 4, 8});
   g.center = attacks::middle_of_column(
       std::clamp(attacks::crest(m, U), 0.3 * static_cast<double>(U), 0.7 * static_cast<double>(U)),
@@ -330,46 +333,55 @@ inline bool draw_whole_grid(Random& random, Case& c) {
   return true;
 }
 
-/// A few cells near the target, in the middle, at the rim of the covered disk, or beyond it.
-inline void draw_grid(Random& random, Case& c) {
-  if (draw_whole_grid(random, c)) return;
+/// Near the target, in the middle, at the rim of the covered disk, or anywhere in it; the place in the middle
+/// of a gold cell, on a node, or anywhere between.
+inline void place_grid(Random& random, Case& c) {
   const ParallelGeometry& g = c.scan.geometry;
-  const int gold = c.rates.gold.value_or(16), views = static_cast<int>(g.views());
-  // 7 multiply-adds a node and view are verify's: a few tens of millions in all.
-  const double most_cells = 4e6 / (std::pow(gold, 3) * views);
-  const int wide = most_cells > 400 ? 8 : most_cells > 60 ? 5 : 2;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const int most = a == 2 ? std::max(1, wide / 2) : wide;
-    c.grid.cells[a] = std::uniform_int_distribution<std::int64_t>(1, most)(random);
-  }
-  const double d = one_of(random, {0.4, 0.7, 0.9, 1.0, 1.0, 1.3, 2.0});
-  c.grid.spacing = {d, d, chance(random, 0.5) ? 1.0 : one_of(random, {0.4, 0.7, 1.0, 1.6})};
   const double half = 0.5 * static_cast<double>(g.rows - 1),
                radius = std::min(g.center, static_cast<double>(g.columns - 1) - g.center) + 0.5;
   Vec3 at = c.target;
   const int place = std::uniform_int_distribution<int>(0, 3)(random);
   if (place == 1) at = {0, 0, 0};
   if (place >= 2) {
-    const double angle = 6.2831 * unit(random), r = place == 2 ? radius : radius * std::sqrt(unit(random));
+    const double angle = 2 * std::numbers::pi * unit(random),
+                 r = place == 2 ? radius : radius * std::sqrt(unit(random));
     at = {r * std::cos(angle), r * std::sin(angle), (2 * unit(random) - 1) * half};
   }
-  // In the middle of a gold cell, on a node, or anywhere.
-  const double shift = one_of(random, {0.0, 0.5 / gold, unit(random)});
+  const double shift = one_of(random, {0.0, 0.5 / c.rates.gold.value_or(16), unit(random)});
   for (std::size_t a = 0; a < 3; ++a)
     c.grid.origin[a] =
         at[a] - (std::floor(0.5 * static_cast<double>(c.grid.cells[a])) + shift) * c.grid.spacing[a];
   if (g.rows == 1 && chance(random, 0.5)) c.grid.origin[2] = -0.5 * c.grid.spacing[2];
-  if (chance(random, 0.25)) {
-    LevelTriple base{};
-    for (std::uint8_t& b : base) b = static_cast<std::uint8_t>(random() % 2);
-    // Cells and bricks must be whole base cells.
-    for (std::size_t a = 0; a < 3; ++a)
-      if (base[2 - a] > 0) c.grid.cells[a] += c.grid.cells[a] % 2;
-    if (c.options.granularity == 1) c.settings.granularity = c.options.granularity = 2;
-    if (c.options.closing != Closing::paper) c.settings.coarsening = base;
-  } else if (chance(random, 0.4)) {
-    c.settings.coarsening = LevelTriple{0, 0, 0};
+}
+
+/// Whether a sample of the grid is covered: of one row, seen from above.
+inline bool meets_coverage(const Case& c) {
+  const Index3 n = c.grid.samples();
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        Vec3 p = c.grid.position({x, y, z});
+        if (c.scan.geometry.rows == 1) p[2] = 0;
+        if (is_covered(c.scan.geometry, c.scan.geometry.center, p)) return true;
+      }
+  return false;
+}
+
+inline void draw_base(Random& random, Case& c) {
+  if (!chance(random, 0.25)) {
+    if (chance(random, 0.4)) c.settings.coarsening = LevelTriple{0, 0, 0};
+    return;
   }
+  LevelTriple base{};
+  for (std::uint8_t& b : base) b = static_cast<std::uint8_t>(random() % 2);
+  // Cells and bricks must be whole base cells.
+  for (std::size_t a = 0; a < 3; ++a)
+    if (base[2 - a] > 0) c.grid.cells[a] += c.grid.cells[a] % 2;
+  if (c.options.granularity == 1) c.settings.granularity = c.options.granularity = 2;
+  if (c.options.closing != Closing::paper) c.settings.coarsening = base;
+}
+
+inline void draw_region_and_window(Random& random, Case& c) {
   if (chance(random, 0.2)) {
     std::array<double, 6> roi{};
     for (std::size_t a = 0; a < 3; ++a) {
@@ -380,10 +392,29 @@ inline void draw_grid(Random& random, Case& c) {
     }
     c.options.roi = roi;
   }
-  if (chance(random, 0.15)) {
+  if (chance(random, 0.12)) {
     const double from = 0.6 * unit(random);
     c.window = {from, from + 0.1 + 0.4 * unit(random)};
   }
+}
+
+/// A few cells, fewer where gold is fine.
+inline void draw_grid(Random& random, Case& c) {
+  if (!draw_whole_grid(random, c)) {
+    const ParallelGeometry& g = c.scan.geometry;
+    // 7 multiply-adds a node and view are verify's: a hundred million in all.
+    const double most_cells =
+        1.2e7 / (std::pow(c.rates.gold.value_or(16), 3) * static_cast<double>(g.views()));
+    const int wide = most_cells > 400 ? 8 : most_cells > 60 ? 5 : 2;
+    for (std::size_t a = 0; a < 3; ++a)
+      c.grid.cells[a] =
+          std::uniform_int_distribution<std::int64_t>(1, a == 2 ? std::max(1, wide / 2) : wide)(random);
+    const double d = one_of(random, {0.4, 0.7, 0.9, 1.0, 1.0, 1.3, 2.0});
+    c.grid.spacing = {d, d, chance(random, 0.5) ? 1.0 : one_of(random, {0.4, 0.7, 1.0, 1.6})};
+    for (int i = 0; i < 20 && (i == 0 || !meets_coverage(c)); ++i) place_grid(random, c);
+    draw_base(random, c);
+  }
+  draw_region_and_window(random, c);
 }
 
 inline double draw_factor(Random& random, double decades, bool exact) {
