@@ -121,3 +121,34 @@ BOOST_AUTO_TEST_CASE(what_float32_cannot_hold_is_refused_by_name) {
     BOOST_TEST(r.outcome.kind == "input", text_of(s) << ": " << r.outcome.kind << ": " << r.outcome.message);
   }
 }
+
+// The harness itself: what it must find in a certificate that was right before.
+BOOST_AUTO_TEST_CASE(wrong_certificates_are_found) {
+  Case c = at_scale(noisy_sphere(), {});
+  c.options.storage = StorageChoice::f32;
+  const Inputs in = inputs_at(c, c.scale);
+  const auto outcome = detail::attempt(device(), in);
+  BOOST_REQUIRE(outcome.built);
+  const auto kinds = [&](auto&& damage) {
+    BuildResult result = *outcome.built;
+    damage(result);
+    Report r;
+    check_built(device(), c, in, result, seed, r);
+    std::set<std::string> found;
+    for (const Failure& f : r.failures) found.insert(f.kind);
+    return found;
+  };
+  BOOST_TEST(kinds([](BuildResult&) {}).empty());
+  BOOST_TEST(kinds([](BuildResult& b) { b.certificate.total_buffer *= 0.6; }).contains("violation"));
+  BOOST_TEST(kinds([](BuildResult& b) {
+               for (float& t : b.certificate.brick_totals) t *= 0.6f;
+             }).contains("brick bound"));
+  BOOST_TEST(kinds([](BuildResult& b) {
+               for (float& t : b.certificate.brick_totals) t = t == b.certificate.brick_totals[12] ? -1 : t;
+             }).contains("not tested"));
+  BOOST_TEST(kinds([](BuildResult& b) { b.certificate.bounds[0].value = INFINITY; }).contains("not finite"));
+  BOOST_TEST(kinds([](BuildResult& b) { b.certificate.budget.gold.value = NAN; }).contains("not finite"));
+  BOOST_TEST(kinds([](BuildResult& b) {
+               b.volume.tiles.begin()->second.f32[7] = std::numeric_limits<float>::quiet_NaN();
+             }).contains("violation"));
+}

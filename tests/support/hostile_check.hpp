@@ -278,11 +278,11 @@ class Truth {
       once("not tested", "a covered point lies in no tested brick: " + errs() + where());
       return 0;
     }
-    if (error > 0 || !(error <= 0)) {
+    const bool roi_face = in_.options.roi && !std::isfinite(bound_of((b[2] * n[1] + b[1]) * n[0] + b[0]));
+    if (!roi_face && error > 0) {
       report_.closest = std::max(report_.closest, error / total_);
       report_.closest_brick = std::max(report_.closest_brick, error / bound);
     }
-    const bool roi_face = in_.options.roi && !std::isfinite(bound_of((b[2] * n[1] + b[1]) * n[0] + b[0]));
     if (!(error <= total_)) once(roi_face ? "roi face" : "violation", errs() + where());
     else if (!(error <= bound))
       once(roi_face ? "roi face" : "brick bound",
