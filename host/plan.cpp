@@ -454,6 +454,10 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   check_rates(rates);
   check_tolerance(tolerance);
   check_line_integrals(scan);
+  if (tolerance.relative && largest_magnitude(scan.data) == 0)
+    throw InputError(
+        "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
+        "--epsilon-abs");
   const Units units = units_of(scan);
   Tolerance wanted = tolerance;
   if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
