@@ -11,6 +11,7 @@
 #include <random>
 
 #include "host/sampler_terms.hpp"
+#include "host/verify_claims.hpp"
 #include "host/verify_field.hpp"
 #include "host/verify_seams.hpp"
 #include "vdvr/error.hpp"
@@ -159,6 +160,26 @@ void judge(const Certificate& stored, const SamplerTerms& sampler, VerifyResult&
   else r.holds = r.holds_buffer.value_or(true) && r.holds_image3d.value_or(true);
 }
 
+// The sampler terms again, and the least that an image sampler can have.
+Differences check_samplers(Device& device, const MixedVolume& volume, const Certificate& stored,
+                           const FieldSlopes& slopes, const SamplerTerms& found) {
+  SamplerProbe ideal;
+  ideal.image3d = ideal.u16.image3d = ideal.u8.image3d = true;
+  const SamplerTerms least = sampler_terms(slopes, volume.grid, ideal, 1, stored.epsilon_abs, volume.rate);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  return compare_samplers(found, least, same_device, stored);
+}
+
+// Adds what differs to the verdict.
+void add_differences(VerifyResult& r) {
+  if (r.differences.empty()) return;
+  r.holds = false;
+  for (std::size_t i = 0; i < r.differences.size(); ++i)
+    r.failure +=
+        fmt::format("{}{}", r.failure.empty() ? "the certificate is not that of these projections: " : "; ",
+                    r.differences[i]);
+}
+
 }  // namespace
 
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
@@ -175,11 +196,20 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     ~Give() { state.memory.give(bytes); }
   } const give{state, bytes};
   const ExactField exact(scan, stored.field, progress);
+  const FieldSlopes slopes = field_slopes(volume);
   const SamplerTerms sampler =
-      sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device),
-                    atlas_length(device.info(), volume), stored.epsilon_abs, volume.rate);
+      sampler_terms(slopes, volume.grid, probe_sampler(device), atlas_length(device.info(), volume),
+                    stored.epsilon_abs, volume.rate);
 
   VerifyResult result;
+  result.differences = compare_scope(scan, used, volume, stored);
+  const auto also = [&](Differences more) {
+    result.differences.insert(result.differences.end(), std::make_move_iterator(more.begin()),
+                              std::make_move_iterator(more.end()));
+  };
+  also(check_samplers(device, volume, stored, slopes, sampler));
+  const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
+  TotalAttack attack(volume, stored);
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   std::int64_t worst = -1, broken = -1;
@@ -187,9 +217,10 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   {
     VerifyField field(state, exact, volume, stored.window, progress);
     field.run(
-        chosen_bricks(volume, stored, options),
+        selected,
         [&](const VerifyField::Brick& b) {
           if (b.total < 0) return;
+          attack.consider(b);
           ++result.bricks_tested;
           result.cells_tested += b.cells;
           result.nodes_tested += b.nodes;
@@ -210,6 +241,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   }
   if (worst < 0) {
     result.failure = "no tested brick holds a covered gold cell";
+    add_differences(result);
     return result;
   }
   result.worst = worst_sample(volume, exact, worst, worst_cell);
@@ -231,6 +263,17 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
                                  stored.brick_totals[at(broken)],
                                  place_text(worst_sample(volume, exact, broken, broken_cell)));
   }
+  const TotalAttack::Outcome points = attack.run(exact, progress);
+  result.points_evaluated = points.points;
+  result.worst_share = points.worst_share;
+  if (result.holds && !points.failure.empty()) {
+    result.holds = false;
+    result.failure = points.failure;
+  }
+  // Rates that name no gold have been found already.
+  if (result.differences.empty())
+    also(compare_terms(device, scan, exact, volume, stored, selected, options.exhaustive, progress));
+  add_differences(result);
   if (options.exhaustive) {
     const Seams seams = compare_seams(volume);
     result.seams = seams.different;

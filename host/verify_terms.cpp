@@ -1,0 +1,223 @@
+// What build computes beside |V - F|, made again by its own code and compared with the certificate. This says
+// whether the certificate is the one that build writes; whether V is near F is measured by other means.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "host/classify_bricks.hpp"
+#include "host/covered_range.hpp"
+#include "host/reconstruct_field.hpp"
+#include "host/verify_claims.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Sups and tables are sums in fp32 over at most a few thousand terms: devices agree on them better than this.
+constexpr double table_rounding = 0x1p-10;
+
+/// The scan filtered as build does, and what follows from that.
+struct Filtered {
+  Filtered(opencl::State& device, const ProjectionSet& projections, const FieldOptions& field)
+      : state(device), scan(filter_projections(device, projections, field)), upsampler(device, scan) {
+    measure_filter_error(scan, projections, field);
+    sups = field_sups(device, upsampler, scan);
+  }
+  Filtered(const Filtered&) = delete;
+  Filtered& operator=(const Filtered&) = delete;
+
+  opencl::State& state;
+  FilteredScan scan;
+  Upsampler upsampler;
+  FieldSups sups;
+};
+
+/// Rounding as build bounds it, of blocks of samples with this spacing, so many along their sides; `base` is
+/// the grid that sets how far columns reach.
+double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double side, int upsampling,
+                     const std::string& u_filter) {
+  const auto n = static_cast<std::int64_t>(side);
+  const ColumnBlocks blocks{n, n, spacing[0], spacing[1], {}, {}};
+  return arithmetic_bound(f.upsampler, f.scan, f.sups, columns_for(f.scan.geometry, base, upsampling), blocks,
+                          u_filter);
+}
+
+// R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
+// the extremes of two fields differ by no more than the fields do.
+void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
+                   const Certificate& c) {
+  const Volume base = reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, "cubic", {});
+  const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
+  const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
+               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, "cubic"),
+               found = range.high - range.low;
+  if (!(std::abs(c.reference_range - found) <= 4 * rounding))
+    out.push_back(
+        fmt::format("reference_range is {}, not {} within {:.3g}", c.reference_range, found, 4 * rounding));
+  // F itself at the two extremes, by other means: the range cannot be smaller.
+  const std::array points{v.grid.position(range.low_at), v.grid.position(range.high_at)};
+  const std::vector<double> F = exact.at(points);
+  const double du = f.scan.geometry.pitch_u / 8, wave = std::numbers::pi / f.scan.geometry.pitch_u,
+               projection = 3.0 / 128 * std::pow(du, 4) * wave * wave * f.sups.second_u;
+  const double least = F[1] - F[0] - 2 * (projection + rounding + exact.rounding());
+  if (!(c.reference_range >= least))
+    out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
+                              c.reference_range, F[1] - F[0]));
+}
+
+// Blocks are cut to the memory there is: from one brick to 128 gold cells, with a halo.
+void compare_arithmetic(Differences& out, Filtered& f, const Grid& base, const MixedVolume& v,
+                        const Certificate& c, bool same_device) {
+  Vec3 gold = v.grid.spacing;
+  for (double& h : gold) h /= v.rate;
+  const double brick = v.granularity * v.rate, block = std::max(1.0, std::floor(128 / brick)) * brick;
+  const auto bound = [&](double side, double ramp_error) {
+    const double own = std::exchange(f.scan.ramp_error, ramp_error);
+    const double all = arithmetic_of(f, base, gold, side, c.upsampling_u, c.u_filter);
+    f.scan.ramp_error = own;
+    return all;
+  };
+  // The filter's own error is measured, and another device's may be smaller.
+  const double low = bound(brick + 3, same_device ? f.scan.ramp_error : 0),
+               high = bound(block + 3 + 2 * level_fit_steps * v.rate, f.scan.ramp_error);
+  const double value = c.budget.arithmetic.value;
+  if (!(value >= low * (1 - table_rounding)))
+    out.push_back(fmt::format("the arithmetic term is {}, below {}", value, low));
+  if (same_device && !(value <= high * (1 + table_rounding)))
+    out.push_back(fmt::format("the arithmetic term is {}, above {}", value, high));
+}
+
+/// |V - gold| + T + P of the selected bricks, as build measures them.
+class Totals {
+ public:
+  Totals(Filtered& f, const MixedVolume& v, const Certificate& c)
+      : f_(f),
+        volume_(v),
+        stored_(c),
+        field_(f.state, v),
+        gold_(f.state, f.scan, f.upsampler, f.sups, settings(v, c)) {}
+
+  void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,
+               const Progress& progress) {
+    const std::vector<std::uint8_t> near = gold_.fine().bricks_near_coverage();
+    for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = selected[i] && near[i];
+    // A brick has its total from either rate of gold: the coarse one explains most, for an eighth of the
+    // work.
+    if (GoldStream* coarse = gold_.coarse()) {
+      std::vector<std::uint8_t> resolved = selected;
+      const LevelTriple finest = coarse->settings().finest();
+      for (std::size_t i = 0; i < resolved.size(); ++i)
+        for (std::size_t a = 0; a < 3; ++a)
+          if (volume_.level[i][a] > finest[a]) resolved[i] = 0;
+      run(*coarse, resolved, progress, [&](const BrickMeasure& m) {
+        if (!agrees(m)) return;
+        selected[at(m.brick)] = 0;
+        // What build certified by coarse gold has no larger error between that gold's nodes.
+        if (m.total >= 0) most_ = std::max(most_, static_cast<double>(m.total) + tolerance(m));
+      });
+    }
+    run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
+      if (m.total >= 0) most_ = std::max(most_, static_cast<double>(m.error) + 2 * arithmetic());
+      if (agrees(m)) return;
+      ++different_;
+      if (different_ > 1) return;
+      first_ = fmt::format("the total of brick {} is {}, not {} within {:.3g}", m.brick,
+                           stored_.brick_totals[at(m.brick)], m.total, tolerance(m));
+    });
+    if (different_ > 0)
+      out.push_back(different_ > 1 ? fmt::format("{} totals of bricks differ; {}", different_, first_)
+                                   : first_);
+    compare_projection(out, exhaustive);
+    compare_largest(out, exhaustive);
+  }
+
+ private:
+  static GoldSettings settings(const MixedVolume& v, const Certificate& c) {
+    GoldSettings s{v.grid, v.granularity, v.rate, c.upsampling_u, c.u_filter, c.window};
+    s.coarsening = v.coarsening;
+    return s;
+  }
+
+  void run(GoldStream& gold, const std::vector<std::uint8_t>& selected, const Progress& progress,
+           const std::function<void(const BrickMeasure&)>& visit) {
+    if (std::find(selected.begin(), selected.end(), 1) == selected.end()) return;
+    const opencl::DeviceArray<std::uint8_t> on_device(f_.state, std::span<const std::uint8_t>(selected),
+                                                      "bricks to measure");
+    gold.run(
+        selected,
+        [&](GoldStream::Batch& batch) {
+          const auto measures = batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device);
+          const auto p = batch.largest_p();
+          for (std::size_t i = 0; i < measures.size(); ++i) {
+            visit(measures[i]);
+            if (!(measures[i].total >= 0)) continue;
+            projection_ = std::max(projection_, static_cast<double>(p[i].first));
+            error_ = std::max(error_, static_cast<double>(measures[i].error));
+          }
+        },
+        progress, "totals");
+  }
+
+  [[nodiscard]] double arithmetic() const { return gold_.fine().arithmetic(); }
+
+  // Of two computations each: gold errs by A, a second difference by 4 A and T, an eighth of three of them,
+  // by 1.5 A. P comes from tables.
+  [[nodiscard]] double tolerance(const BrickMeasure& m) const {
+    return 5 * arithmetic() + table_rounding * static_cast<double>(std::max(m.total, 0.0f));
+  }
+
+  [[nodiscard]] bool agrees(const BrickMeasure& m) const {
+    if (stored_.brick_totals.empty()) return true;
+    const auto stored = static_cast<double>(stored_.brick_totals[at(m.brick)]);
+    if (m.total < 0 || stored < 0) return m.total < 0 && stored < 0;
+    return std::abs(stored - static_cast<double>(m.total)) <= tolerance(m);
+  }
+
+  void compare_projection(Differences& out, bool exhaustive) const {
+    const double value = stored_.budget.projection.value;
+    if (!(value >= projection_ * (1 - table_rounding)) ||
+        (exhaustive && !(value <= projection_ * (1 + table_rounding))))
+      out.push_back(fmt::format("the projection term is {}, not {}{}", value, exhaustive ? "" : "at least ",
+                                projection_));
+  }
+
+  void compare_largest(Differences& out, bool exhaustive) const {
+    const double value = stored_.measured_max;
+    if (!(value >= error_ - 2 * arithmetic()) || (exhaustive && !(value <= most_)))
+      out.push_back(
+          fmt::format("measured_max is {}, not {}{}", value, exhaustive ? "" : "at least ", error_));
+  }
+
+  Filtered& f_;
+  const MixedVolume& volume_;
+  const Certificate& stored_;
+  DeviceField field_;
+  GoldRates gold_;
+  double projection_ = 0, error_ = 0;  // largest seen
+  double most_ = 0;                    // what measured_max can be
+  std::int64_t different_ = 0;
+  std::string first_;
+};
+
+}  // namespace
+
+Differences compare_terms(Device& device, const ProjectionSet& scan, const ExactField& exact,
+                          const MixedVolume& volume, const Certificate& stored,
+                          const std::vector<std::uint8_t>& selected, bool exhaustive,
+                          const Progress& progress) {
+  Differences out;
+  Filtered f(device.state(), scan, stored.field);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  compare_range(out, f, exact, volume, stored);
+  compare_arithmetic(out, f, coarsened(volume.grid, volume.coarsening), volume, stored, same_device);
+  if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
+    out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
+  Totals(f, volume, stored).compare(out, selected, exhaustive, progress);
+  return out;
+}
+
+}  // namespace vdvr
