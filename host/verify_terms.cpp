@@ -9,6 +9,7 @@
 
 #include "host/classify_bricks.hpp"
 #include "host/covered_range.hpp"
+#include "host/host_memory.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/verify_claims.hpp"
 
@@ -22,8 +23,11 @@ constexpr double table_rounding = 0x1p-10;
 
 /// The scan filtered as build does, and what follows from that.
 struct Filtered {
-  Filtered(opencl::State& device, const ProjectionSet& projections, const FieldOptions& field)
-      : state(device), scan(filter_projections(device, projections, field)), upsampler(device, scan) {
+  Filtered(opencl::State& device, const ProjectionSet& projections, const FieldOptions& field,
+           const Progress& progress)
+      : state(device),
+        scan(filter_projections(device, projections, field, progress)),
+        upsampler(device, scan) {
     measure_filter_error(scan, projections, field);
     sups = field_sups(device, upsampler, scan);
   }
@@ -49,8 +53,8 @@ double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double 
 // R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
 // the extremes of two fields differ by no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
-                   const Certificate& c) {
-  const Volume base = reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, "cubic", {});
+                   const Certificate& c, const Progress& progress) {
+  const Volume base = reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, "cubic", progress);
   const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
                rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, "cubic"),
@@ -210,9 +214,12 @@ Differences compare_terms(Device& device, const ProjectionSet& scan, const Exact
                           const std::vector<std::uint8_t>& selected, bool exhaustive,
                           const Progress& progress) {
   Differences out;
-  Filtered f(device.state(), scan, stored.field);
+  HostMemory host(device.state());
+  host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, filtered,");
+  host.count(4 * static_cast<std::uint64_t>(volume.grid.sample_count()), "the base samples");
+  Filtered f(device.state(), scan, stored.field, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
-  compare_range(out, f, exact, volume, stored);
+  compare_range(out, f, exact, volume, stored, progress);
   compare_arithmetic(out, f, coarsened(volume.grid, volume.coarsening), volume, stored, same_device);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
     out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
