@@ -91,7 +91,7 @@ void print_verification(const VerifyResult& m, const Certificate& c) {
   if (m.points_evaluated > 0)
     fmt::print("    {:<18} {} between nodes: at most {:.1f} % of what the certificate bounds there\n",
                "points", m.points_evaluated, 100 * m.worst_share);
-  for (const std::string& line : m.differences) fmt::print("    DIFFERS            {}\n", line);
+  for (const std::string& what : m.differences) fmt::print("    DIFFERS            {}\n", what);
 }
 
 namespace {
