@@ -125,7 +125,10 @@ class Totals {
     }
     std::vector<BrickMeasure> low;
     run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
-      if (m.total >= 0) most_ = std::max(most_, static_cast<double>(m.error) + 2 * arithmetic());
+      if (m.total >= 0) {
+        error_ = std::max(error_, static_cast<double>(m.error));
+        most_ = std::max(most_, static_cast<double>(m.error) + 2 * arithmetic());
+      }
       if (!agrees(m)) low.push_back(m);
     });
     compare_alone(out, std::move(low), progress);
@@ -152,9 +155,11 @@ class Totals {
           const auto p = batch.largest_p();
           for (std::size_t i = 0; i < measures.size(); ++i) {
             visit(measures[i]);
-            if (!(measures[i].total >= 0)) continue;
-            projection_ = std::max(projection_, static_cast<double>(p[i].first));
-            error_ = std::max(error_, static_cast<double>(measures[i].error));
+            // Of bricks that build tested: coarse gold has nodes further outside the covered region.
+            const std::size_t brick = at(measures[i].brick);
+            if (measures[i].total >= 0 && brick < stored_.brick_totals.size() &&
+                stored_.brick_totals[brick] >= 0)
+              projection_ = std::max(projection_, static_cast<double>(p[i].first));
           }
         },
         progress, "totals");
@@ -208,6 +213,7 @@ class Totals {
   }
 
   void compare_projection(Differences& out, bool exhaustive) const {
+    if (stored_.brick_totals.empty()) return;
     const double value = stored_.budget.projection.value;
     if (!(value >= projection_ * (1 - table_rounding)) ||
         (exhaustive && !(value <= projection_ * (1 + table_rounding))))
@@ -227,8 +233,9 @@ class Totals {
   const Certificate& stored_;
   DeviceField field_;
   GoldRates gold_;
-  double projection_ = 0, error_ = 0;  // largest seen
-  double most_ = 0;                    // what measured_max can be
+  double projection_ = 0;  // largest seen
+  double error_ = 0;       // largest seen on the gold that certifies
+  double most_ = 0;        // what measured_max can be
 };
 
 }  // namespace
