@@ -12,6 +12,7 @@
 #include "host/choose_coarsening.hpp"
 #include "host/classify_bricks.hpp"
 #include "host/close_boundaries.hpp"
+#include "host/covered_range.hpp"
 #include "host/gold_stream.hpp"
 #include "host/host_memory.hpp"
 #include "host/raise_levels.hpp"
@@ -297,9 +298,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.roi = options.roi;
   c.not_covered_count = plan.not_covered_count;
   c.not_covered_fraction = plan.not_covered_fraction;
-  c.not_covered_rule =
-      "a point is covered when all its projections fall on the detector; samples further outside than the "
-      "diagonals of a cell of the grid and of the base are stored as 0";
+  c.not_covered_rule = kNotCoveredRule;
   c.input_name = scan.report.name;
   c.input_sha256 = scan.report.sha256;
   c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};

@@ -168,6 +168,7 @@ void read_promise(const Member& m, Certificate& c) {
   c.reference_range = m.at("reference_range").number();
   const Member holds = m.at("holds"), total = m.at("total");
   c.holds_buffer = holds.at("buffer").flag();
+  if (m.has("sealed")) c.sealed = m.at("sealed").flag();
   if (m.has("comparison")) c.comparison = m.at("comparison").flag();
   if (holds.has("image3d")) c.holds_image3d = holds.at("image3d").flag();
   c.total_buffer = total.at("buffer").number();
@@ -220,11 +221,39 @@ void read_origin(const Member& m, Certificate& c) {
 
 }  // namespace
 
+std::string contradiction(const Certificate& c) {
+  if (c.comparison)
+    return c.holds_buffer || c.holds_image3d.value_or(false)
+               ? "it was built for comparison, and yet something 'holds'"
+               : "";
+  const bool image_fits =
+      !c.total_image3d || !c.holds_image3d || *c.holds_image3d == (*c.total_image3d <= c.epsilon_abs);
+  if (c.holds_buffer != (c.total_buffer <= c.epsilon_abs) || !image_fits)
+    return fmt::format("'holds' does not follow from total and epsilon_abs {}", c.epsilon_abs);
+  // Written with all digits: what differs in the tenth was not written together.
+  const auto same = [](double a, double b) {
+    return std::abs(a - b) <= 1e-10 * std::max(std::abs(a), std::abs(b));
+  };
+  if (c.reference_range > 0 && !same(c.epsilon * c.reference_range, c.epsilon_abs))
+    return fmt::format("epsilon_abs {} is not epsilon {} of the reference range {}", c.epsilon_abs, c.epsilon,
+                       c.reference_range);
+  const double sum = c.measured_total + c.budget.arithmetic.value;
+  if (!same(c.total_buffer, sum + c.budget.sampler.buffer.value))
+    return fmt::format("total {} of the buffer sampler is not measured_total, arithmetic and sampler",
+                       c.total_buffer);
+  if (c.total_image3d && c.budget.sampler.image3d &&
+      !same(*c.total_image3d, sum + c.budget.sampler.image3d->value))
+    return fmt::format("total {} of the image3d sampler is not measured_total, arithmetic and sampler",
+                       *c.total_image3d);
+  return {};
+}
+
 std::string to_json(const Certificate& c) {
   Json j;
   j["epsilon"] = finite("epsilon", c.epsilon);
   j["epsilon_abs"] = finite("epsilon_abs", c.epsilon_abs);
   j["reference_range"] = finite("reference_range", c.reference_range);
+  if (c.sealed) j["sealed"] = true;
   if (c.comparison) j["comparison"] = true;
   j["holds"] = {{"buffer", c.holds_buffer}};
   if (c.holds_image3d) j["holds"]["image3d"] = *c.holds_image3d;

@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "host/choose_coarsening.hpp"
+#include "host/covered_range.hpp"
 #include "host/foresee.hpp"
 #include "host/gold_stream.hpp"
 #include "host/host_memory.hpp"
@@ -218,40 +219,6 @@ void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t
        r.gold, t.gold, true});
 }
 
-// Samples of a plane [y][x] that lie on the detector in every view.
-std::vector<std::uint8_t> covered_in_plane(const Grid& grid, const Coverage& coverage) {
-  const Index3 n = grid.samples();
-  std::vector<std::uint8_t> inside(at(n[0] * n[1]));
-  for (std::int64_t y = 0; y < n[1]; ++y)
-    for (std::int64_t x = 0; x < n[0]; ++x) {
-      const Vec3 p = grid.position({x, y, 0});
-      inside[at(y * n[0] + x)] = coverage.margin(p[0], p[1]) >= 0;
-    }
-  return inside;
-}
-
-// Smallest and largest covered sample.
-std::pair<double, double> covered_values(const Volume& volume, const Coverage& coverage,
-                                         std::int64_t& not_covered) {
-  const Index3 n = volume.grid.samples();
-  double low = INFINITY, high = -INFINITY;
-  not_covered = 0;
-  const std::vector<std::uint8_t> inside = covered_in_plane(volume.grid, coverage);
-  for (std::int64_t z = 0; z < n[2]; ++z) {
-    const bool in_height = coverage.margin_z(volume.grid.position({0, 0, z})[2]) >= 0;
-    for (std::int64_t i = 0; i < n[0] * n[1]; ++i) {
-      if (!in_height || !inside[at(i)]) {
-        ++not_covered;
-        continue;
-      }
-      const double v = static_cast<double>(volume.samples[at(z * n[0] * n[1] + i)]);
-      low = std::min(low, v);
-      high = std::max(high, v);
-    }
-  }
-  return {low, high};
-}
-
 void check_tolerance(const Tolerance& tolerance) {
   if (tolerance.relative.has_value() == tolerance.absolute.has_value())
     throw InputError("give one of --epsilon and --epsilon-abs");
@@ -332,19 +299,14 @@ Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units
   // The reference range at rates whose own error cannot matter.
   plan.base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
   check_densities(to_world(largest_magnitude(plan.base.samples), units));
-  std::int64_t not_covered = 0;
-  auto [low, high] = covered_values(plan.base, coverage, not_covered);
-  plan.not_covered_count = not_covered;
-  plan.not_covered_fraction = static_cast<double>(not_covered) / static_cast<double>(grid.sample_count());
+  const CoveredRange range = covered_range(plan.base, coverage);
+  plan.not_covered_count = range.not_covered;
+  plan.not_covered_fraction =
+      static_cast<double>(range.not_covered) / static_cast<double>(grid.sample_count());
   // One plane of covered samples suffices; none does not.
-  if (not_covered == grid.sample_count() && grid.cells[2] > 1)
+  if (range.not_covered == grid.sample_count() && grid.cells[2] > 1)
     throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
-  if (!std::isfinite(high - low)) {  // a one-row scan covers only the plane z = 0, between samples
-    const auto [lowest, highest] = std::minmax_element(plan.base.samples.begin(), plan.base.samples.end());
-    low = static_cast<double>(*lowest);
-    high = static_cast<double>(*highest);
-  }
-  plan.reference_range = high - low;
+  plan.reference_range = range.high - range.low;
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto all = candidates(rates);
   set_epsilon(plan, tolerance,

@@ -19,6 +19,7 @@
 #include "host/io/hdf5_file.hpp"
 #include "host/io/limits.hpp"
 #include "host/io/rehearsal.hpp"
+#include "host/seal.hpp"
 #include "host/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
@@ -355,6 +356,54 @@ Certificate read_certificate(const std::string& path, const std::string& json) {
   }
 }
 
+// --- seal
+// ------------------------------------------------------------------------------------------------------------
+
+/// Of all objects that a reader looks at. Paths of /tiles come after "/tiles" itself.
+std::vector<h5::Attribute> all_attributes(const h5::Reader& file) {
+  std::vector<std::string> objects{"/"};
+  for (const char* path : {"/base", kTotals, "/certificate", "/grid", "/level", "/tile", "/tiles"})
+    if (file.has(path)) objects.emplace_back(path);
+  if (file.has("/tiles"))
+    for (const std::string& name : file.members("/tiles")) objects.push_back("/tiles/" + name);
+  std::vector<h5::Attribute> all;
+  for (const std::string& object : objects) {
+    const auto some = file.attributes(object);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+/// What is wrong with the seal; empty where nothing is, or where the file is unsealed.
+std::string read_seal(const h5::Reader& file, VdvrFile& result) {
+  const bool present = file.has_attribute("/", kSeal);
+  if (!present && !result.certificate.sealed) return {};
+  result.seal = Seal::broken;
+  if (!present)
+    return "the seal is broken: the certificate says that the file is sealed, and the seal is gone";
+  const std::string stored = file.text_attribute("/", kSeal);
+  const std::string found =
+      seal_of(result.certificate_json, result.certificate.brick_totals, all_attributes(file));
+  if (stored != found)
+    return fmt::format(
+        "the seal is broken: certificate, totals by brick and attributes have sha256 {}, the seal says {}",
+        found, stored.substr(0, 64));
+  if (!result.certificate.sealed)
+    return "the seal is broken: there is one, but the certificate does not say so";
+  result.seal = Seal::whole;
+  return {};
+}
+
+/// What was altered, in one line.
+std::string read_altered(const h5::Reader& file, VdvrFile& result) {
+  std::string altered = read_seal(file, result);
+  const std::string found = content_sha256(result.volume);
+  if (found == result.certificate.content_sha256) return altered;
+  return fmt::format(
+      "{}{}the content does not match its hash: it has sha256 {}, but its certificate was issued for {}",
+      altered, altered.empty() ? "" : "; ", found, result.certificate.content_sha256);
+}
+
 // --- content hash
 // -----------------------------------------------------------------------------------------------------
 
@@ -398,6 +447,7 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
     throw ResourceError(fmt::format("{}: not enough memory for the samples in its {} bytes", path.string(),
                                     file.file_bytes()));
   }
+  result.altered = read_altered(file, result);
   return result;
 }
 
@@ -432,6 +482,7 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
     throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
   Certificate stored = certificate;
   if (stored.content_sha256.empty()) stored.content_sha256 = content_sha256(v);
+  stored.sealed = true;
   const std::string json = to_json(stored);
 
   io::AtomicFile target(path);
@@ -457,15 +508,31 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
     }
     file.text("/certificate", json);
     if (!certificate.brick_totals.empty()) write_totals(file, v, certificate.brick_totals);
+    file.attribute("/", kSeal, seal_of(json, certificate.brick_totals, file.attributes()));
     file.close();
   }
   target.commit();
 }
 
-VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+const char* text_of(Seal seal) {
+  switch (seal) {
+    case Seal::none:
+      return "unsealed";
+    case Seal::whole:
+      return "sealed";
+    case Seal::broken:
+      break;
+  }
+  return "BROKEN SEAL";
+}
+
+VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered) {
   if (io::metadata_unchecked(path))
     io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
-  return read_whole(path, max_memory_bytes);
+  VdvrFile file = read_whole(path, max_memory_bytes);
+  if (altered == Altered::refuse && !file.altered.empty())
+    throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
+  return file;
 }
 
 bool is_vdvr(const std::filesystem::path& path) {

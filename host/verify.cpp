@@ -13,6 +13,7 @@
 #include "host/region_of_interest.hpp"
 #include "host/sampler_terms.hpp"
 #include "host/units.hpp"
+#include "host/verify_claims.hpp"
 #include "host/verify_field.hpp"
 #include "host/verify_seams.hpp"
 #include "vdvr/error.hpp"
@@ -170,8 +171,8 @@ class TestedBricks {
     int rate = 0;       // and at which rate
     int tried = 0;      // the finest rate at which it was tested
   };
-  TestedBricks(VerifyField& field, const MixedVolume& volume, const Progress& progress)
-      : field_(field), volume_(volume), progress_(progress), bricks_(volume.level.size()) {}
+  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, const Progress& progress)
+      : field_(field), volume_(volume), attack_(attack), progress_(progress), bricks_(volume.level.size()) {}
 
   void test(const std::vector<std::uint8_t>& selected, int rate, VerifyResult& result) {
     std::vector<Brick> now(bricks_.size());
@@ -182,6 +183,7 @@ class TestedBricks {
           Brick& b = now[at(p.brick)];
           b.error = std::max(b.error, p.error);
           if (rate == volume_.rate) {
+            attack_.consider(p);
             result.cells_tested += p.cells;
             result.nodes_tested += p.nodes;
           }
@@ -238,6 +240,7 @@ class TestedBricks {
 
   VerifyField& field_;
   const MixedVolume& volume_;
+  TotalAttack& attack_;
   const Progress& progress_;
   std::vector<Brick> bricks_;
 };
@@ -248,6 +251,26 @@ double left_by_samplers(const Certificate& stored, const SamplerTerms& sampler) 
   if (stored.holds_image3d.value_or(false) && sampler.image3d)
     taken = std::max(taken, sampler.image3d->value);
   return stored.epsilon_abs - taken;
+}
+
+// The sampler terms again, and the least that an image sampler can have.
+Differences check_samplers(Device& device, const MixedVolume& volume, const Certificate& stored,
+                           const FieldSlopes& slopes, const SamplerTerms& found) {
+  SamplerProbe ideal;
+  ideal.image3d = ideal.u16.image3d = ideal.u8.image3d = true;
+  const SamplerTerms least = sampler_terms(slopes, volume.grid, ideal, 1, stored.epsilon_abs, volume.rate);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  return compare_samplers(found, least, same_device, stored);
+}
+
+// Adds what differs to the verdict.
+void add_differences(VerifyResult& r) {
+  if (r.differences.empty()) return;
+  r.holds = false;
+  for (std::size_t i = 0; i < r.differences.size(); ++i)
+    r.failure +=
+        fmt::format("{}{}", r.failure.empty() ? "the certificate is not that of these projections: " : "; ",
+                    r.differences[i]);
 }
 
 }  // namespace
@@ -266,16 +289,25 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     ~Give() { state.memory.give(bytes); }
   } const give{state, bytes};
   const ExactField exact(scan, stored.field, progress);
-  const SamplerTerms sampler = sampler_terms(field_slopes(volume), volume.grid, probe_sampler(device),
-                                             atlas_length(device.info(), volume), stored.epsilon_abs,
-                                             volume.rate, sampler_underflow(device.info()));
+  const FieldSlopes slopes = field_slopes(volume);
+  const SamplerTerms sampler =
+      sampler_terms(slopes, volume.grid, probe_sampler(device), atlas_length(device.info(), volume),
+                    stored.epsilon_abs, volume.rate, sampler_underflow(device.info()));
 
   VerifyResult result;
+  result.differences = compare_scope(scan, used, volume, stored);
+  const auto also = [&](Differences more) {
+    result.differences.insert(result.differences.end(), std::make_move_iterator(more.begin()),
+                              std::make_move_iterator(more.end()));
+  };
+  also(check_samplers(device, volume, stored, slopes, sampler));
+  const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
+  TotalAttack attack(volume, stored);
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
-  TestedBricks tested(field, volume, progress);
-  tested.test(chosen_bricks(volume, stored, options), volume.rate, result);
+  TestedBricks tested(field, volume, attack, progress);
+  tested.test(selected, volume.rate, result);
   result.arithmetic = field.arithmetic();
   tested.settle(left_by_samplers(stored, sampler), result);
   tested.settle(stored.measured_total + stored.budget.arithmetic.value, result);
@@ -301,6 +333,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   }
   if (worst < 0) {
     result.failure = "no tested brick holds a covered gold cell";
+    add_differences(result);
     return result;
   }
   const auto place = [&](std::int64_t brick) {
@@ -324,6 +357,17 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     result.failure = fmt::format("|V - F| exceeds the certificate's bound {:.6g} of one brick, {}",
                                  stored.brick_totals[at(broken)], place_text(place(broken)));
   }
+  const TotalAttack::Outcome points = attack.run(exact, progress);
+  result.points_evaluated = points.points;
+  result.worst_share = points.worst_share;
+  if (result.holds && !points.failure.empty()) {
+    result.holds = false;
+    result.failure = points.failure;
+  }
+  // Rates that name no gold have been found already.
+  if (result.differences.empty())
+    also(compare_terms(device, scan, exact, volume, stored, selected, options.exhaustive, progress));
+  add_differences(result);
   if (options.exhaustive) {
     const Seams seams = compare_seams(volume);
     result.seams = seams.different;

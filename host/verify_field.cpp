@@ -443,6 +443,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     const cl_int4 place = batch.items[at(i)];
     for (int a = 0; a < 3; ++a) b.first_cell[at(a)] = place.s[a] % s.per_brick * s.cells;
     b.constant = constants[at(i)];
+    b.unit = unit_;
     b.columns = std::span<const Column>(host).subspan(at(i * s.cells * s.cells), at(s.cells * s.cells));
     const std::uint32_t* flags = host_bits.data() + i * s.cells * s.cells * s.words;
     for (std::int64_t w = 0; w < s.cells * s.cells * s.words; ++w) b.cells += std::popcount(flags[w]);

@@ -40,6 +40,7 @@ class VerifyField {
     Index3 worst_cell{0, 0, 0};         ///< gold cell inside the brick
     double constant = 0;                ///< what `total` holds beside a column's own total
     std::span<const Column> columns;    ///< [y][x] of the piece's side; total < 0: untested
+    double unit = 1;                    ///< of what columns hold
   };
 
   /// `field` outlives this object. All it is given and gives is in world units, but for columns: the device

@@ -403,6 +403,8 @@ BOOST_AUTO_TEST_CASE(only_promised_samplers_of_the_device_are_judged) {
   const Made& m = small();
   Certificate c = m.certificate;
   c.holds_image3d.reset();
+  c.total_image3d.reset();
+  c.budget.sampler.image3d.reset();
   const VerifyResult buffer = measured(m, m.volume, c);
   BOOST_TEST(buffer.holds);
   BOOST_TEST(!buffer.holds_image3d.has_value());

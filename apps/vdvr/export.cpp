@@ -61,8 +61,7 @@ int export_command(Arguments& args) {
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
   ProgressLine progress(args.command(), common.quiet);
-  const VdvrFile file = read_vdvr(path, common.max_memory);
-  if (!args.has("unverified")) check_certificate(path, file);
+  const VdvrFile file = read_certified(path, args, args.has("unverified"));
   const Grid grid = finer(file.volume.grid, oversampling);
   const Volume volume = sample_all(file.volume, grid, common.max_memory, progress.callback());
   throw_if_interrupted();

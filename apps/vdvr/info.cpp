@@ -12,14 +12,23 @@
 namespace vdvr::cli {
 namespace {
 
-int certified_info(const std::filesystem::path& path, const CommonOptions& common) {
-  const VdvrFile file = read_vdvr(path, common.max_memory);
-  std::string mismatch;
-  try {
-    check_certificate(path, file);
-  } catch (const MismatchError& e) {
-    mismatch = e.what();
+std::string seal_text(Seal seal) {
+  switch (seal) {
+    case Seal::none:
+      return "unsealed: of an earlier version, or edited since; `vdvr verify` compares with the projections";
+    case Seal::whole:
+      return "sealed: certificate, totals by brick and attributes are as they were written";
+    case Seal::broken:
+      break;
   }
+  return text_of(seal);
+}
+
+int certified_info(const std::filesystem::path& path, const CommonOptions& common) {
+  const VdvrFile file = read_vdvr(path, common.max_memory, Altered::report);
+  std::string mismatch = file.altered;
+  if (const std::string what = contradiction(file.certificate); mismatch.empty() && !what.empty())
+    mismatch = "the certificate contradicts itself: " + what;
   Json json = {{"file", path.string()},
                {"kind", "certified volume"},
                {"generator", file.generator},
@@ -30,6 +39,7 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
   json["grid"]["rate"] = file.volume.rate;
   json["bricks"] = levels_json(file.volume);
   json["storage"] = storage_json(file.volume, file.file_bytes);
+  json["seal"] = text_of(file.seal);
   json["content_matches"] = mismatch.empty();
   json["certificate"] = certificate_json(file.certificate);
   print_result(common, json, [&] {
@@ -38,9 +48,10 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
     print_grid(file.volume.grid);
     print_storage(file.volume, file.file_bytes);
     print_certificate(file.certificate);
+    fmt::print("seal           {}\n", seal_text(file.seal));
     if (mismatch.empty()) fmt::print("content        matches the certificate's hash\n");
   });
-  if (!mismatch.empty()) throw MismatchError(mismatch);
+  if (!mismatch.empty()) throw MismatchError(fmt::format("{}: {}", path.string(), mismatch));
   return 0;
 }
 

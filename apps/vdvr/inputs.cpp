@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include <nlohmann/json.hpp>
 
+#include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/volume_file.hpp"
@@ -58,49 +56,22 @@ double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {
   return field.center.value_or(geometry.center);
 }
 
-std::string altered_content(const VdvrFile& file) {
-  const std::string found = content_sha256(file.volume);
-  if (found == file.certificate.content_sha256) return {};
-  return fmt::format(
-      "the content does not match its hash: it has sha256 {}, but its certificate was issued for {}", found,
-      file.certificate.content_sha256);
-}
-
 void check_consistency(const fs::path& path, const Certificate& c) {
-  const auto contradicts = [&](const std::string& what) {
+  if (const std::string what = contradiction(c); !what.empty())
     throw MismatchError(fmt::format("{}: the certificate contradicts itself: {}", path.string(), what));
-  };
-  if (c.comparison) {
-    if (c.holds_buffer || c.holds_image3d.value_or(false))
-      contradicts("it was built for comparison, and yet something 'holds'");
-    return;
-  }
-  const bool buffer_fits = c.total_buffer <= c.epsilon_abs;
-  const bool image_fits =
-      !c.total_image3d || !c.holds_image3d || *c.holds_image3d == (*c.total_image3d <= c.epsilon_abs);
-  if (c.holds_buffer != buffer_fits || !image_fits)
-    contradicts(fmt::format("'holds' does not follow from total and epsilon_abs {}", c.epsilon_abs));
-  // Written with all digits: what differs in the tenth was not written together.
-  const auto same = [](double a, double b) {
-    return std::abs(a - b) <= 1e-10 * std::max(std::abs(a), std::abs(b));
-  };
-  if (c.reference_range > 0 && !same(c.epsilon * c.reference_range, c.epsilon_abs))
-    contradicts(fmt::format("epsilon_abs {} is not epsilon {} of the reference range {}", c.epsilon_abs,
-                            c.epsilon, c.reference_range));
-  const double sum = c.measured_total + c.budget.arithmetic.value;
-  if (!same(c.total_buffer, sum + c.budget.sampler.buffer.value))
-    contradicts(fmt::format("total {} of the buffer sampler is not measured_total, arithmetic and sampler",
-                            c.total_buffer));
-  if (c.total_image3d && c.budget.sampler.image3d &&
-      !same(*c.total_image3d, sum + c.budget.sampler.image3d->value))
-    contradicts(fmt::format("total {} of the image3d sampler is not measured_total, arithmetic and sampler",
-                            *c.total_image3d));
 }
 
-void check_certificate(const fs::path& path, const VdvrFile& file) {
-  if (const std::string altered = altered_content(file); !altered.empty())
-    throw MismatchError(fmt::format("{}: {}; build it again", path.string(), altered));
+VdvrFile read_certified(const fs::path& path, const Arguments& args, bool unverified) {
+  const CommonOptions common = common_options(args);
+  VdvrFile file = read_vdvr(path, common.max_memory, unverified ? Altered::report : Altered::refuse);
+  if (unverified) return file;
   check_consistency(path, file.certificate);
+  if (file.seal == Seal::none && !common.quiet)
+    say(
+        fmt::format("vdvr {}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
+                    "its certificate with the projections\n",
+                    args.command(), path.string()));
+  return file;
 }
 
 void check_input(const fs::path& path, const ProjectionSet& scan, const Certificate& c) {

@@ -26,13 +26,11 @@ ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args
 /// The centre that defines F: the field's, else the scan's.
 double center_of(const FieldOptions& field, const ParallelGeometry& geometry);
 
-/// What to say when the content is not the one that was certified; empty when it is.
-std::string altered_content(const VdvrFile& file);
 /// Throws MismatchError when the certificate's own numbers do not follow from each other.
 void check_consistency(const std::filesystem::path& path, const Certificate& certificate);
-/// Both: throws MismatchError when the content is not what the certificate was issued for, or the certificate
-/// contradicts itself.
-void check_certificate(const std::filesystem::path& path, const VdvrFile& file);
+/// A certified volume. Throws MismatchError when it was altered or its certificate contradicts itself, and
+/// says on stderr that a file is unsealed. `unverified`: neither.
+VdvrFile read_certified(const std::filesystem::path& path, const Arguments& args, bool unverified = false);
 /// Throws MismatchError when the projections are not those the volume was built from.
 void check_input(const std::filesystem::path& path, const ProjectionSet& scan,
                  const Certificate& certificate);

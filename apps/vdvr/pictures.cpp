@@ -17,8 +17,7 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
   const std::uint64_t max_memory = common_options(args).max_memory;
   switch (kind_of(path, args)) {
     case InputKind::certified: {
-      VdvrFile file = read_vdvr(path, max_memory);
-      if (!unverified) check_certificate(path, file);
+      VdvrFile file = read_certified(path, args, unverified);
       // Samples on the grid alone are an ordinary volume; the certificate says nothing about their
       // interpolation.
       if (method == "dvr") return {as_mixed(on_grid(file.volume)), std::nullopt, false};

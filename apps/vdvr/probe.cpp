@@ -99,8 +99,7 @@ std::string level_text(const LevelTriple& l) {
 
 std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
                                    const std::vector<Vec3>& points, const Progress& progress) {
-  const VdvrFile file = read_vdvr(path, common_options(args).max_memory);
-  check_certificate(path, file);
+  const VdvrFile file = read_certified(path, args);
   const MixedVolume& volume = file.volume;
   const Certificate& c = file.certificate;
   std::optional<ParallelGeometry> geometry = noted_geometry(c);
@@ -152,7 +151,7 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
   if (args.has("like")) {
     if (has_field_options(args))
       throw InputError("--like takes the field options from its file; do not give them again");
-    field = read_vdvr(args.path("like"), common_options(args).max_memory).certificate.field;
+    field = read_certified(args.path("like"), args).certificate.field;
   }
   const ExactField exact(load_scan(path, args, field, progress), field, progress);
   std::vector<Probe> probes(points.size());

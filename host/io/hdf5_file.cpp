@@ -88,6 +88,18 @@ Element element_of(hid_t type) {
   return is(H5T_STD_I32LE) ? Element::i32 : Element::other;
 }
 
+/// Numbers of an attribute: more than this no file of ours has, and memory is taken for them.
+constexpr std::uint64_t most_attribute_values = 1 << 20;
+constexpr hsize_t most_attributes = 256;
+
+template <class T>
+Attribute numbers_of(const std::string& object, const std::string& name, char kind,
+                     std::span<const T> values) {
+  Attribute a{object, name, kind, values.size(), std::string(values.size_bytes(), '\0')};
+  if (!values.empty()) std::memcpy(a.bytes.data(), values.data(), values.size_bytes());
+  return a;
+}
+
 std::uint64_t element_bytes(Element e) {
   switch (e) {
     case Element::u8:
@@ -180,22 +192,26 @@ void Writer::create_attribute(const std::string& object, const std::string& name
 void Writer::attribute(const std::string& object, const std::string& name, std::int64_t value) {
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   create_attribute(object, name, H5T_STD_I64LE, space.get(), H5T_NATIVE_INT64, &value);
+  attributes_.push_back(numbers_of<std::int64_t>(object, name, 'i', {&value, 1}));
 }
 
 void Writer::attribute(const std::string& object, const std::string& name,
                        std::span<const std::int64_t> values) {
   create_attribute(object, name, H5T_STD_I64LE, simple_space({values.size()}).get(), H5T_NATIVE_INT64,
                    values.data());
+  attributes_.push_back(numbers_of<std::int64_t>(object, name, 'i', values));
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, double value) {
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   create_attribute(object, name, H5T_IEEE_F64LE, space.get(), H5T_NATIVE_DOUBLE, &value);
+  attributes_.push_back(numbers_of<double>(object, name, 'f', {&value, 1}));
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, std::span<const double> values) {
   create_attribute(object, name, H5T_IEEE_F64LE, simple_space({values.size()}).get(), H5T_NATIVE_DOUBLE,
                    values.data());
+  attributes_.push_back(numbers_of<double>(object, name, 'f', values));
 }
 
 void Writer::attribute(const std::string& object, const std::string& name, const std::string& text) {
@@ -204,6 +220,7 @@ void Writer::attribute(const std::string& object, const std::string& name, const
   const Handle type = text_type(std::max<std::size_t>(1, text.size())),
                space(H5Screate(H5S_SCALAR), H5Sclose);
   create_attribute(object, name, type.get(), space.get(), type.get(), text.c_str());
+  attributes_.push_back({object, name, 't', text.size(), text});
 }
 
 void Writer::create_dataset(const std::string& path, const Shape& shape, hid_t stored, hid_t given,
@@ -404,6 +421,51 @@ std::string Reader::text_attribute(const std::string& object, const std::string&
                  [&](hid_t memory, void* out) { return H5Aread(attribute.get(), memory, out); }))
     refuse(fmt::format("attribute '{}' of {}", name, object), hdf5_reason());
   return text;
+}
+
+std::vector<Attribute> Reader::attributes(const std::string& object) const {
+  const Handle parent = open_object(object);
+  H5O_info_t info{};
+  if (H5Oget_info2(parent.get(), &info, H5O_INFO_NUM_ATTRS) < 0) refuse(object, hdf5_reason());
+  if (info.num_attrs > most_attributes)
+    refuse(object, fmt::format("has {} attributes, more than {}", info.num_attrs, most_attributes));
+  std::vector<std::string> names;
+  const auto collect = [](hid_t, const char* name, const H5A_info_t*, void* out) -> herr_t {
+    static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
+  };
+  if (H5Aiterate2(parent.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0)
+    refuse(object, hdf5_reason());
+  std::sort(names.begin(), names.end());
+  std::vector<Attribute> all;
+  for (const std::string& name : names) {
+    const std::string shown = fmt::format("attribute '{}' of {}", name, object);
+    const Handle attribute(H5Aopen(parent.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+    if (!attribute) refuse(shown, hdf5_reason());
+    const Handle type(H5Aget_type(attribute.get()), H5Tclose), space(H5Aget_space(attribute.get()), H5Sclose);
+    const H5T_class_t c = H5Tget_class(type.get());
+    const hssize_t have = H5Sget_simple_extent_npoints(space.get());
+    if (have < 0 || static_cast<std::uint64_t>(have) > most_attribute_values)
+      refuse(shown, fmt::format("holds {} values", have));
+    const auto count = static_cast<std::uint64_t>(have);
+    const auto numbers = [&](auto zero, hid_t memory, char kind) {
+      std::vector<decltype(zero)> values(count, zero);
+      if (count > 0 && H5Aread(attribute.get(), memory, values.data()) < 0) refuse(shown, hdf5_reason());
+      all.push_back(numbers_of<decltype(zero)>(object, name, kind, values));
+    };
+    if (c == H5T_INTEGER) {
+      numbers(std::int64_t{0}, H5T_NATIVE_INT64, 'i');
+    } else if (c == H5T_FLOAT) {
+      numbers(0.0, H5T_NATIVE_DOUBLE, 'f');
+    } else if (c == H5T_STRING && count == 1) {
+      const std::string text = text_attribute(object, name);
+      all.push_back({object, name, 't', text.size(), text});
+    } else {
+      refuse(shown, fmt::format("is {} values of {}: neither numbers nor one text", count,
+                                class_name(c, H5Tget_size(type.get()))));
+    }
+  }
+  return all;
 }
 
 Dataset Reader::dataset(const std::string& path) const {

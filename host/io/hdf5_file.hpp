@@ -55,6 +55,14 @@ using Shape = std::vector<std::uint64_t>;  ///< slowest axis first
 /// little is padded.
 Shape chunk_shape(const Shape& shape, std::uint64_t element_bytes);
 
+/// An attribute as what it says, however it is stored: integers as int64, reals as float64, one text.
+struct Attribute {
+  std::string object, name;
+  char kind = 'i';          ///< 'i', 'f' or 't'
+  std::uint64_t count = 0;  ///< numbers, or bytes of text
+  std::string bytes;        ///< little-endian
+};
+
 /// Writes a new file; `shown` is the path that messages name. `deflate_level` 1 to 9, 0: not compressed; text
 /// never is. Failures throw ResourceError (disk).
 class Writer {
@@ -75,6 +83,8 @@ class Writer {
   /// A scalar string kept in its object header, where HDF5's checksum covers it; longer than 60,000 bytes,
   /// where a header cannot hold it, a string dataset of one element under Fletcher32.
   void text(const std::string& path, const std::string& text);
+  /// All that were written so far.
+  [[nodiscard]] const std::vector<Attribute>& attributes() const { return attributes_; }
   /// Flushes and closes. Throws ResourceError.
   void close();
 
@@ -89,6 +99,7 @@ class Writer {
   std::string shown_;
   unsigned deflate_level_ = 0;
   Handle file_;
+  std::vector<Attribute> attributes_;
 };
 
 enum class Element { f32, u8, u16, u32, i32, other };
@@ -132,6 +143,8 @@ class Reader {
   [[nodiscard]] std::vector<double> reals(const std::string& object, const std::string& name,
                                           std::uint64_t count) const;
   [[nodiscard]] std::string text_attribute(const std::string& object, const std::string& name) const;
+  /// Every attribute of an object, by name; one that is no number and no text is refused.
+  [[nodiscard]] std::vector<Attribute> attributes(const std::string& object) const;
   [[nodiscard]] Dataset dataset(const std::string& path) const;
   /// Into memory of dataset.bytes bytes, native byte order.
   void read(const Dataset& dataset, void* values) const;

@@ -50,6 +50,8 @@ struct Certificate {
   double epsilon = 0;          ///< fraction of reference_range
   double epsilon_abs = 0;      ///< density units
   double reference_range = 0;  ///< max - min of F over covered 1x samples
+  /// Stored in a file that holds a seal over it (docs/file-format.md).
+  bool sealed = false;
   /// Built by settings that leave terms or the closing out, to compare with: it promises nothing.
   bool comparison = false;
   bool holds_buffer = false;
@@ -87,6 +89,9 @@ struct Certificate {
 /// and the sampler; infinite where nothing was tested. Throws InputError where the certificate has no totals
 /// by brick, or says nothing of image3d.
 std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
+
+/// One line where the certificate's own numbers do not follow from each other; empty where they do.
+std::string contradiction(const Certificate& certificate);
 
 /// The JSON of docs/file-format.md; finite numbers only.
 std::string to_json(const Certificate& certificate);

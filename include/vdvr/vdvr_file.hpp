@@ -10,6 +10,16 @@
 
 namespace vdvr {
 
+/// Whether certificate, totals by brick and attributes are those that were written together. It is no
+/// signature: whoever changes a file can seal it again, which only `verify` finds.
+enum class Seal {
+  none,  ///< a file of an earlier version, or one that was written anew without
+  whole,
+  broken,
+};
+/// "unsealed", "sealed", "BROKEN SEAL".
+const char* text_of(Seal seal);
+
 struct VdvrFile {
   MixedVolume volume;
   Certificate certificate;
@@ -17,22 +27,31 @@ struct VdvrFile {
   std::string generator;
   int format_version = 1;
   std::uint64_t file_bytes = 0;
+  Seal seal = Seal::none;
+  std::string altered;  ///< one line: what is not as it was written; empty where all that is hashed is
+};
+
+/// What to do with a file that reads well and is not what was written.
+enum class Altered {
+  refuse,  ///< MismatchError
+  report,  ///< in VdvrFile::altered
 };
 
 /// How samples and index lie in the file; what they decode to, and its hash, are the same.
 enum class Compression { none, deflate };
 
-/// Written whole or not at all, chunked, deflated or not, with Fletcher32 checksums. An empty content_sha256
-/// in the certificate is filled in; any other is stored as given. Throws InputError for a volume that
-/// read_vdvr would refuse or a certificate that is not finite, FileError (folder), ResourceError (disk). Not
-/// thread-safe with other users of HDF5.
+/// Written whole or not at all, chunked, deflated or not, with Fletcher32 checksums, and sealed. An empty
+/// content_sha256 in the certificate is filled in; any other is stored as given. Throws InputError for a
+/// volume that read_vdvr would refuse or a certificate that is not finite, FileError (folder), ResourceError
+/// (disk). Not thread-safe with other users of HDF5.
 void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume, const Certificate& certificate,
                 Compression compression = Compression::deflate);
 
 /// Reads and checks everything: types, shapes in 64 bits before allocating, tile indices, finite geometry,
-/// checksums. Throws FileError (path, dataset, value). Does not compare the content hash: see content_sha256.
-/// `max_memory_bytes` 0: no limit.
-VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
+/// checksums; then compares the seal and the content's hash. Throws FileError (path, dataset, value), and
+/// MismatchError for a file that was altered, unless it is to be reported. `max_memory_bytes` 0: no limit.
+VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
+                   Altered altered = Altered::refuse);
 
 /// True when the file begins like HDF5 and says format = "vdvr".
 bool is_vdvr(const std::filesystem::path& path);

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
@@ -49,15 +51,24 @@ struct VerifyResult {
   std::int64_t bricks_finer = 0;  ///< bricks tested again on finer gold, where the file's own decided nothing
   int finest_rate = 0;            ///< of the gold used
   std::int64_t seams = 0;         ///< samples that two bricks store with different bits (exhaustive only)
-  std::string failure;            ///< one line: what does not match, and where; empty when it holds
+  /// Points inside cells where |V - F| was evaluated, since verify's bound there is above the certificate's,
+  /// and the largest |V - F| found, as a share of what the certificate bounds it by.
+  std::int64_t points_evaluated = 0;
+  double worst_share = 0;
+  /// What the certificate says and what was computed instead, a line each: range, coverage, geometry, terms,
+  /// totals.
+  std::vector<std::string> differences;
+  std::string failure;  ///< one line: what does not match, and where; empty when it holds
 };
 
 /// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
-/// cell, V through the sampler header; again on finer gold, up to 64x, in bricks whose bound at the file's own
-/// rate exceeds epsilon or the certificate's total. Requires the samplers that `stored` says hold and that
-/// this device has. Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on the
-/// host, then 7 * views multiply-adds per gold node on the device. Throws ResourceError when --max-memory is
-/// too small for one brick and one view.
+/// cell, V through the sampler header; again on finer gold, up to 64x, in bricks whose bound at the file's
+/// own rate exceeds epsilon or the certificate's total. Requires the samplers that `stored` says hold and
+/// that this device has; then computes again what else `stored` says (docs/error-bounds.md, "What verify
+/// compares"). Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on
+/// the host, then 7 * views multiply-adds per gold node on the device, and what `build` takes to filter, to
+/// reconstruct the base and to measure the tested bricks. Throws ResourceError when --max-memory is too small
+/// for one brick and one view.
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                     const Certificate& stored, const VerifyOptions& options = {},
                     const Progress& progress = {});

@@ -1,5 +1,5 @@
 // The certified volume: deflated and not, with integer samples, and rewritten in the old HDF5 layout, where a
-// damaged byte of metadata meets no checksum. Read as the commands do: the content hash is compared.
+// damaged byte of metadata meets no checksum. Read as the commands do: seal and content hash are compared.
 #include "tests/fuzz/seeds.hpp"
 #include "tests/fuzz/target.hpp"
 #include "tests/support/certificates.hpp"
@@ -27,9 +27,7 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
 
 void read(const std::filesystem::path& file) {
   if (!is_vdvr(file)) throw FileError(file.string() + ": is no certified volume");
-  const VdvrFile read = read_vdvr(file, memory_limit);
-  if (content_sha256(read.volume) != read.certificate.content_sha256)
-    throw MismatchError(file.string() + ": its content is not what its certificate was made for");
+  static_cast<void>(read_vdvr(file, memory_limit));
 }
 
 }  // namespace

@@ -71,10 +71,10 @@ inline bool same_volume(const MixedVolume& a, const MixedVolume& b) {
   return same;
 }
 
-/// The message of the FileError that reading gives; "accepted" when it gives none.
+/// The message of the FileError that reading gives; "accepted" when it gives none, altered or not.
 inline std::string refusal(const fs::path& path) {
   try {
-    read_vdvr(path);
+    read_vdvr(path, 0, Altered::report);
   } catch (const FileError& e) {
     return e.what();
   }
