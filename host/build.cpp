@@ -93,7 +93,6 @@ class Builder {
       throw InputError("--roi meets no brick of the grid");
 
     filtered_ = filter_projections(state_, scan, plan.field, progress);
-    measure_filter_error(filtered_, scan, plan.field);
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);

@@ -116,8 +116,7 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
                             const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
                             const Progress& progress) {
   opencl::State& state = device.state();
-  FilteredScan filtered = filter_projections(state, scan, field);
-  measure_filter_error(filtered, scan, field);
+  const FilteredScan filtered = filter_projections(state, scan, field);
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto stream_at = [&](int up, const std::string& filter, int gold) {

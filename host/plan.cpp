@@ -310,8 +310,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   const auto now = [] { return std::chrono::steady_clock::now(); };
   const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
   auto start = now();
-  FilteredScan filtered = filter_projections(state, scan, field);
-  measure_filter_error(filtered, scan, field);
+  const FilteredScan filtered = filter_projections(state, scan, field);
   double preparation = since(start);  // that build will repeat
   Upsampler upsampler(state, filtered);
   const Coverage coverage(filtered.geometry);

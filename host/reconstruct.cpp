@@ -209,7 +209,9 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
       if (slab) return std::move(*slab);
     }
     if (!filtered) {
-      filtered = filter_projections(state, scan, options.field, progress);
+      // Without upsampling nothing is certified.
+      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic,
+                                    direct ? Precision::fp32 : Precision::fp64);
       watch.lap(state, "filter");
       upsampler.emplace(state, *filtered);
     }

@@ -170,7 +170,6 @@ BOOST_AUTO_TEST_CASE(arithmetic_bound_is_never_exceeded) {
         Device device;
         FilteredScan filtered = filter_projections(device.state(), scan, {});
         const double a_priori_ramp = filtered.ramp_error;
-        measure_filter_error(filtered, scan, {});
         Upsampler upsampler(device.state(), filtered);
         const UpsampledColumns upsampled = upsampled_columns(columns, rate, 1.0);
         const FieldSups sups = field_sups(device.state(), upsampler, filtered);
