@@ -42,6 +42,8 @@
   M(a1, s1, 1, 0)   \
   M(a2, s2, 2, 0) M(a3, s3, 3, 0) M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) M(b3, s7, 3, 1)
 #define LANE(v, i) v.i
+// -1 where true, as vectors have it.
+#define IS_LESS(a, b) ((a) < (b))
 #elif VDVR_TILE == 1
 #define TILE float
 #define ITILE int
@@ -53,6 +55,7 @@
 #define OFFSET_Y 0.0f
 #define FOR_TILE(M) M(a0, s0, 0, 0)
 #define LANE(v, i) v
+#define IS_LESS(a, b) (-((a) < (b)))
 #else
 #error "VDVR_TILE is 1 or 8"
 #endif
@@ -88,6 +91,7 @@
 #define TOTAL(sum, i, c, r)     \
   sum##_low_total += sum##_low; \
   sum##_high_total += sum##_high;
+#define AGAIN(sum, i, c, r) sum##_low = sum##_high = (VEC)(0.0f);
 #define PUT(sum, i, c, r)                                                               \
   if (x + c < nx && y + r < ny) {                                                       \
     STORE(sum##_low_total, target + (size_t)(r * nx + c) * out_stride);                 \
@@ -119,28 +123,30 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
                        : next % 16 != 0 ? VDVR_LANES
                                         : (size_t)views * columns * 16 - z % 16;
   __global const float4* view = steps + (size_t)block * views;
-  for (int first = 0; first < views; first += VDVR_RUN) {
-    const int last = min(first + VDVR_RUN, views);
-    FOR_TILE(CLEAR)
-    for (int k = first; k < last; ++k, plane += columns * 16) {
-      const float4 step = view[k];
-      const TILE s = fma((TILE)(step.x), tile_x, fma((TILE)(step.y), tile_y, (TILE)(step.z)));
-      const TILE whole = floor(s);
-      const ITILE below = TO_ITILE(whole);
-      const TILE f = s - whole, g = 1.0f - f;
+  FOR_TILE(CLEAR)
+  for (int k = 0; k < views; ++k, plane += columns * 16) {
+    const float4 step = view[k];
+    const TILE s = fma((TILE)(step.x), tile_x, fma((TILE)(step.y), tile_y, (TILE)(step.z)));
+    // Truncated, and one less where that is above: CPUs do it faster than floor.
+    const ITILE cut = TO_ITILE(s), below = cut + IS_LESS(s, TO_TILE(cut));
+    const TILE f = s - TO_TILE(below), g = 1.0f - f;
 #if VDVR_CUBIC
-      // Lagrange weights on the nodes -1, 0, 1, 2.
-      const TILE h = 2.0f - f, e = 1.0f + f, outer = f * g * (-1.0f / 6.0f), inner = e * h * 0.5f;
-      const TILE w0 = outer * h, w1 = inner * g, w2 = inner * f, w3 = outer * e;
-      const ITILE at = (clamp((int)step.w + below, (ITILE)1, (ITILE)(columns - 3)) - 1) * 16;
+    // Lagrange weights on the nodes -1, 0, 1, 2.
+    const TILE h = 2.0f - f, e = 1.0f + f, outer = f * g * (-1.0f / 6.0f), inner = e * h * 0.5f;
+    const TILE w0 = outer * h, w1 = inner * g, w2 = inner * f, w3 = outer * e;
+    const ITILE at = (clamp((int)step.w + below, (ITILE)1, (ITILE)(columns - 3)) - 1) * 16;
 #else
-      const TILE w0 = g, w1 = f;
-      const ITILE at = clamp((int)step.w + below, (ITILE)0, (ITILE)(columns - 2)) * 16;
+    const TILE w0 = g, w1 = f;
+    const ITILE at = clamp((int)step.w + below, (ITILE)0, (ITILE)(columns - 2)) * 16;
 #endif
-      FOR_TILE(ADD)
+    FOR_TILE(ADD)
+    // One loop, not one in another, which CPUs ran a fifth slower.
+    if ((k + 1) % VDVR_RUN == 0) {
+      FOR_TILE(TOTAL)
+      FOR_TILE(AGAIN)
     }
-    FOR_TILE(TOTAL)
   }
+  FOR_TILE(TOTAL)
   __global float* target = out + (((size_t)block * ny + y) * nx + x) * out_stride + z;
   FOR_TILE(PUT)
 }
