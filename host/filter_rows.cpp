@@ -79,8 +79,8 @@ class FourierError {
 
   // Of a filtered sample before the weight, for arithmetic that rounds by u.
   [[nodiscard]] double operator()(double u, double smallest, double row_norm) const {
-    // A stage of radix 16 errs by at most 512 u, its twiddles by 68 u; one stage more packs real rows.
-    const double transform = 600 * u * (std::log2(length_) + 1);
+    // A stage of radix 16 errs by at most 512 u, its twiddles by 124 u; one stage more packs real rows.
+    const double transform = 700 * u * (std::log2(length_) + 1);
     // The spectrum: its sum in double precision, and what rounds once.
     const double spectrum = (taps_ + 40) * 0x1p-53 * kernel_sum_ + u * spectrum_max_;
     // Two rows can share a transform, whose norm is then that of both.
