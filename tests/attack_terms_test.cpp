@@ -325,18 +325,21 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_the_product_along_rows_alone) {
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_covers_long_biased_sums) {
-  // Equal terms: while the sum stays between two powers of two, every addition rounds the same way.
-  constexpr std::int64_t views = 8192;
-  ParallelGeometry g = geometry(views, 1, 8);
-  g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
-  for (const char* filter : {"linear", "cubic"})
-    for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
-      const FilteredScan f = given_samples(
-          g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
-      expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
-             std::string("summation of ") + std::to_string(views) + " views, " + filter + ", " +
-                 std::to_string(term));
-    }
+  // Equal terms: while the sum stays between two powers of two, every addition rounds the same way. Of 65536
+  // views it is the sums of runs whose addition counts.
+  for (const std::int64_t views : {8192, 65536}) {
+    ParallelGeometry g = geometry(views, 1, 8);
+    g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
+    for (const char* filter : {"linear", "cubic"})
+      for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
+        if (views > 8192 && term != 1.75) continue;
+        const FilteredScan f = given_samples(
+            g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
+        expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
+               std::string("summation of ") + std::to_string(views) + " views, " + filter + ", " +
+                   std::to_string(term));
+      }
+  }
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
