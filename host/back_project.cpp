@@ -30,13 +30,14 @@ std::int64_t column_stride(std::int64_t rows) {
 
 double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns,
                       const ColumnBlocks& blocks) {
-  // Start and steps are rounded (u each), both fused products round once, and no intermediate passes the
-  // block's reach + 1.
+  // Steps and what is left of the middle are rounded (u each), both fused products round once, and no
+  // intermediate passes the reach from the middle + 1/2; the fraction of a small negative s rounds once more.
   const double scale = columns.rate / geometry.pitch_u;
   // |cos| a + |sin| b <= sqrt(a^2 + b^2).
-  const double reach = scale * std::hypot(static_cast<double>(blocks.nx + 4) * blocks.step_x,
-                                          static_cast<double>(blocks.ny + 2) * blocks.step_y);
-  return 0x1p-24 * (4 * reach + 6);
+  const double reach = 0.5 * scale *
+                       std::hypot(static_cast<double>(blocks.nx) * blocks.step_x,
+                                  static_cast<double>(blocks.ny) * blocks.step_y);
+  return 0x1p-24 * (3 * reach + 3);
 }
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
@@ -61,11 +62,10 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
       const ViewStep step = view_step(geometry, slab.columns, blocks, view);
       const double t = blocks.first[b][0] * std::cos(geometry.theta_rad[view]) +
                        blocks.first[b][1] * std::sin(geometry.theta_rad[view]);
-      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center);
-      // The lowest s of the block, less one so that rounding cannot make a local position negative.
-      const double lowest = s + std::min(0.0, step.along_x * static_cast<double>(blocks.nx + 4)) +
-                            std::min(0.0, step.along_y * static_cast<double>(blocks.ny + 2));
-      const double whole = std::floor(lowest) - 1;
+      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center) +
+                       0.5 * (step.along_x * static_cast<double>(blocks.nx - 1) +
+                              step.along_y * static_cast<double>(blocks.ny - 1));
+      const double whole = std::round(s);
       steps[b * views + k] = {{static_cast<float>(step.along_x), static_cast<float>(step.along_y),
                                static_cast<float>(s - whole), static_cast<float>(whole)}};
     }
@@ -90,6 +90,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                  cl_int, cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
+              {"VDVR_RUN", std::to_string(view_run)},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
               {"VDVR_TILE", std::to_string(tuning.tile)},
               {"VDVR_VECTORS", std::to_string(tuning.vectors)}});

@@ -17,7 +17,8 @@ void batched_product(opencl::State& state, const opencl::DeviceArray<float>& out
   const ColumnTuning tuning = column_tuning(state.info);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_ulong, cl_ulong,
                  cl_ulong, cl_ulong, cl_ulong, cl_ulong>
-      kernel(state, "batched_product", "batched_product", {{"VDVR_LANES", std::to_string(tuning.lanes)}});
+      kernel(state, "batched_product", "batched_product",
+             {{"VDVR_LANES", std::to_string(tuning.lanes)}, {"VDVR_RUN", std::to_string(s.run)}});
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const auto ints = [](std::int64_t n) { return static_cast<cl_int>(n); };
   kernel({{count(s.z_padded / tuning.lanes), opencl::round_up(count(s.rows), rows_per_item) / rows_per_item,

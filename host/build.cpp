@@ -76,8 +76,8 @@ class Builder {
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
       throw InputError("--roi meets no brick of the grid");
 
-    filtered_ = filter_projections(state_, scan, plan.field, progress, FilterMethod::automatic, units);
-    measure_filter_error(filtered_, scan, plan.field, units);
+    filtered_ = filter_projections(state_, scan, plan.field, progress, FilterMethod::automatic,
+                                   Precision::fp64, units);
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);

@@ -85,8 +85,8 @@ void measure_views(FilteredScan& out, std::span<const float> data, const ViewWei
   for (std::size_t k = 0; k < norms.size(); ++k) {
     if (!std::isfinite(out.view_max[k]) || !std::isfinite(norms[k]))
       throw not_finite(static_cast<std::int64_t>(k));
-    out.ramp_error +=
-        weights.weight[k] * filter.error(norms[k]) + 0x1p-126;  // the weighted sample may be flushed
+    out.ramp_error += filter.error(weights.weight[k], norms[k], out.view_max[k]) +
+                      0x1p-126;  // the weighted sample may be flushed
   }
 }
 
@@ -119,7 +119,8 @@ LineIntegrals::LineIntegrals(const ProjectionSet& scan, const Units& units) : sc
 }
 
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                                const Progress& progress, FilterMethod method, const Units& units) {
+                                const Progress& progress, FilterMethod method, Precision precision,
+                                const Units& units) {
   FilteredScan out;
   out.geometry = used_geometry(scan, field, units);
   const ParallelGeometry& g = out.geometry;
@@ -127,51 +128,13 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
   out.limited_angle = weights.limited_angle;
 
   out.fft_length = fft::good_length(2 * g.columns - 1);
-  const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method);
-  const std::vector<float> view_weight(weights.weight.begin(), weights.weight.end());
+  const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method, precision);
   out.samples = large_zeros(static_cast<std::size_t>(scan.size()));
   out.view_max.assign(static_cast<std::size_t>(g.views()), 0.0);
   const LineIntegrals line_integrals(scan, units);
-  (*filter)(line_integrals.data(), view_weight, out.samples, progress);
+  (*filter)(line_integrals.data(), weights.weight, out.samples, progress);
   measure_views(out, line_integrals.data(), weights, *filter);
   return out;
-}
-
-void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field,
-                          const Units& units) {
-  const ParallelGeometry& g = filtered.geometry;
-  const double cost = static_cast<double>(scan.size()) * static_cast<double>(g.columns);
-  if (cost > 4e9) return;
-  const auto kernel = ramp_kernel(field, g.pitch_u, g.columns);
-  const ViewWeights weights = view_weights(g.theta_rad);
-  const std::size_t U = static_cast<std::size_t>(g.columns), V = static_cast<std::size_t>(g.rows);
-  const LineIntegrals line_integrals(scan, units);
-  const std::span<const float> data = line_integrals.data();
-  std::vector<double> both(2 * U - 1),
-      error(static_cast<std::size_t>(g.views()));  // the kernel at -(U-1) .. U-1
-  for (std::size_t i = 0; i < both.size(); ++i) both[i] = kernel[i < U ? U - 1 - i : i - U + 1];
-  parallel_for(g.views(), {}, "filter error", [&](std::int64_t view) {
-    const std::size_t k = static_cast<std::size_t>(view);
-    std::vector<double> row(U);
-    for (std::size_t v = 0; v < V; ++v) {
-      std::fill(row.begin(), row.end(), 0.0);
-      for (std::size_t m = 0; m < U; ++m) {
-        const double p = static_cast<double>(data[(k * V + v) * U + m]);
-        const double* shifted = both.data() + (U - 1 - m);
-        for (std::size_t i = 0; i < U; ++i) row[i] += shifted[i] * p;
-      }
-      for (std::size_t i = 0; i < U; ++i)
-        error[k] = std::max(error[k], std::abs(row[i] * weights.weight[k] -
-                                               static_cast<double>(filtered.samples[(k * U + i) * V + v])));
-    }
-  });
-  filtered.ramp_error = 0;
-  double kernel_sum = 0, largest = 0;
-  for (const double g_i : both) kernel_sum += std::abs(g_i);
-  for (const float p : data) largest = std::max(largest, std::abs(static_cast<double>(p)));
-  for (std::size_t k = 0; k < error.size(); ++k)  // the reference rounds too: U terms of double precision
-    filtered.ramp_error +=
-        error[k] + static_cast<double>(U) * 0x1p-52 * weights.weight[k] * kernel_sum * largest;
 }
 
 std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
@@ -184,10 +147,9 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
 DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                            const Units& units)
     : state_(&state), data_(scan, units), geometry_(used_geometry(scan, field, units)) {
-  const ViewWeights weights = view_weights(geometry_.theta_rad);
-  weights_.assign(weights.weight.begin(), weights.weight.end());
+  weights_ = view_weights(geometry_.theta_rad).weight;
   filter_ = make_row_filter(state, geometry_, ramp_kernel(field, geometry_.pitch_u, geometry_.columns),
-                            FilterMethod::automatic);
+                            FilterMethod::automatic, Precision::fp32);
 }
 
 std::optional<UpsampledSlab> DirectFilter::operator()(const UpsampledColumns& columns,
@@ -289,6 +251,7 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
                     {.rows = n * g.columns,
                      .terms = g.rows,
                      .z_padded = slab.rows_padded,
+                     .run = row_run,
                      .out_chunk = resampled_chunk,
                      .v_chunk = count(g.rows * 16)});
     batched_product(*state_, slab.values, matrix.values, resampled,
@@ -296,6 +259,7 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
                      .terms = g.columns,
                      .z_padded = slab.rows_padded,
                      .batches = n,
+                     .run = column_run,
                      .out_first = count(first * columns.count * 16),
                      .out_batch = count(columns.count * 16),
                      .out_chunk = count(views * columns.count * 16),

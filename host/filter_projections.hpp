@@ -28,21 +28,16 @@ struct FilteredScan {
   std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
   std::vector<double> view_max;  ///< max |q| of each view's samples
   double ramp_error =
-      0;  ///< sum over views of a bound on the fp32 error of any filtered sample (docs/error-bounds.md)
+      0;  ///< sum over views of a bound on the error of any filtered sample (docs/error-bounds.md)
   bool limited_angle = false;
 };
 
-/// Geometry and samples are in `units`. Cost: as RowFilter's. Memory: the filtered scan on the host, one
-/// chunk on the device; where line integrals are scaled, those once more.
+/// What is certified is filtered in double precision and rounded once; fp32 is faster. Geometry and samples
+/// are in `units`. Cost: as RowFilter's. Memory: the filtered scan on the host, one chunk on the device;
+/// where line integrals are scaled, those once more.
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                                 const Progress& progress = {}, FilterMethod method = FilterMethod::automatic,
-                                const Units& units = {});
-
-/// Replaces the a-priori ramp_error by the largest difference from a direct convolution in double precision,
-/// view by view, where that takes at most about a second (views * rows * columns^2 multiply-adds); else keeps
-/// the bound.
-void measure_filter_error(FilteredScan& filtered, const ProjectionSet& scan, const FieldOptions& field,
-                          const Units& units = {});
+                                Precision precision = Precision::fp64, const Units& units = {});
 
 /// A scan's line integrals in other units: its own data, unless these have to be scaled.
 class LineIntegrals {
@@ -70,7 +65,8 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
                          const UpsampledColumns& columns, std::int64_t rows);
 
 /// Slabs straight from the scan, where columns and rows are the detector's own and the device filters by
-/// products: the filtered scan stays on the device. The values are those of filter_projections and Upsampler.
+/// products: the filtered scan stays on the device. The values are those of filter_projections in fp32 and
+/// Upsampler.
 class DirectFilter {
  public:
   /// Keeps references to the state and the scan. Samples are in `units`.
@@ -87,9 +83,13 @@ class DirectFilter {
   opencl::State* state_;
   LineIntegrals data_;
   ParallelGeometry geometry_;
-  std::vector<float> weights_;
+  std::vector<double> weights_;
   std::unique_ptr<RowFilter> filter_;
 };
+
+/// Terms of a run of the products along rows and along columns (batched_product.hpp). The former's errors are
+/// grown by the latter's matrix, and it is the smaller one.
+constexpr int row_run = 4, column_run = 16;
 
 /// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.
 class Upsampler {

@@ -116,8 +116,8 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
                            const Progress& progress) {
   opencl::State& state = device.state();
-  FilteredScan filtered = filter_projections(state, scan, field, {}, FilterMethod::automatic, units);
-  measure_filter_error(filtered, scan, field, units);
+  const FilteredScan filtered =
+      filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto stream_at = [&](int up, const std::string& filter, int gold) {

@@ -290,8 +290,8 @@ Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units
   const auto now = [] { return std::chrono::steady_clock::now(); };
   const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
   auto start = now();
-  FilteredScan filtered = filter_projections(state, scan, field, {}, FilterMethod::automatic, units);
-  measure_filter_error(filtered, scan, field, units);
+  const FilteredScan filtered =
+      filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
   double preparation = since(start);  // that build will repeat
   Upsampler upsampler(state, filtered);
   const Coverage coverage(filtered.geometry);

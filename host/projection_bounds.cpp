@@ -27,14 +27,18 @@ std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 constexpr double smallest_normal = 0x1p-126;
 
 // What two products may lose below the smallest normal number: relative bounds do not cover it, and devices
-// may flush.
+// may flush, in each of the terms and in what is kept of each run.
 double underflow(const ParallelGeometry& g, double gain_u) {
-  return 2 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
+  return 4 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
 }
 
-// How much a run-wise sum of n products errs, in units of u times the sum of magnitudes
-// (kernels/batched_product.cl).
-double product_error(std::int64_t n) { return 18 + static_cast<double>(n) / 16; }
+// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
+// (kernels/batched_product.cl): a term is rounded within its run, the sum at its end, and the m roundings
+// that were kept are summed with m u of themselves.
+double product_error(std::int64_t n, int run) {
+  const double runs = std::ceil(static_cast<double>(n) / run);
+  return run + 2 + 1.01 * runs * runs * unit_roundoff;
+}
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
@@ -73,7 +77,7 @@ double lebesgue_constant(std::int64_t n) {
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
-  return unit_roundoff * (product_error(g.columns) + product_error(g.rows) + 2) *
+  return unit_roundoff * (product_error(g.columns, column_run) + product_error(g.rows, row_run) + 2) *
              upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max +
          underflow(g, upsampler.gain_u(columns, order));
 }
@@ -160,19 +164,23 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
+  const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;    // largest sum of |Lagrange weights|
+  const double slope_gain = u_filter == "cubic" ? 4.0 / 3 : 1.0;  // and of their derivative's, of differences
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
-  const double upsampling = unit_roundoff * ((product_error(g.rows) + 2) * gain_v * gain_u * samples +
-                                             (product_error(g.columns) + 2) * gain_u * sups.value);
-  // One rounding per multiply-add from the view that a term enters at, and the weights' own.
-  const double per_view = u_filter == "cubic" ? 4 : 2;
+  const double upsampling =
+      unit_roundoff * ((product_error(g.rows, row_run) + 2) * gain_v * gain_u * samples +
+                       (product_error(g.columns, column_run) + 2) * gain_u * sups.value);
+  // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
+  // own.
+  const double per_view = u_filter == "cubic" ? 4 : 2,
+               runs = std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run));
   const double summation =
-      unit_roundoff * (per_view * static_cast<double>(g.views()) + 8) * weight_gain * sups.value;
-  // A wrong position moves along the interpolant, whose slope is at most 3/2 of the signal's; that is bounded
-  // by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
+      unit_roundoff * (per_view * static_cast<double>(view_run) + runs + 8) * weight_gain * sups.value;
+  // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is
+  // bounded by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
-  const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * 1.5 * slope;
+  const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * slope_gain * slope;
   const double views = static_cast<double>(g.views());
   return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position +
          views * (2 * underflow(g, gain_u) + 8 * smallest_normal);

@@ -212,7 +212,9 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
       if (slab) return std::move(*slab);
     }
     if (!filtered) {
-      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic, units);
+      // Without upsampling nothing is certified.
+      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic,
+                                    direct ? Precision::fp32 : Precision::fp64, units);
       watch.lap(state, "filter");
       upsampler.emplace(state, *filtered);
     }

@@ -30,9 +30,9 @@ struct Filtered {
            const FieldOptions& field, const Progress& progress)
       : state(device),
         units(of_scan),
-        scan(filter_projections(device, projections, field, progress, FilterMethod::automatic, units)),
+        scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
+                                Precision::fp64, units)),
         upsampler(device, scan) {
-    measure_filter_error(scan, projections, field, units);
     sups = field_sups(device, upsampler, scan);
   }
   Filtered(const Filtered&) = delete;

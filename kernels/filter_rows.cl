@@ -5,6 +5,7 @@
 // out_chunk + 16 c, where c counts from detector column out_first, and columns beyond the detector's edges
 // are its mirror images. VDVR_STEP 2: every second tap is zero but the centre (Ram-Lak), so that a column
 // sees only those of the other parity and itself. Sums run in runs of 16 terms that are then added.
+// VDVR_DOUBLE 1: taps, weights and sums in double precision, rounded once, to the float that is stored.
 // Called by host/filter_rows.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
@@ -23,13 +24,13 @@
 
 // Eight columns share each vector of `in`. Named sums, not arrays: compilers keep these in registers.
 #define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
-#define ZERO(r) VEC total##r = (VEC)(0.0f);
-#define CLEAR(r) VEC sum##r = (VEC)(0.0f);
-#define ADD(r) sum##r = fma((VEC)(tap[r - n]), x, sum##r);
+#define ZERO(r) SUM total##r = (SUM)(0.0f);
+#define CLEAR(r) SUM sum##r = (SUM)(0.0f);
+#define ADD(r) sum##r = fma((SUM)(tap[r - n]), x, sum##r);
 #define TOTAL(r) total##r += sum##r;
 #if VDVR_STEP == 2
 #define CENTRE(r) \
-  total##r = fma((VEC)(centre), LOAD(source + (size_t)min(i + 2 * r, columns - 1) * 16), total##r);
+  total##r = fma((SUM)(centre), WIDE(LOAD(source + (size_t)min(i + 2 * r, columns - 1) * 16)), total##r);
 #else
 #define CENTRE(r)
 #endif
@@ -42,7 +43,7 @@
 #define PUT(r)                                                                \
   if (i + VDVR_STEP * r < columns) {                                          \
     const int u = i + VDVR_STEP * r;                                          \
-    const VEC value = weight * total##r;                                      \
+    const VEC value = NARROW(weight * total##r);                              \
     if (ANY_BROKEN(value)) broken[k] = 1;                                     \
     PUT_AT(value, u)                                                          \
     if (out_first < 0) PUT_AT(value, -1 - u)                                  \
@@ -50,7 +51,7 @@
   }
 
 __kernel void filter_rows(__global float* out, __global int* broken, __global const float* in,
-                          __global const float* taps, __global const float* weights, float centre, int offset,
+                          __global const REAL* taps, __global const REAL* weights, REAL centre, int offset,
                           int columns, int z_padded, int views, int out_first, int out_columns,
                           ulong out_begin, ulong out_view, ulong out_chunk) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
@@ -61,19 +62,19 @@ __kernel void filter_rows(__global float* out, __global int* broken, __global co
   // The first column seen; tap[r - n] is that between column i + STEP r and the n-th one seen.
   const int first_seen = VDVR_STEP == 2 ? 1 - i % 2 : 0;
   const int seen = (columns - first_seen + VDVR_STEP - 1) / VDVR_STEP;
-  __global const float* tap = taps + offset + (i - first_seen - (VDVR_STEP - 1)) / VDVR_STEP;
+  __global const REAL* tap = taps + offset + (i - first_seen - (VDVR_STEP - 1)) / VDVR_STEP;
   FOR_COLUMNS(ZERO)
   for (int first = 0; first < seen; first += 16) {
     const int last = min(first + 16, seen);
     FOR_COLUMNS(CLEAR)
     for (int n = first; n < last; ++n) {
-      const VEC x = LOAD(source + (size_t)(first_seen + VDVR_STEP * n) * 16);
+      const SUM x = WIDE(LOAD(source + (size_t)(first_seen + VDVR_STEP * n) * 16));
       FOR_COLUMNS(ADD)
     }
     FOR_COLUMNS(TOTAL)
   }
   FOR_COLUMNS(CENTRE)
-  const VEC weight = (VEC)(weights[k]);
+  const SUM weight = (SUM)(weights[k]);
   __global float* target = out + out_begin + (size_t)k * out_view + (size_t)(z / 16) * out_chunk + z % 16;
   FOR_COLUMNS(PUT)
 }

@@ -198,32 +198,44 @@ BOOST_AUTO_TEST_CASE(amplitude_bound_of_projections_holds_at_1x) {
   BOOST_TEST_MESSAGE("  amplitude of projections at 1x: error / bound " << closest);
 }
 
+// Every way to filter, with its name.
+struct Filtering {
+  FilterMethod method;
+  Precision precision;
+  const char* name;
+};
+const Filtering filterings[] = {{FilterMethod::fourier, Precision::fp32, "FFT"},
+                                {FilterMethod::product, Precision::fp32, "product"},
+                                {FilterMethod::fourier, Precision::fp64, "FFT in double"},
+                                {FilterMethod::product, Precision::fp64, "product in double"},
+                                {FilterMethod::host, Precision::fp64, "host"}};
+
 BOOST_AUTO_TEST_CASE(filter_error_is_never_above_what_is_charged) {
-  for (const FilterMethod method : {FilterMethod::fourier, FilterMethod::product})
+  for (const Filtering& f : filterings) {
+    double closest = 0;
     for (const Scan& scan : awkward_scans()) {
-      FilteredScan filtered = filter_projections(device().state(), scan.data, {}, {}, method);
-      const double a_priori = filtered.ramp_error, error = filter_error(filtered, scan.data);
-      measure_filter_error(filtered, scan.data, {});
+      const FilteredScan filtered =
+          filter_projections(device().state(), scan.data, {}, {}, f.method, f.precision);
+      const double error = filter_error(filtered, scan.data);
+      if (error > 0) closest = std::max(closest, error / filtered.ramp_error);
       BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
-                 scan.name << ", measured: " << error << " > " << filtered.ramp_error);
-      // Higham's theorem knows no underflow: below 2^-126 the relative bound is none.
-      const bool normal =
-          *std::max_element(filtered.view_max.begin(), filtered.view_max.end()) > 0x1p-126 || error == 0;
-      if (normal)
-        BOOST_TEST(error <= tolerance::bound(a_priori),
-                   scan.name << ", a priori: " << error << " > " << a_priori);
+                 scan.name << ", " << f.name << ": " << error << " > " << filtered.ramp_error);
     }
+    BOOST_TEST_MESSAGE("  filter, " << f.name << ": error / bound " << closest);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(scans_beyond_the_range_of_fp32_are_refused_or_bounded) {
-  for (const FilterMethod method : {FilterMethod::fourier, FilterMethod::product})
-    for (const double scale : {1e-40, 1e38}) {
-      const ProjectionSet scan = noise(geometry(11, 4, 24), 6, scale);
+  for (const Filtering& f : filterings)
+    for (const double scale : {1e-40, 1e38, 3e38}) {
+      ProjectionSet scan = noise(geometry(11, 4, 24), 6, scale);
+      scan.geometry.pitch_u = scale > 1e38 ? 0.01 : 1;  // filtered samples 25 times as large as the scan's
       try {
-        FilteredScan filtered = filter_projections(device().state(), scan, {}, {}, method);
+        const FilteredScan filtered =
+            filter_projections(device().state(), scan, {}, {}, f.method, f.precision);
         const double error = filter_error(filtered, scan);
         BOOST_TEST(error <= tolerance::bound(filtered.ramp_error),
-                   "noise of " << scale << ", a priori: " << error << " > " << filtered.ramp_error);
+                   "noise of " << scale << ", " << f.name << ": " << error << " > " << filtered.ramp_error);
       } catch (const InputError&) {
         BOOST_TEST(true);  // refused
       }
@@ -237,7 +249,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_gold_of_awkward_scans) {
   for (const Scan& scan : awkward_scans()) {
     FilteredScan filtered = filter_projections(device().state(), scan.data, {});
     filtered.ramp_error = 0;                        // what is tested starts from the filtered samples
-    if (filtered.view_max[0] < 0x1p-100) continue;  // underflow is covered by the measured filter error alone
+    if (filtered.view_max[0] < 0x1p-100) continue;  // attacked with the filter
     for (const char* filter : {"linear", "cubic"}) {
       const int upsampling = 2 << (turn++ % 4);
       const ColumnBlocks block{3, 3, 0.37, 0.41, {{scan.target[0] - 0.5, scan.target[1] - 0.4}}, {}};
@@ -313,18 +325,21 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_the_product_along_rows_alone) {
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_covers_long_biased_sums) {
-  // Equal terms: while the sum stays between two powers of two, every addition rounds the same way.
-  constexpr std::int64_t views = 8192;
-  ParallelGeometry g = geometry(views, 1, 8);
-  g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
-  for (const char* filter : {"linear", "cubic"})
-    for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
-      const FilteredScan f = given_samples(
-          g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
-      expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
-             std::string("summation of ") + std::to_string(views) + " views, " + filter + ", " +
-                 std::to_string(term));
-    }
+  // Equal terms: while the sum stays between two powers of two, every addition rounds the same way. Of 65536
+  // views it is the sums of runs whose addition counts.
+  for (const std::int64_t views : {8192, 65536}) {
+    ParallelGeometry g = geometry(views, 1, 8);
+    g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
+    for (const char* filter : {"linear", "cubic"})
+      for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
+        if (views > 8192 && term != 1.75) continue;
+        const FilteredScan f = given_samples(
+            g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
+        expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
+               std::string("summation of ") + std::to_string(views) + " views, " + filter + ", " +
+                   std::to_string(term));
+      }
+  }
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {

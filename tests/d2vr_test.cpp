@@ -121,7 +121,6 @@ void check_field(const ProjectionSet& scan, const D2vrField& field, const refere
 // The sum over views of the largest error of a filtered sample.
 double filter_error(const ProjectionSet& scan) {
   FilteredScan filtered = filter_projections(device().state(), scan, {});
-  measure_filter_error(filtered, scan, {});
   return filtered.ramp_error;
 }
 

@@ -80,7 +80,6 @@ struct Chain {
         exact(scan, {}),
         filtered(filter_projections(state(), scan, {})),
         upsampler(state(), filtered) {
-    measure_filter_error(filtered, scan, {});
     sups = field_sups(state(), upsampler, filtered);
   }
   static opencl::State& state() { return support::device().state(); }

@@ -52,7 +52,7 @@ struct Plan {
   cl::Buffer scratch;
 };
 
-using Key = std::tuple<cl_context, cl_command_queue, std::int64_t, std::int64_t, bool>;
+using Key = std::tuple<cl_context, cl_command_queue, Precision, std::int64_t, std::int64_t, bool>;
 
 struct Cache {
   Library library;
@@ -71,12 +71,13 @@ void forget(const opencl::State& state) noexcept {
   if (cache->plans.empty()) delete std::exchange(cache, nullptr);
 }
 
-Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward) {
+Plan& plan_for(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+               bool forward) {
   static const bool listening = (opencl::before_device_ends(forget), true);
   (void)listening;
   if (!cache) cache = new Cache;
   auto& plans = cache->plans;
-  const Key key{state.context(), state.queue(), length, batch, forward};
+  const Key key{state.context(), state.queue(), precision, length, batch, forward};
   if (const auto found = plans.find(key); found != plans.end()) return found->second;
 
   const auto n = static_cast<std::size_t>(length), bins = n / 2 + 1;
@@ -84,7 +85,8 @@ Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bo
   plan.context = state.context;
   const auto ok = [&](clfftStatus s, const char* call) { check(s, call, length, batch, state); };
   ok(clfftCreateDefaultPlan(&plan.handle, state.context(), CLFFT_1D, &n), "clfftCreateDefaultPlan");
-  ok(clfftSetPlanPrecision(plan.handle, CLFFT_SINGLE), "clfftSetPlanPrecision");
+  ok(clfftSetPlanPrecision(plan.handle, precision == Precision::fp64 ? CLFFT_DOUBLE : CLFFT_SINGLE),
+     "clfftSetPlanPrecision");
   ok(clfftSetResultLocation(plan.handle, CLFFT_OUTOFPLACE), "clfftSetResultLocation");
   ok(clfftSetPlanBatchSize(plan.handle, static_cast<std::size_t>(batch)), "clfftSetPlanBatchSize");
   if (forward) {
@@ -101,10 +103,10 @@ Plan& plan_for(opencl::State& state, std::int64_t length, std::int64_t batch, bo
   return plans.emplace(key, std::move(plan)).first->second;
 }
 
-void transform(opencl::State& state, std::int64_t length, std::int64_t batch, bool forward,
-               const cl::Buffer& in, const cl::Buffer& out) {
+void transform(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+               bool forward, const cl::Buffer& in, const cl::Buffer& out) {
   const std::lock_guard guard(bake_lock);
-  const Plan& plan = plan_for(state, length, batch, forward);
+  const Plan& plan = plan_for(state, precision, length, batch, forward);
   cl_mem source = in(), target = out();
   check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0,
                               nullptr, nullptr, &source, &target, plan.scratch()),
@@ -123,14 +125,14 @@ std::int64_t good_length(std::int64_t n) {
   return best;
 }
 
-void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
-                  const cl::Buffer& out) {
-  transform(state, length, batch, true, in, out);
+void forward_real(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+                  const cl::Buffer& in, const cl::Buffer& out) {
+  transform(state, precision, length, batch, true, in, out);
 }
 
-void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
-                  const cl::Buffer& out) {
-  transform(state, length, batch, false, in, out);
+void inverse_real(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+                  const cl::Buffer& in, const cl::Buffer& out) {
+  transform(state, precision, length, batch, false, in, out);
 }
 
 }  // namespace vdvr::fft

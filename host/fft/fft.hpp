@@ -12,13 +12,15 @@ namespace vdvr::fft {
 /// The smallest length >= n that clFFT takes and runs fast: 2^a, 3 * 2^a or 5 * 2^a.
 std::int64_t good_length(std::int64_t n);
 
-/// Real to Hermitian along contiguous rows: float in[batch][length] -> float2 out[batch][length/2 + 1].
-/// Enqueues only.
-void forward_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
-                  const cl::Buffer& out);
+enum class Precision { fp32, fp64 };
+
+/// Real to Hermitian along contiguous rows: T in[batch][length] -> T2 out[batch][length/2 + 1], T float or
+/// double. Enqueues only.
+void forward_real(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+                  const cl::Buffer& in, const cl::Buffer& out);
 
 /// Hermitian to real, scaled by 1/length. `in` may be overwritten. Enqueues only.
-void inverse_real(opencl::State& state, std::int64_t length, std::int64_t batch, const cl::Buffer& in,
-                  const cl::Buffer& out);
+void inverse_real(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+                  const cl::Buffer& in, const cl::Buffer& out);
 
 }  // namespace vdvr::fft

@@ -41,7 +41,6 @@ struct Chain {
         exact(scan, {}),
         filtered(filter_projections(device().state(), scan, {})),
         upsampler(device().state(), filtered) {
-    measure_filter_error(filtered, scan, {});
     sups = field_sups(device().state(), upsampler, filtered);
   }
   const ProjectionSet& scan;
