@@ -62,7 +62,7 @@ int fail(const std::string& who, const std::string& message, int code) {
 int run_guarded(const Command& command, std::vector<std::string> tokens) {
   const std::string who = fmt::format("vdvr {}", command.name);
   try {
-    catch_signals();
+    catch_signals(command.name);
     Arguments args(command, std::move(tokens));
     const int code = command.run(args);
     if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);
