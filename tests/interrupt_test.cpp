@@ -58,7 +58,7 @@ struct Work {
         {"render", {"render", volume.string(), "--size", "1500x1500", "-o", o + ".png"}},
         {"probe", {"probe", s, "--exact", "--points", (folder / "points.csv").string(), "-o", o + ".csv"}},
         {"run", {"run", s, "--epsilon", "25%", "-o", (out / "all").string()}},
-        {"bench", {"bench", "fbp", s}}};
+        {"bench", {"bench", "fbp", "--size", "257", "--angles", "300"}}};
   }
 };
 
