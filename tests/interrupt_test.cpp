@@ -54,7 +54,7 @@ struct Work {
         {"build", {"build", s, "--epsilon", "25%", "-o", o + ".vdvr"}},
         {"verify",
          {"verify", volume.string(), "--projections", (folder / "small.h5").string(), "--exhaustive"}},
-        {"reconstruct", {"reconstruct", s, "-o", o + ".mha"}},
+        {"reconstruct", {"reconstruct", s, "--size", "640x640x16", "--spacing", "0.5", "-o", o + ".mha"}},
         {"render", {"render", volume.string(), "--size", "1500x1500", "-o", o + ".png"}},
         {"probe", {"probe", s, "--exact", "--points", (folder / "points.csv").string(), "-o", o + ".csv"}},
         {"run", {"run", s, "--epsilon", "25%", "-o", (out / "all").string()}},
@@ -73,8 +73,8 @@ BOOST_AUTO_TEST_CASE(every_command_answers_a_signal_soon) {
   const Work w;
   std::ofstream(w.folder / "points.csv") << [] {
     std::string text = "x,y,z\n";
-    for (int i = 0; i < 3000; ++i)
-      text += std::to_string(0.03 * i - 45) + "," + std::to_string(0.01 * i) + ",0." +
+    for (int i = 0; i < 60000; ++i)
+      text += std::to_string(0.001 * i - 30) + "," + std::to_string(0.01 * i) + ",0." +
               std::to_string(i % 400) + "\n";
     return text;
   }();
