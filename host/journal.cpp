@@ -18,6 +18,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "host/io/atomic_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -120,6 +121,7 @@ std::string differences(const JournalHead& was, const JournalHead& is) {
 
 Journal::Journal(std::filesystem::path path, bool resume) : path_(std::move(path)), resume_(resume) {
   lock();
+  io::note_temporary(path_);  // as long as it holds nothing
   try {
     std::array<char, magic.size()> start{};
     const std::uint64_t bytes = size_of(file_);
@@ -131,7 +133,9 @@ Journal::Journal(std::filesystem::path path, bool resume) : path_(std::move(path
     end_ = magic.size();
     if (const auto first = read_record()) head_ = head_of(*first);
     records_ = head_ && size_of(file_) > end_ ? 1 : 0;  // at least: enough to know that it is worth keeping
+    if (records_ > 0) io::forget_temporary(path_);
   } catch (...) {
+    io::forget_temporary(path_);
     ::close(file_);
     throw;
   }
@@ -141,6 +145,7 @@ Journal::~Journal() {
   if (file_ < 0) return;
   std::error_code ignored;
   if (records_ == 0) std::filesystem::remove(path_, ignored);
+  io::forget_temporary(path_);
   ::close(file_);
 }
 
@@ -188,6 +193,7 @@ void Journal::begin(const JournalHead& head) {
   end_ = 0;
   if (::ftruncate(file_, 0) != 0)
     throw ResourceError(fmt::format("{}: cannot be emptied: {}", path_.string(), std::strerror(errno)));
+  io::note_temporary(path_);
   if (const int error = write_at(file_, 0, magic.data(), magic.size()); error != 0)
     throw ResourceError(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(error)));
   end_ = magic.size();
@@ -252,7 +258,7 @@ void Journal::append(const std::vector<std::byte>& record) {
   if (!begun_ || reading_)
     throw InputError(fmt::format("{}: the journal still holds what is being added", path_.string()));
   write_record(record);
-  ++records_;
+  if (++records_ == 1) io::forget_temporary(path_);
   const std::int64_t now = now_ns();
   if (now - synced_at_ns_ < sync_every_ns) return;
   sync();
@@ -267,6 +273,7 @@ void Journal::sync() {
 
 void Journal::remove() {
   if (file_ < 0) return;
+  io::forget_temporary(path_);
   std::error_code ignored;
   std::filesystem::remove(path_, ignored);
   ::close(file_);

@@ -1,5 +1,5 @@
-// A loop over host threads whose progress and exceptions reach the caller. Called by every stage that works
-// on the host.
+// A loop over host threads whose progress and exceptions reach the caller, and which ends when a stop is
+// requested. Called by every stage that works on the host.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "vdvr/progress.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr {
 
@@ -31,6 +32,7 @@ void parallel_for(std::int64_t n, const Progress& progress, const std::string& s
   const auto work = [&](bool reports) {
     try {
       for (std::int64_t i = next++; i < n && !stop; i = next++) {
+        throw_if_stopped();
         body(i);
         ++done;
         if (reports) report(progress, stage, static_cast<double>(done) / static_cast<double>(n));

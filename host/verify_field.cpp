@@ -8,7 +8,6 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
@@ -144,7 +143,7 @@ VerifyField::Shape VerifyField::shape_at(int rate, bool many) const {
 void VerifyField::run(const std::vector<std::uint8_t>& selected, int rate,
                       const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
   if (rate < volume_.rate || rate % volume_.rate != 0)
-    throw std::invalid_argument(fmt::format("V of rate {} cannot be tested at {}", volume_.rate, rate));
+    throw InputError(fmt::format("V of rate {} cannot be tested at {}", volume_.rate, rate));
   const auto wanted = std::count(selected.begin(), selected.end(), 1);
   Shape s = shape_at(rate, 2 * wanted > static_cast<std::int64_t>(selected.size()));
   arithmetic_ = s.bounds.arithmetic;

@@ -322,6 +322,22 @@ BOOST_AUTO_TEST_CASE(points_one_rounding_below_a_face_of_the_region_are_certifie
   BOOST_TEST(verifies(scan, v, built.result.certificate));
 }
 
+// What a plan refuses cannot be built; whether the rest can, build finds out.
+BOOST_AUTO_TEST_CASE(plan_refuses_what_cannot_do_and_no_more) {
+  const ProjectionSet scan = noise_scan(15, 7, 29, 9);
+  Device device;
+  const Grid grid = grid_of(scan, {8, 8, 6}, 0.9);
+  const RateOptions rates{16, "cubic", 4};
+  const auto plan_at = [&](double epsilon_abs) {
+    return make_plan(device, scan, grid, {}, rates, {{}, epsilon_abs});
+  };
+  const Plan wide = plan_at(10);
+  const double slack = wide.epsilon_abs - wide.budget.grid.value - wide.budget.arithmetic.value;
+  BOOST_REQUIRE(slack > 10 * wide.budget.arithmetic.value);
+  BOOST_CHECK_NO_THROW(plan_at(1.05 * slack + 3 * wide.budget.arithmetic.value));
+  BOOST_CHECK_THROW(plan_at(0.99 * slack), ToleranceError);
+}
+
 BOOST_AUTO_TEST_CASE(notes_of_the_scan_reach_the_certificate) {
   ProjectionSet scan = noise_scan(12, 5, 15, 8);
   scan.report.notes.push_back("the scan holds float64");

@@ -9,6 +9,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "vdvr/error.hpp"
+
 using namespace vdvr;
 
 namespace {
@@ -87,4 +89,18 @@ BOOST_AUTO_TEST_CASE(an_exception_of_progress_ends_the_loop_and_comes_out) {
   BOOST_CHECK_THROW(parallel_for(
                         n, [](auto&&...) { throw std::range_error("stop"); }, "", body),
                     std::range_error);
+}
+
+BOOST_AUTO_TEST_CASE(a_requested_stop_ends_loops_that_report_nothing) {
+  std::atomic<std::int64_t> done{0};
+  BOOST_CHECK_EXCEPTION(parallel_for(n, {}, "",
+                                     [&](std::int64_t i) {
+                                       if (i == n / 2) request_stop(143);
+                                       ++done;
+                                     }),
+                        Interrupted, [](const Interrupted& e) { return e.exit_code() == 143; });
+  BOOST_TEST(done < n);
+  BOOST_CHECK_THROW(parallel_for(1, {}, "", [](std::int64_t) {}), Interrupted);
+  request_stop(0);
+  parallel_for(1, {}, "", [](std::int64_t) {});
 }

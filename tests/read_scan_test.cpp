@@ -152,6 +152,26 @@ BOOST_AUTO_TEST_CASE(not_a_number_in_line_integrals_is_refused_with_its_place) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(values_that_float32_rounds_are_noted) {
+  const TemporaryFolder folder;
+  for (const auto& [value, rounds] : {std::pair{0.5, false}, {0.1, true}}) {
+    const Path path = folder / "a.h5";
+    {
+      Hdf5Writer file(path);
+      file.group("/exchange");
+      file.dataset("/exchange/data", {K, V, U}, std::vector<double>(K * V * U, value), H5T_IEEE_F64LE);
+      file.attribute("/exchange/data", "description", "line integrals");
+      file.dataset("/exchange/theta", {K}, {0, 45, 90, 135}, H5T_IEEE_F64LE);
+      file.attribute("/exchange/theta", "units", "degrees");
+    }
+    const auto notes = read_scan(path).report.notes;
+    const bool noted = std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+      return note.find("rounded to float32") != std::string::npos;
+    });
+    BOOST_TEST(noted == rounds);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(counts_without_flats_are_refused) {
   const TemporaryFolder folder;
   Exchange e;

@@ -62,13 +62,21 @@ std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions
 }
 
 int resumable(const Journal& journal, const std::function<int()>& work) {
+  const std::string stays =
+      fmt::format("interrupted; {} stays: the same command with --resume continues", journal.path().string());
+  // Called once files that hold nothing are gone.
+  explain_interruption([path = journal.path(), stays] {
+    std::error_code error;
+    return std::filesystem::exists(path, error) ? stays : std::string("interrupted");
+  });
+  struct Forget {
+    ~Forget() { explain_interruption({}); }
+  } const forget;
   try {
     return work();
   } catch (const Interrupted& e) {
     if (journal.records() == 0) throw;
-    throw Interrupted(e.exit_code(),
-                      fmt::format("interrupted; {} stays: the same command with --resume continues",
-                                  journal.path().string()));
+    throw Interrupted(e.exit_code(), stays);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
 
@@ -54,7 +55,12 @@ std::string as_message(const Error& error) {
   return text;
 }
 
-int fail(const std::string& who, const std::string& message, int code) {
+/// What fails once a stop was requested fails for that: a compiler whose files its own handler removed.
+int fail(const std::string& who, std::string message, int code) {
+  if (const int stop = stop_requested(); stop != 0 && stop != code) {
+    message = "interrupted";
+    code = stop;
+  }
   say(fmt::format("{}: {}\n", who, message));
   return code;
 }
@@ -62,7 +68,7 @@ int fail(const std::string& who, const std::string& message, int code) {
 int run_guarded(const Command& command, std::vector<std::string> tokens) {
   const std::string who = fmt::format("vdvr {}", command.name);
   try {
-    catch_signals();
+    catch_signals(command.name);
     Arguments args(command, std::move(tokens));
     const int code = command.run(args);
     if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);

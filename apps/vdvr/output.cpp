@@ -39,11 +39,13 @@ OutputFolder::OutputFolder(fs::path folder, std::vector<std::string> names, bool
       throw InputError(fmt::format("{}: exists already; --force overwrites it", (folder_ / name).string()));
   made_ = fs::create_directories(folder_, error);
   if (error) throw InputError(fmt::format("{}: cannot be created: {}", folder_.string(), error.message()));
+  if (made_) io::note_temporary(folder_);
 }
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
   if (made_) fs::remove(folder_, ignored);  // fails, as it should, unless empty
+  io::forget_temporary(folder_);
 }
 
 void OutputFolder::begin() {

@@ -1,20 +1,55 @@
 #include "apps/vdvr/progress.hpp"
 
 #include <fmt/format.h>
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <system_error>
+#include <thread>
+#include <utility>
 
+#include "host/io/atomic_file.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
 namespace {
 
-volatile std::sig_atomic_t caught_signal = 0;
+// A child of ours that still has the handlers must not end us.
+pid_t handler_owner = 0;
+int wake_pipe = -1;
 
-extern "C" void note_signal(int number) { caught_signal = number; }
+extern "C" void note_signal(int number) {
+  const int kept = errno;
+  request_stop(128 + number);
+  const char wake = 0;
+  if (::getpid() == handler_owner) static_cast<void>(!::write(wake_pipe, &wake, 1));
+  errno = kept;
+}
+
+// Long enough for work that looks for the wish to unwind, short enough to answer within a second.
+constexpr std::chrono::milliseconds patience{600};
+
+std::mutex explanation_lock;
+std::function<std::string()> explanation;
+
+void end_when_asked(int pipe, const std::string& command) {
+  char woken = 0;
+  while (::read(pipe, &woken, 1) != 1)
+    if (errno != EINTR) return;
+  std::this_thread::sleep_for(patience);
+  const int code = stop_requested();
+  io::remove_temporaries();
+  const std::lock_guard guard(explanation_lock);
+  say(fmt::format("vdvr {}: {}\n", command, explanation ? explanation() : Interrupted(code).what()));
+  ::_exit(code);
+}
 
 std::string time_text(double seconds) {
   if (seconds < 90) return fmt::format("{:.0f} s", seconds);
@@ -24,7 +59,17 @@ std::string time_text(double seconds) {
 
 }  // namespace
 
-void catch_signals() {
+void catch_signals(const std::string& command) {
+  std::array<int, 2> ends{-1, -1};
+  if (::pipe2(ends.data(), O_CLOEXEC) == 0) {
+    handler_owner = ::getpid();
+    wake_pipe = ends[1];
+    try {
+      std::thread(end_when_asked, ends[0], command).detach();
+    } catch (
+        const std::system_error&) {  // no thread to be had: work that looks for the wish stops all the same
+    }
+  }
   struct sigaction action {};
   action.sa_handler = note_signal;
   sigemptyset(&action.sa_mask);
@@ -34,14 +79,17 @@ void catch_signals() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
+void explain_interruption(std::function<std::string()> message) {
+  const std::lock_guard guard(explanation_lock);
+  explanation = std::move(message);
+}
+
 void say(const std::string& text) {
   std::fputs(text.c_str(), stderr);
   std::fflush(stderr);
 }
 
-void throw_if_interrupted() {
-  if (caught_signal != 0) throw Interrupted(128 + static_cast<int>(caught_signal));
-}
+void throw_if_interrupted() { throw_if_stopped(); }
 
 ProgressLine::ProgressLine(std::string command, bool quiet)
     : command_(std::move(command)), quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -11,9 +12,14 @@
 
 namespace vdvr::cli {
 
-/// Installs the handlers of SIGINT and SIGTERM, which only take note; see throw_if_interrupted. A pipe that
-/// nobody reads any more is a failing write, not the end of the process.
-void catch_signals();
+/// Installs the handlers of SIGINT and SIGTERM, which ask the library to stop; see throw_if_interrupted. Work
+/// that has not unwound 0.6 s later is in a call that cannot be left, such as the compilation of a kernel:
+/// the process then ends without unwinding, its temporary files removed. A pipe that nobody reads any more is
+/// a failing write, not the end of the process. `command`: for the message.
+void catch_signals(const std::string& command);
+/// What to say instead of "interrupted" when the process ends without unwinding; called by another thread.
+/// None: take it back.
+void explain_interruption(std::function<std::string()> message);
 /// Writes to stderr. That nobody reads it is no reason to stop.
 void say(const std::string& text);
 /// Throws Interrupted (130 or 143) once a signal has come. Called by every progress report and before every

@@ -8,6 +8,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <mutex>
+#include <set>
 #include <vector>
 
 #include "vdvr/error.hpp"
@@ -29,6 +31,15 @@ void sync_path(const std::filesystem::path& path, int flags) {
     throw ResourceError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(why)));
 }
 
+struct Temporaries {
+  std::mutex lock;
+  std::set<std::filesystem::path> paths;
+};
+Temporaries& temporaries() {
+  static Temporaries all;
+  return all;
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
@@ -46,11 +57,14 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   ::fchmod(fd, 0644);
   ::close(fd);
   temporary_ = name;
+  note_temporary(temporary_);
 }
 
 AtomicFile::~AtomicFile() {
   std::error_code ignored;
-  if (!committed_) std::filesystem::remove(temporary_, ignored);
+  if (committed_) return;
+  std::filesystem::remove(temporary_, ignored);
+  forget_temporary(temporary_);
 }
 
 void AtomicFile::commit() {
@@ -60,7 +74,28 @@ void AtomicFile::commit() {
   if (error)
     throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
   committed_ = true;
+  forget_temporary(temporary_);
   sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+void note_temporary(const std::filesystem::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.paths.insert(path);
+}
+
+void forget_temporary(const std::filesystem::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.paths.erase(path);
+}
+
+void remove_temporaries() {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  std::error_code ignored;
+  for (const auto& path : all.paths) std::filesystem::remove(path, ignored);
+  all.paths.clear();
 }
 
 void remove_leftovers(const std::filesystem::path& target) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "host/opencl/array.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::opencl {
 
@@ -26,6 +27,7 @@ class Kernel {
   Kernel(State& state, const std::string& program_name, const std::string& kernel_name,
          const Defines& defines = {})
       : state_(&state), name_(kernel_name) {
+    throw_if_stopped();  // compiling takes seconds
     const cl::Program& p = program(state, program_name, defines);
     try {
       kernel_ = cl::Kernel(p, kernel_name.c_str());
@@ -39,7 +41,8 @@ class Kernel {
     }
   }
 
-  /// Enqueues; does not wait.
+  /// Enqueues. Waits only where the device is the CPU and two kernels are ahead of this one: what is enqueued
+  /// cannot be taken back, so that a stop would wait for all of it.
   void operator()(const Range& range, const Args&... args) {
     std::array<std::uint64_t, 3> local = range.local;
     while (local[0] * local[1] * local[2] > max_group_) {  // a device smaller than the tuning assumed
@@ -49,11 +52,14 @@ class Kernel {
     }
     const auto g = [&](int a) { return round_up(range.global[a], local[a]); };
     if (g(0) * g(1) * g(2) == 0) return;
+    throw_if_stopped();
     try {
       cl_uint index = 0;
       (kernel_.setArg(index++, args), ...);
+      cl::Event event;
       state_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(g(0), g(1), g(2)),
-                                         cl::NDRange(local[0], local[1], local[2]));
+                                         cl::NDRange(local[0], local[1], local[2]), nullptr, &event);
+      state_->keep_pace(std::move(event));
     } catch (const cl::Error& e) {
       throw DeviceError(fmt::format("kernel {} on '{}', global {}x{}x{}, local {}x{}x{}: {} {}", name_,
                                     state_->info.name, g(0), g(1), g(2), local[0], local[1], local[2],

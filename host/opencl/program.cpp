@@ -11,6 +11,7 @@
 #include "host/opencl/embedded.hpp"
 #include "host/opencl/state.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::opencl {
 namespace {
@@ -57,6 +58,8 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
   try {
     built.build({state.device}, options.c_str());
   } catch (const cl::Error& e) {
+    // LLVM's own handler removes the files of a compilation that a signal interrupts, which then fails.
+    throw_if_stopped();
     std::string log;
     try {
       log = built.getBuildInfo<CL_PROGRAM_BUILD_LOG>(state.device);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/opencl/cl.hpp"
@@ -55,7 +56,16 @@ struct State {
   /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is
   /// allocated.
   cl::Buffer allocate(std::uint64_t bytes, const std::string& what);
+  /// On a CPU: waits until at most two kernels are unfinished, the latest included.
+  void keep_pace(cl::Event latest) {
+    if (!info.is_cpu) return;
+    if (before_() != nullptr) before_.wait();
+    before_ = std::exchange(last_, std::move(latest));
+  }
   void release(std::uint64_t bytes, cl::Buffer buffer) noexcept;
+
+ private:
+  cl::Event before_, last_;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".

@@ -1,0 +1,17 @@
+// The wish that long work ends. Loops over host threads and launches of kernels look for it, whether or not
+// they report progress; the library installs no signal handler, a program's handler calls request_stop.
+#pragma once
+
+namespace vdvr {
+
+/// All long work of this process throws Interrupted(exit_code) at its next look; 0 takes the wish back. May
+/// be called from signal handlers and from any thread.
+void request_stop(int exit_code) noexcept;
+
+/// The exit code asked for, or 0.
+int stop_requested() noexcept;
+
+/// Throws Interrupted if a stop was requested.
+void throw_if_stopped();
+
+}  // namespace vdvr
