@@ -90,7 +90,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                  cl_int, cl_int, cl_int>
       kernel(state, "back_project", "back_project",
              {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
-              {"VDVR_RUN", std::to_string(view_run)},
+              {"VDVR_RUN", std::to_string(view_run(filter))},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
               {"VDVR_TILE", std::to_string(tuning.tile)},
               {"VDVR_VECTORS", std::to_string(tuning.vectors)}});

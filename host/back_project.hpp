@@ -32,8 +32,8 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                   const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
                   const ColumnTuning& tuning);
 
-/// Views that are summed before their sum is added to the others'.
-constexpr std::int64_t view_run = 16;
+/// Views that are summed before their sum is added to the others': 64 multiply-adds.
+inline std::int64_t view_run(const std::string& filter) { return filter == "cubic" ? 16 : 32; }
 
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
 /// share cache sets.

@@ -174,9 +174,9 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
   const double per_view = u_filter == "cubic" ? 4 : 2,
-               runs = std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run));
-  const double summation =
-      unit_roundoff * (per_view * static_cast<double>(view_run) + runs + 8) * weight_gain * sups.value;
+               runs = std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(u_filter)));
+  const double summation = unit_roundoff * (per_view * static_cast<double>(view_run(u_filter)) + runs + 8) *
+                           weight_gain * sups.value;
   // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is
   // bounded by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
