@@ -165,14 +165,21 @@ class Builder {
     }
   }
 
-  // The node at which the largest measure lies.
+  // The node at which the largest measure lies. Coarse gold tests nodes further outside the covered region
+  // than fine gold does.
   Vec3 worst_node(const MixedVolume& volume, std::int64_t brick) {
     std::vector<std::uint8_t> one(bricks_.level.size(), 0);
     one[at(brick)] = 1;
-    Vec3 where{};
-    stream().run(
-        one, [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, brick); }, {}, "worst");
-    return where;
+    std::optional<Vec3> where;
+    for (GoldStream* gold : {&gold_->fine(), gold_->coarse()})
+      if (gold && !where)
+        gold->run(
+            one,
+            [&](GoldStream::Batch& batch) {
+              where = vdvr::worst_node(batch, volume, brick, gold->settings().rate);
+            },
+            {}, "worst");
+    return where.value_or(Vec3{});
   }
 
   const std::vector<BrickMeasure>& measures() const { return node_test_->measures(); }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include "host/parallel.hpp"
@@ -158,9 +159,8 @@ Certificate to_world(Certificate c, const Units& units) {
 
 namespace {
 
-constexpr double smallest = 0x1p-126, largest = 0x1p126;
-
-void check(double magnitude, const char* what, const char* remedy) {
+void check(double magnitude, double largest, const char* what, const char* remedy) {
+  constexpr double smallest = 0x1p-126;
   if (magnitude == 0 || (magnitude >= smallest && magnitude <= largest)) return;
   throw InputError(fmt::format(
       "{} reach {:.3g}; float32, in which scans are read and volumes stored, holds {:.3g} to {:.3g}: {}",
@@ -172,11 +172,14 @@ void check(double magnitude, const char* what, const char* remedy) {
 void check_line_integrals(const ProjectionSet& scan) {
   const double magnitude = largest_magnitude(scan.data);
   if (!std::isfinite(magnitude)) return;  // refused by view, after filtering
-  check(magnitude, "the line integrals", "scale them, or state lengths in another unit");
+  check(magnitude, static_cast<double>(std::numeric_limits<float>::max()), "the line integrals",
+        "scale them, or state lengths in another unit");
 }
 
 void check_densities(double magnitude) {
-  check(magnitude, "the densities", "state lengths (the pitch) in another unit, or scale the line integrals");
+  // Fitted samples and tiles may rise above the base's.
+  check(magnitude, 0x1p126, "the densities",
+        "state lengths (the pitch) in another unit, or scale the line integrals");
 }
 
 }  // namespace vdvr

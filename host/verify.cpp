@@ -321,7 +321,10 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     result.measured_max = std::max(result.measured_max, b.error);
     if (b.tried > volume.rate) ++result.bricks_finer;
     result.finest_rate = std::max(result.finest_rate, b.tried);
-    if (!stored.brick_totals.empty()) {
+    // With a window a brick of which build tested nothing may have cells here, whose range is widened by
+    // more.
+    const bool promised = !stored.brick_totals.empty() && (stored.brick_totals[i] >= 0 || !stored.window);
+    if (promised) {
       const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
       // Between gold nodes the certificate's bound holds with the sampler's rounding.
       if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))

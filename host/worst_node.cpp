@@ -3,12 +3,13 @@
 
 namespace vdvr {
 
-Vec3 worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick) {
+std::optional<Vec3> worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
+                               int gold_rate) {
   const Index3 bricks = volume.bricks();
   const Index3 p{brick % bricks[0], brick / bricks[0] % bricks[1], brick / bricks[0] / bricks[1]};
   const std::int64_t g = volume.granularity;
-  const double rate = volume.rate;
-  Vec3 where{};
+  const double rate = gold_rate;
+  std::optional<Vec3> where;
   float largest = -1;
   const BrickSamples stored(volume, p);
   batch.for_each_node(brick, [&](const Index3& i, float gold, const Slack& slack) {
@@ -20,9 +21,11 @@ Vec3 worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::
     const float total = slack.total(v - gold);
     if (total <= largest) return;
     largest = total;
+    where.emplace();
     for (std::size_t a = 0; a < 3; ++a)
-      where[a] = volume.grid.origin[a] +
-                 (static_cast<double>(p[a] * g) + static_cast<double>(i[a]) / rate) * volume.grid.spacing[a];
+      (*where)[a] =
+          volume.grid.origin[a] +
+          (static_cast<double>(p[a] * g) + static_cast<double>(i[a]) / rate) * volume.grid.spacing[a];
   });
   return where;
 }

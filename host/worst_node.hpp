@@ -2,11 +2,15 @@
 // sampler. Called by build.cpp.
 #pragma once
 
+#include <optional>
+
 #include "host/gold_stream.hpp"
 
 namespace vdvr {
 
-/// World position of the node with the largest |V - gold| + T + P of a brick of the batch.
-Vec3 worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick);
+/// World position of the node with the largest |V - gold| + T + P of a brick of a batch of gold at `rate`;
+/// none where that tests no node of it.
+std::optional<Vec3> worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
+                               int rate);
 
 }  // namespace vdvr

@@ -503,8 +503,8 @@ BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
   Certificate at_nodes;
   at_nodes.brick_totals.assign(volume.level.size(), -1);
   double largest = 0;
-  field.run(all,
-            [&](const VerifyField::Brick& b) {
+  field.run(all, volume.rate,
+            [&](const VerifyField::Piece& b) {
               if (b.total < 0) return;
               at_nodes.brick_totals[static_cast<std::size_t>(b.brick)] =
                   static_cast<float>(b.error + 2 * field.arithmetic());
@@ -513,8 +513,8 @@ BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
             {});
   const auto attacked = [&](const Certificate& c) {
     TotalAttack attack(volume, c);
-    field.run(all,
-              [&](const VerifyField::Brick& b) {
+    field.run(all, volume.rate,
+              [&](const VerifyField::Piece& b) {
                 if (b.total >= 0) attack.consider(b);
               },
               {});

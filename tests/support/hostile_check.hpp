@@ -331,7 +331,10 @@ inline void check_verify(Device& device, const Inputs& in, const BuildResult& re
     options.exhaustive = !sample;
     const VerifyResult verified = verify(device, in.scan, result.volume, result.certificate, options);
     r.verified = true;
-    if (result.certificate.holds_buffer && !verified.holds)
+    // Nodes around the covered region are tested; where none of it is left, verify says that it tests
+    // nothing.
+    const bool nothing_covered = verified.cells_tested == 0 && r.points == 0;
+    if (result.certificate.holds_buffer && !verified.holds && !nothing_covered)
       r.fail(verified.cells_tested > 0 ? "verify refuses" : "verify tests nothing",
              verified.failure + "; verify's total " + text_of(verified.total) + ", the certificate's " +
                  text_of(result.certificate.total_buffer));
@@ -355,6 +358,7 @@ inline void check_file(const BuildResult& result, Report& r) {
       r.fail("file", "the volume reads back otherwise");
     Certificate expected = result.certificate;
     expected.content_sha256 = file.certificate.content_sha256;
+    expected.sealed = true;
     if (to_json(file.certificate) != to_json(expected))
       r.fail("file", "the certificate reads back otherwise");
     if (file.certificate.brick_totals != result.certificate.brick_totals)
@@ -427,7 +431,8 @@ inline std::string rough_difference(const BuildResult& one, const BuildResult& s
   if (!(std::abs(a - b) <= 0.05 * a)) return text_of(a) + " samples per base sample, and " + text_of(b);
   const double p = one.certificate.total_buffer / one.certificate.epsilon_abs,
                q = scaled.certificate.total_buffer / scaled.certificate.epsilon_abs;
-  if (!(std::abs(p - q) <= 0.01 * p)) return "total / epsilon " + text_of(p) + ", and " + text_of(q);
+  // A brick at the tolerance may fall on either side of it, and then the next one is the worst.
+  if (!(std::abs(p - q) <= 0.05 * p)) return "total / epsilon " + text_of(p) + ", and " + text_of(q);
   return {};
 }
 
@@ -444,6 +449,10 @@ inline void compare_scales(const Case& c, const Inputs& in, const Outcome& one, 
     return;
   }
   if (scaled.kind == "built") return;
+  // A file's step is a normal number: integers of smaller densities may be too coarse, and it says so.
+  if (scaled.kind == "tolerance" && scaled.message.find("--storage") != std::string::npos &&
+      c.scale.density < 0x1p-90)
+    return;
   if (!r.excuse.empty()) {
     if (one.kind != "built" && scaled.kind != "other") return;
     const auto names = [&](const char* type) { return scaled.message.find(type) != std::string::npos; };
