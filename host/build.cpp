@@ -165,21 +165,24 @@ class Builder {
     }
   }
 
-  // The node at which the largest measure lies. Coarse gold tests nodes further outside the covered region
-  // than fine gold does.
-  Vec3 worst_node(const MixedVolume& volume, std::int64_t brick) {
+  // The node at which the largest measure lies, on the gold that decided its brick. A brick's border can be
+  // tested for its neighbours' sake alone, which computed by itself it does not show: then the brick's first
+  // node.
+  Vec3 worst_node(const MixedVolume& volume, const BrickMeasure& worst) {
+    GoldStream& gold =
+        gold_->coarse() && worst.rate != stream().settings().rate ? *gold_->coarse() : stream();
     std::vector<std::uint8_t> one(bricks_.level.size(), 0);
-    one[at(brick)] = 1;
+    one[at(worst.brick)] = 1;
     std::optional<Vec3> where;
-    for (GoldStream* gold : {&gold_->fine(), gold_->coarse()})
-      if (gold && !where)
-        gold->run(
-            one,
-            [&](GoldStream::Batch& batch) {
-              where = vdvr::worst_node(batch, volume, brick, gold->settings().rate);
-            },
-            {}, "worst");
-    return where.value_or(Vec3{});
+    gold.run(
+        one,
+        [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, worst.brick, worst.rate); },
+        {}, "worst");
+    if (where) return *where;
+    const Index3 n = volume.bricks();
+    const std::int64_t g = volume.granularity;
+    return volume.grid.position(
+        {worst.brick % n[0] * g, worst.brick / n[0] % n[1] * g, worst.brick / n[0] / n[1] * g});
   }
 
   const std::vector<BrickMeasure>& measures() const { return node_test_->measures(); }
@@ -276,7 +279,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   }
   if (worst) {
     c.measured_total = static_cast<double>(worst->total) * (1 + 0x1p-22);  // two sums in fp32
-    c.worst_at = builder.worst_node(volume, worst->brick);
+    c.worst_at = builder.worst_node(volume, *worst);
   }
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {builder.slack().gold, "curvature: signed second differences of gold, with remainder"};
