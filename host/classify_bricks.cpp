@@ -95,6 +95,13 @@ bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
 
 void ClassifyBricks::classify(const DeviceField& base, double tolerance,
                               const std::vector<std::uint8_t>& near) {
+  // Nothing of an earlier attempt stays: its levels are of another tolerance, or of another lattice.
+  host_.uncount(tile_bytes_);
+  tile_bytes_ = 0;
+  bounds_ = {};
+  bricks_.level.assign(bricks_.level.size(), LevelTriple{0, 0, 0});
+  bricks_.involved.assign(bricks_.level.size(), 0);
+  for (std::vector<float>& tile : bricks_.samples) tile = {};
   measures_.assign(bricks_.level.size(), {});
   along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);

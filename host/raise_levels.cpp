@@ -36,7 +36,9 @@ class Raise {
       const LevelTriple& other = bricks_.level[at(j)];
       if (!along_) {
         if (other[0] >= own_[0]) continue;
-        for (std::uint8_t& l : to_[at(j)]) rise(l, static_cast<std::uint8_t>(other[0] + 1));
+        // A base coarser along one axis gives that axis more levels than the others have.
+        for (std::size_t a = 0; a < 3; ++a)
+          rise(to_[at(j)][a], std::min<std::uint8_t>(top_[a], static_cast<std::uint8_t>(other[a] + 1)));
         any = true;
         continue;
       }

@@ -48,6 +48,12 @@ BOOST_AUTO_TEST_CASE(isotropic_levels_rise_as_one) {
               std::vector<LevelTriple>{{1, 1, 1}, {2, 2, 2}}));
 }
 
+BOOST_AUTO_TEST_CASE(isotropic_levels_end_at_gold_along_every_axis_where_the_base_is_coarser) {
+  OpenBricks b = pair_of({4, 3, 4}, {3, 3, 3});
+  b.coarsening = {1, 0, 1};
+  BOOST_TEST((raised(b, 0, high_x, {}, false) == std::vector<LevelTriple>{{4, 3, 4}, {4, 3, 4}}));
+}
+
 BOOST_AUTO_TEST_CASE(a_brick_without_coarser_neighbours_rises_along_the_axis_that_errs_most) {
   AxisErrors along;
   along.of[0] = {{{1, 0}, {0.25f, 0}, {0.06f, 0}}};
