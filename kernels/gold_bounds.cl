@@ -69,8 +69,8 @@ __kernel void dilate_table(__global float2* out, __global const float2* table, _
 
 // The bound of each cell: for each view the dilated table's entry under the cell's centre.
 // first_z: the table's cell that the blocks begin at.
-// steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}. `lost`: what products
-// of all views can have lost below the normal numbers.
+// steps: per block and view {s per cell along x, along y, s at the first cell's centre, 0}. `lost`: what
+// products of all views can have lost below the normal numbers.
 __kernel void project_bound(__global float* p, __global const float2* table, __global const float4* steps,
                             int views, int columns, int cells_x, int cells_y, int cells_z, int blocks,
                             int first_z, float factor, float lost) {
@@ -168,9 +168,9 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   if (z == 0) cells_above[column] = cells_below[column] = VDVR_UNTESTED;
 }
 
-// Slack of each node: the largest of either of the cells around it, VDVR_UNTESTED where no such cell meets the
-// covered region. margin: per block and column the coverage margin across z; nodes with less than `lowest`
-// are untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
+// Slack of each node: the largest of either of the cells around it, VDVR_UNTESTED where no such cell meets
+// the covered region. margin: per block and column the coverage margin across z; nodes with less than
+// `lowest` are untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
 __kernel void node_slack(__global float* above, __global float* below, __global const float* cells_above,
                          __global const float* cells_below, __global const float* margin,
                          __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,

@@ -21,7 +21,8 @@ enum class StorageChoice { automatic, f32, u16, u8 };
 
 struct BuildOptions {
   int granularity = 4;
-  std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box only
+  std::optional<std::array<double, 6>>
+      roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box only
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
   Closing closing = Closing::coarse;
   StorageChoice storage = StorageChoice::automatic;
