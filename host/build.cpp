@@ -19,7 +19,7 @@
 #include "host/reconstruct_field.hpp"
 #include "host/region_of_interest.hpp"
 #include "host/sampler_terms.hpp"
-#include "host/units.hpp"
+#include "host/result_units.hpp"
 #include "host/worst_node.hpp"
 #include "vdvr/error.hpp"
 

@@ -18,7 +18,7 @@
 #include "host/paper_bounds.hpp"
 #include "host/reconstruct_field.hpp"
 #include "host/sampler_terms.hpp"
-#include "host/units.hpp"
+#include "host/result_units.hpp"
 #include "host/volume_problem.hpp"
 #include "vdvr/error.hpp"
 

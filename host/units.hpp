@@ -10,10 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
 #include "vdvr/grid.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/plan.hpp"
 #include "vdvr/projections.hpp"
 
 namespace vdvr {
@@ -40,17 +37,13 @@ double largest_magnitude(const std::vector<float>& samples);
 
 /// 2^exponent times every sample; exact but for what leaves the normal numbers of fp32.
 void scale(std::vector<float>& samples, int exponent);
-/// Samples and step; integers stay what they are.
-void scale(MixedVolume& volume, int exponent);
 
-/// What is given in `units` in world units. Bounds by brick never become smaller.
+/// What is given in `units` in world units.
 double to_world(double density, const Units& units);
 Vec3 to_world(const Vec3& point, const Units& units);
 ParallelGeometry to_world(ParallelGeometry geometry, const Units& units);
 Grid to_world(Grid grid, const Units& units);
 std::array<double, 6> to_world(const std::array<double, 6>& box, const Units& units);
-Plan to_world(Plan plan, const Units& units);
-Certificate to_world(Certificate certificate, const Units& units);
 
 template <class T>
 T from_world(T world, const Units& units) {

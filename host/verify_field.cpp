@@ -11,7 +11,7 @@
 
 #include "host/opencl/kernel.hpp"
 #include "host/parallel.hpp"
-#include "host/units.hpp"
+#include "host/result_units.hpp"
 #include "host/verify_cosines.hpp"
 #include "vdvr/error.hpp"
 

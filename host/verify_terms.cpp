@@ -11,7 +11,7 @@
 #include "host/covered_range.hpp"
 #include "host/host_memory.hpp"
 #include "host/reconstruct_field.hpp"
-#include "host/units.hpp"
+#include "host/result_units.hpp"
 #include "host/verify_claims.hpp"
 
 namespace vdvr {

@@ -18,14 +18,7 @@ namespace vdvr {
 namespace {
 
 using testing::noise_scan;
-
-ProjectionSet simulated(const Phantom& phantom, std::int64_t columns, std::int64_t rows, int angles) {
-  SimulateOptions options;
-  options.columns = columns;
-  options.rows = rows;
-  options.angles = angles;
-  return simulate(phantom, options);
-}
+using testing::simulated;
 
 Grid grid_around_axis(const Index3& cells, double spacing) {
   Grid grid;
@@ -241,17 +234,25 @@ BOOST_AUTO_TEST_CASE(bounds_of_cells_for_two_rates_are_no_smaller_than_for_one) 
   }
 }
 
+// A brick that coarse gold decided, given a tile at the fine rate.
+struct Refined {
+  explicit Refined(Case& c) {
+    while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
+    BOOST_REQUIRE(brick < c.decided.size());
+    c.bricks.level[brick] = {3, 3, 3};
+    alone.assign(c.bricks.level.size(), 0);
+    alone[brick] = 1;
+    c.classify.extract(alone);
+  }
+  std::size_t brick = 0;
+  std::vector<std::uint8_t> alone;  // the selection of it
+};
+
 BOOST_AUTO_TEST_CASE(tile_finer_than_coarse_gold_is_measured_on_fine_gold) {
   const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
   Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
-  std::size_t brick = 0;
-  while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
-  BOOST_REQUIRE(brick < c.decided.size());
-  // A tile at the fine rate, altered at a node that coarse gold does not have.
-  c.bricks.level[brick] = {3, 3, 3};
-  std::vector<std::uint8_t> raised(c.bricks.level.size(), 0);
-  raised[brick] = 1;
-  c.classify.extract(raised);
+  const auto [brick, raised] = Refined(c);
+  // Altered at a node that coarse gold does not have.
   BOOST_REQUIRE(c.bricks.samples[brick].size() == 17u * 17u * 17u);
   c.bricks.samples[brick][(5 * 17 + 5) * 17 + 5] += static_cast<float>(3 * c.tolerance);
   const MixedVolume volume = close_boundaries(c.bricks, Closing::none);
@@ -263,13 +264,7 @@ BOOST_AUTO_TEST_CASE(tile_finer_than_coarse_gold_is_measured_on_fine_gold) {
 BOOST_AUTO_TEST_CASE(brick_that_closing_raised_is_measured_at_its_stored_level) {
   const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
   Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
-  std::size_t brick = 0;
-  while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
-  BOOST_REQUIRE(brick < c.decided.size());
-  c.bricks.level[brick] = {3, 3, 3};
-  std::vector<std::uint8_t> raised(c.bricks.level.size(), 0);
-  raised[brick] = 1;
-  c.classify.extract(raised);
+  const auto [brick, raised] = Refined(c);
   const std::vector<LevelTriple> stored = c.bricks.level;
   MixedVolume volume = close_boundaries(c.bricks, Closing::none);
   // As if its own level were 1 and closing had raised it: the volume holds the tile of level 3.

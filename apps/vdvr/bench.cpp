@@ -103,7 +103,7 @@ int bench_fbp(Arguments& args) {
   const double updates = static_cast<double>(computed) * simulated.angles;
   for (std::size_t i = 0; i < repetitions; ++i) {
     const auto start = Clock::now();
-    reconstruct(device, scan, grid, options, [](const std::string&, double) { throw_if_interrupted(); });
+    reconstruct(device, scan, grid, options, [](const std::string&, double) { throw_if_stopped(); });
     seconds.push_back(since(start));
   }
   // Again stage by stage: waiting between stages is not part of the end-to-end time.

@@ -57,7 +57,7 @@ void write_report(const PaperRun& run, OutputFolder& folder) {
       for (const auto& picture : section.pictures)
         write_png(folder.file(picture.name + ".png"), picture.image);
       for (const auto& plot : section.plots) io::write_file(folder.file(plot.name + ".svg"), plot.svg);
-      throw_if_interrupted();
+      throw_if_stopped();
     }
     io::write_file(folder.file("paper.html"), html(run.page));
     io::write_file(folder.file("paper.json"), run.json.dump(2) + "\n");
@@ -119,7 +119,7 @@ int bench_paper(Arguments& args) {
       "those of this run; \"paper's settings\" is this engine with the options of --paper. "
       "F is the field that filtered back-projection with ideal interpolation of the projections defines; the "
       "function is the phantom itself."};
-  throw_if_interrupted();
+  throw_if_stopped();
   write_report(run, folder);
   line.clear();
   print_result(common, run.json, [&] { print_claims(run.json, output); });

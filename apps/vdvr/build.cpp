@@ -17,7 +17,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Certify
   ProgressLine progress(args.command(), common.quiet);
   const Planned planned = read_and_plan(device, args, options, progress.callback());
   const BuildResult result = build_certified(device, planned, options, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   write_vdvr(output, result.volume, result.certificate, options.compression);
   options.build.journal->remove();
   progress.clear();

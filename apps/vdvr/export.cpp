@@ -64,7 +64,7 @@ int export_command(Arguments& args) {
   const VdvrFile file = read_certified(path, args, args.has("unverified"));
   const Grid grid = finer(file.volume.grid, oversampling);
   const Volume volume = sample_all(file.volume, grid, common.max_memory, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   write_volume(output, volume);
   progress.clear();
   print_result(common,

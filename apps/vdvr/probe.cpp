@@ -229,7 +229,7 @@ int probe_command(Arguments& args) {
                                     : kind == InputKind::volume ? probe_volume(path, args, points)
                                     : d2vr ? probe_d2vr(path, args, points, progress.callback())
                                            : probe_exact(path, args, points, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   io::write_file(output, to_csv(points, probes));
   progress.clear();
   const auto covered = std::count_if(probes.begin(), probes.end(), [](const Probe& p) { return p.covered; });

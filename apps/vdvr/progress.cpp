@@ -89,8 +89,6 @@ void say(const std::string& text) {
   std::fflush(stderr);
 }
 
-void throw_if_interrupted() { throw_if_stopped(); }
-
 ProgressLine::ProgressLine(std::string command, bool quiet)
     : command_(std::move(command)), quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}
 
@@ -119,7 +117,7 @@ void ProgressLine::end_latest(Clock::time_point now) {
 }
 
 void ProgressLine::report(const std::string& stage, double fraction) {
-  throw_if_interrupted();
+  throw_if_stopped();
   const std::scoped_lock lock(mutex_);
   const auto now = Clock::now();
   end_latest(now);

@@ -9,10 +9,11 @@
 #include <string>
 
 #include "vdvr/progress.hpp"
+#include "vdvr/stop.hpp"  // for every report of progress, and before every output
 
 namespace vdvr::cli {
 
-/// Installs the handlers of SIGINT and SIGTERM, which ask the library to stop; see throw_if_interrupted. Work
+/// Installs the handlers of SIGINT and SIGTERM, which ask the library to stop; see vdvr/stop.hpp. Work
 /// that has not unwound 0.6 s later is in a call that cannot be left, such as the compilation of a kernel:
 /// the process then ends without unwinding, its temporary files removed. A pipe that nobody reads any more is
 /// a failing write, not the end of the process. `command`: for the message.
@@ -22,9 +23,6 @@ void catch_signals(const std::string& command);
 void explain_interruption(std::function<std::string()> message);
 /// Writes to stderr. That nobody reads it is no reason to stop.
 void say(const std::string& text);
-/// Throws Interrupted (130 or 143) once a signal has come. Called by every progress report and before every
-/// output.
-void throw_if_interrupted();
 
 class ProgressLine {
  public:

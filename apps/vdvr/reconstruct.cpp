@@ -41,7 +41,7 @@ int reconstruct_command(Arguments& args) {
   const ProjectionSet scan = load_scan(args.path("IN"), args, options.field, progress.callback());
   const Grid grid = make_grid(scan.geometry, grid_wanted);
   const Volume volume = reconstruct(device, scan, grid, options, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   write_volume(output, volume);
   progress.clear();
 

@@ -279,7 +279,7 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   Device device = open_device(common);
   const ErrorSlice slice =
       error_slice(device, scan, scene.volume, *scene.certificate, options, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   write_error_slice(output, kind, slice);
   progress.clear();
   const double epsilon = scene.certificate->epsilon_abs;
@@ -377,12 +377,12 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
                       OutputKind kind) {
   if (kind == OutputKind::picture) {
     RenderResult result = stage.draw(o);
-    throw_if_interrupted();
+    throw_if_stopped();
     write_png(output, result.image);
     return result;
   }
   RenderResult result = stage.source.draw(o);
-  throw_if_interrupted();
+  throw_if_stopped();
   write_npy(output, result.values);
   return result;
 }

@@ -156,7 +156,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
   });
   if (!out.verified.holds)
     throw MismatchError(fmt::format("the certificate is not confirmed: {}", out.verified.failure));
-  throw_if_interrupted();
+  throw_if_stopped();
 
   folder.begin();
   write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate, options.compression);
@@ -168,7 +168,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
   if (!(out.error.max_error <= certificate.epsilon_abs))
     throw MismatchError(fmt::format("the error slice shows {:.6g}, above epsilon {:.6g}", out.error.max_error,
                                     certificate.epsilon_abs));
-  throw_if_interrupted();
+  throw_if_stopped();
   folder.finish(to_json(certificate));
   options.build.journal->remove();
   out.files.emplace_back("certificate.json", "what is promised, and by which argument");

@@ -147,7 +147,7 @@ int simulate_command(Arguments& args) {
   apply_scan_options(args, setup.scan);
   const Phantom phantom = phantom_for(setup);
   const ProjectionSet scan = simulate(phantom, setup.scan, progress.callback());
-  throw_if_interrupted();
+  throw_if_stopped();
   write_data_exchange(output, scan);
   progress.clear();
 

@@ -431,7 +431,8 @@ inline std::string rough_difference(const BuildResult& one, const BuildResult& s
   if (!(std::abs(a - b) <= 0.05 * a)) return text_of(a) + " samples per base sample, and " + text_of(b);
   const double p = one.certificate.total_buffer / one.certificate.epsilon_abs,
                q = scaled.certificate.total_buffer / scaled.certificate.epsilon_abs;
-  // A brick at the tolerance may fall on either side of it, and then the next one is the worst.
+  // No theorem: a brick at the tolerance may fall on either side of it, and then the next one is the worst.
+  // What is certain is compared at powers of two, to the bit; this is to see what goes wrong by orders.
   if (!(std::abs(p - q) <= 0.05 * p)) return "total / epsilon " + text_of(p) + ", and " + text_of(q);
   return {};
 }

@@ -1,12 +1,15 @@
-// Small scans for tests: noise, single waves, spikes; reproducible.
+// Small scans for tests: noise, single waves, spikes, phantoms; reproducible. And grids in them.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "vdvr/projections.hpp"
+#include "vdvr/reconstruct.hpp"
+#include "vdvr/simulate.hpp"
 
 namespace vdvr::testing {
 
@@ -30,6 +33,23 @@ inline ProjectionSet noise_scan(std::int64_t views, std::int64_t rows, std::int6
   std::mt19937 random(seed);
   for (float& p : scan.data) p = static_cast<float>(random()) / 4294967296.0f - 0.5f;
   return scan;
+}
+
+inline ProjectionSet simulated(const Phantom& phantom, std::int64_t columns, std::int64_t rows, int angles) {
+  SimulateOptions options;
+  options.columns = columns;
+  options.rows = rows;
+  options.angles = angles;
+  return simulate(phantom, options);
+}
+
+inline Grid grid_of(const ProjectionSet& scan, const Index3& size, double spacing,
+                    std::optional<Vec3> origin = {}) {
+  GridOptions options;
+  options.size = size;
+  options.spacing = spacing;
+  options.origin = origin;
+  return make_grid(scan.geometry, options);
 }
 
 }  // namespace vdvr::testing
