@@ -9,7 +9,7 @@
 #include "host/bounds/spectral_error.hpp"
 #include "host/fbp/cosine_spectrum.hpp"
 #include "host/picture/figure.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error_map.hpp"
 
 namespace vdvr::cli {
