@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/fbp/filter_projections.hpp"
+#include "vdvr/rates.hpp"
 
 namespace vdvr {
 
