@@ -152,8 +152,7 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
 }
 #endif
 
-// --- buffer: cells and their corners
-// -----------------------------------------------------------------------------------------------------------
+// --- buffer: cells and their corners ---
 #ifdef VDVR_SAMPLER_BUFFER
 
 // The number of a sample in each lane: `lane` + `all`. What is the same in all lanes is kept apart because it
