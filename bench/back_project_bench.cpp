@@ -8,9 +8,9 @@
 #include <numbers>
 
 #include "bench/hand_loop.hpp"
-#include "host/back_project.hpp"
+#include "host/fbp/back_project.hpp"
+#include "host/fbp/reconstruct_field.hpp"
 #include "host/opencl/kernel.hpp"
-#include "host/reconstruct_field.hpp"
 #include "vdvr/device.hpp"
 
 using namespace vdvr;

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "host/bitmap_font.hpp"
+#include "host/picture/bitmap_font.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

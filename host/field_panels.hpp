@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/figure.hpp"
+#include "host/picture/figure.hpp"
 #include "vdvr/image.hpp"
 
 namespace vdvr {

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "host/png.hpp"
+#include "host/picture/png.hpp"
 
 namespace vdvr {
 

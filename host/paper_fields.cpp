@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/parallel.hpp"
+#include "host/system/parallel.hpp"
 
 namespace vdvr::paper {
 namespace {

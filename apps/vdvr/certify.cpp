@@ -6,7 +6,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/progress.hpp"
-#include "host/io/atomic_file.hpp"
+#include "host/system/atomic_file.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
 

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "host/decorate.hpp"
-#include "host/error_slice.hpp"
+#include "host/picture/decorate.hpp"
+#include "host/picture/error_slice.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -6,7 +6,7 @@
 
 #include "apps/vdvr/paper.hpp"
 #include "host/line_plot.hpp"
-#include "host/upsample_volume.hpp"
+#include "host/volume/upsample_volume.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -7,7 +7,7 @@
 #include "apps/vdvr/paper.hpp"
 #include "apps/vdvr/pictures.hpp"
 #include "host/paper_objects.hpp"
-#include "host/upsample_volume.hpp"
+#include "host/volume/upsample_volume.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {

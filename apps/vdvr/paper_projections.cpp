@@ -7,9 +7,9 @@
 
 #include "apps/vdvr/paper.hpp"
 #include "apps/vdvr/plan_pictures.hpp"
-#include "host/cosine_spectrum.hpp"
+#include "host/bounds/spectral_error.hpp"
+#include "host/fbp/cosine_spectrum.hpp"
 #include "host/line_plot.hpp"
-#include "host/spectral_error.hpp"
 #include "vdvr/error_map.hpp"
 
 namespace vdvr::cli {

@@ -10,7 +10,7 @@
 #include "apps/vdvr/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "host/error_slice.hpp"
+#include "host/picture/error_slice.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 

@@ -9,7 +9,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "apps/vdvr/verification.hpp"
-#include "host/error_slice.hpp"
+#include "host/picture/error_slice.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

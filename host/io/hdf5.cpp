@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "host/io/limits.hpp"
+#include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -15,7 +15,7 @@
 #include <sstream>
 #include <vector>
 
-#include "host/io/limits.hpp"
+#include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <memory>
 
-#include "host/io/limits.hpp"
+#include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -16,8 +16,6 @@ namespace vdvr {
 /// How bricks of different levels meet (docs/error-bounds.md, sections on closing). `none` leaves the field
 /// discontinuous: for comparison, never certified.
 enum class Closing { coarse, paper, none };
-/// Sample types of base and tiles (docs/file-format.md, storage).
-enum class StorageChoice { automatic, f32, u16, u8 };
 
 struct BuildOptions {
   int granularity = 4;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -15,13 +16,6 @@ namespace vdvr {
 struct ErrorTerm {
   double value = 0;    ///< largest, in density units
   std::string method;  ///< "measured", "curvature", "amplitude", "rounding", "device probe", ...
-};
-
-/// The field options that define F (docs/geometry.md); stored in the certificate, taken from it by `verify`.
-struct FieldOptions {
-  std::string filter = "ram-lak";  ///< ram-lak | shepp-logan | cosine | hamming | hann
-  double cutoff = 1.0;             ///< fraction of the detector's Nyquist frequency
-  std::optional<double> center;    ///< overrides the scan's
 };
 
 struct SamplerTerms {

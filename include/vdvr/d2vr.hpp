@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"

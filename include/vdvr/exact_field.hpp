@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
+#include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"

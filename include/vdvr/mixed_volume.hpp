@@ -24,6 +24,8 @@ using LevelTriple = std::array<std::uint8_t, 3>;
 enum class SampleType : std::uint8_t { f32, u16, u8 };  // the order of kernels/shared/mixed_sampler.h
 /// "f32", "u16", "u8".
 const char* text_of(SampleType type);
+/// Which of them base and tiles take.
+enum class StorageChoice { automatic, f32, u16, u8 };
 
 /// Stored samples of equal tiles (the base volume is one tile) in the vector that `type` names; the others
 /// are empty. An integer stands for step * (offset + stored * 2^shift), offset and shift those of its tile:

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/mixed_volume.hpp"
 #include "vdvr/reconstruct.hpp"
 
 namespace vdvr {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"

@@ -1,7 +1,7 @@
 // Kernels that read only what they wrote, and what Oclgrind 21.10 makes of them (docs/robustness.md):
 //   oclgrind-kernel --uninitialized --build-options -cl-opt-disable upper_half.sim    reports a use of lane 3
 //   oclgrind-kernel --uninitialized --build-options -cl-opt-disable joined.sim        crashes
-// Our packets do both: any_lane16 halves vectors, TURN joins them (kernels/shared/packet.h).
+// Our packets do both: any_lane16 halves vectors, TURN joins them (kernels/device/packet.h).
 __kernel void upper_half(__global int* out) {
   const int16 whole = (int16)(1);
   const int8 half_of_it = whole.hi;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host/cosine_series.hpp"
+#include "host/fbp/cosine_series.hpp"
 #include "vdvr/projections.hpp"
 
 namespace vdvr::reference {

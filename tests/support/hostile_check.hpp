@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <set>
 
-#include "host/region_of_interest.hpp"
+#include "host/volume/region_of_interest.hpp"
 #include "tests/support/hostile_case.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"

@@ -1,0 +1,237 @@
+// Launchers of the projection half of kernels/bounds/bound_table.cl, and the closed-form bounds
+// (docs/error-bounds.md).
+#include "host/bounds/projection_bounds.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "host/opencl/kernel.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/error_map.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double unit_roundoff = 0x1p-24;
+
+cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+
+constexpr double smallest_normal = 0x1p-126;
+
+// What two products may lose below the smallest normal number: relative bounds do not cover it, and devices
+// may flush, in each of the terms and in what is kept of each run.
+double underflow(const ParallelGeometry& g, double gain_u) {
+  return 4 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
+}
+
+// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
+// (kernels/fbp/batched_product.cl): a term is rounded within its run, the sum at its end, and the m roundings
+// that were kept are summed with m u of themselves.
+double product_error(std::int64_t n, int run) {
+  const double runs = std::ceil(static_cast<double>(n) / run);
+  return run + 2 + 1.01 * runs * runs * unit_roundoff;
+}
+
+using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
+
+// The largest |d| of every view of a slab of derivatives.
+std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
+  RowSup row_sup(state, "bounds/bound_table", "row_sup");
+  opencl::DeviceArray<float> sup(state, count(d.views * d.rows_padded), "row maxima");
+  row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(),
+          to_int(d.views), to_int(d.columns.count), to_int(d.rows_padded));
+  const auto host = sup.to_host();
+  require_finite(host, order);
+  std::vector<double> out(static_cast<std::size_t>(d.views));
+  for (std::size_t k = 0; k < out.size(); ++k)
+    for (std::int64_t z = 0; z < d.rows; ++z)
+      out[k] = std::max(out[k],
+                        static_cast<double>(
+                            host[k * static_cast<std::size_t>(d.rows_padded) + static_cast<std::size_t>(z)]));
+  return out;
+}
+
+}  // namespace
+
+void require_finite(const std::vector<float>& sups, int order) {
+  if (std::all_of(sups.begin(), sups.end(), [](float s) { return std::isfinite(s); })) return;
+  throw InputError(fmt::format(
+      "the {} of the filtered projections is not finite in float32; check the scan's values and pitches",
+      order == 0 ? std::string("value") : fmt::format("{}{} derivative", order, order == 2 ? "nd" : "th")));
+}
+
+double lebesgue_constant(std::int64_t n) {
+  // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
+  // Polynomials, section 1.4).
+  return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5;
+}
+
+double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+                           int order, double view_max) {
+  const ParallelGeometry& g = scan.geometry;
+  return unit_roundoff * (product_error(g.columns, column_run) + product_error(g.rows, row_run) + 2) *
+             upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max +
+         underflow(g, upsampler.gain_u(columns, order));
+}
+
+std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
+  const std::int64_t per_view = columns * (rows + 16) * 4;
+  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
+}
+
+FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  constexpr int dense = 4;
+  // A signal sampled L times denser than Nyquist rises above its samples by at most 1 / cos(pi / (2 L)), per
+  // axis (Ehlich and Zeller 1964). A single row does not vary along v.
+  const double rise = 1 / std::cos(pi / (2.0 * dense)), rise_v = g.rows > 1 ? rise : 1.0;
+  const UpsampledColumns columns = upsampled_columns(g.columns, dense, 0),
+                         own = upsampled_columns(g.columns, 1, 0);
+  std::vector<double> rows, own_rows;
+  for (std::int64_t j = 0; j <= dense * g.rows; ++j) rows.push_back(-0.5 + static_cast<double>(j) / dense);
+  for (std::int64_t j = 0; j < g.rows; ++j) own_rows.push_back(static_cast<double>(j));
+
+  FieldSups sups;
+  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
+  const auto sum = [](const std::vector<double>& v) {
+    double s = 0;
+    for (const double x : v) s += x;
+    return s;
+  };
+  for (std::int64_t first = 0; first < g.views(); first += chunk) {
+    const std::int64_t n = std::min(chunk, g.views() - first);
+    sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
+    for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
+      sups.view_second_u.push_back(rise * rise_v * m);
+    sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
+    if (g.rows > 1) {
+      for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
+        sups.view_second_v.push_back(rise * rise_v * m);
+      sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
+    }
+  }
+  sups.view_second_v.resize(sups.view_second_u.size(), 0.0);  // a single row does not vary along v
+  // Rounding of the evaluation, relative to the sums of magnitudes it adds up.
+  for (std::size_t k = 0; k < scan.view_max.size(); ++k) {
+    const double value = derivative_rounding(upsampler, scan, columns, 0, scan.view_max[k]);
+    sups.value += value;
+    sups.view_second_u[k] += derivative_rounding(upsampler, scan, columns, 2, scan.view_max[k]);
+    // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
+    if (g.rows > 1) sups.view_second_v[k] += value * std::pow(pi / g.pitch_v, 2);
+  }
+  sups.second_u = sum(sups.view_second_u);
+  sups.second_v = sum(sups.view_second_v);
+  return sups;
+}
+
+double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Grid& grid, int rate) {
+  const ParallelGeometry& g = scan.geometry;
+  const double h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;
+  const double wu = std::pow(pi / g.pitch_u, 2), wv = g.rows > 1 ? std::pow(pi / g.pitch_v, 2) : 0.0;
+  const double mixed = std::min(wv * sups.second_u, wu * sups.second_v);
+  // (1/8) sum_j h_j^2 [ h_j^2/12 sup|F_jjjj| + sum_i h_i^2/8 sup|F_jjii| ], the x and y parts together (docs,
+  // section 5).
+  return 0.125 * (std::pow(h, 4) * (5.0 / 24) * wu * sups.second_u + 2 * h * h * hz * hz / 8 * mixed +
+                  std::pow(hz, 4) * (5.0 / 24) * wv * sups.second_v);
+}
+
+namespace {
+
+// Row sums of the matrix are samples of a function of the position; between columns it rises by no more than
+// this (Ehlich, Zeller).
+double gain_anywhere(Upsampler& upsampler, const UpsampledColumns& columns) {
+  return upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate));
+}
+
+}  // namespace
+
+double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns) {
+  return scan.ramp_error * gain_anywhere(upsampler, columns) * lebesgue_constant(scan.geometry.rows);
+}
+
+double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
+                        const UpsampledColumns& columns, const ColumnBlocks& blocks,
+                        const std::string& u_filter) {
+  const ParallelGeometry& g = scan.geometry;
+  const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
+  double samples = 0;
+  for (const double m : scan.view_max) samples += m;
+  const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;    // largest sum of |Lagrange weights|
+  const double slope_gain = u_filter == "cubic" ? 4.0 / 3 : 1.0;  // and of their derivative's, of differences
+  // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
+  // result round).
+  const double upsampling =
+      unit_roundoff * ((product_error(g.rows, row_run) + 2) * gain_v * gain_u * samples +
+                       (product_error(g.columns, column_run) + 2) * gain_u * sups.value);
+  // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
+  // own.
+  const double per_view = u_filter == "cubic" ? 4 : 2,
+               runs = std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(u_filter)));
+  const double summation = unit_roundoff * (per_view * static_cast<double>(view_run(u_filter)) + runs + 8) *
+                           weight_gain * sups.value;
+  // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is
+  // bounded by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
+  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * slope_gain * slope;
+  const double views = static_cast<double>(g.views());
+  return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position +
+         views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
+}
+
+AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {
+  const ParallelGeometry& g = scan.geometry;
+  const std::int64_t U = g.columns, V = g.rows;
+  const auto du = analysis_matrix(U), dv = analysis_matrix(V);
+  const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
+  // [view][rate], summed in the order of views: a build made twice says the same to the bit.
+  std::vector<std::vector<double>> projection(at(g.views())), gold(at(g.views()));
+  parallel_for(g.views(), {}, "amplitude", [&](std::int64_t k) {
+    const float* q = scan.samples.data() + k * U * V;
+    std::vector<double> a(at(U * V)), b(at(U * V));  // [m][v], then [m][l]
+    for (std::int64_t m = 0; m < U; ++m)
+      for (std::int64_t u = 0; u < U; ++u)
+        for (std::int64_t v = 0; v < V; ++v)
+          a[at(m * V + v)] += du[at(m * U + u)] * static_cast<double>(q[u * V + v]);
+    for (std::int64_t m = 0; m < U; ++m)
+      for (std::int64_t l = 0; l < V; ++l)
+        for (std::int64_t v = 0; v < V; ++v) b[at(m * V + l)] += dv[at(l * V + v)] * a[at(m * V + v)];
+    const double c = std::cos(g.theta_rad[at(k)]), s = std::sin(g.theta_rad[at(k)]);
+    std::vector<double> p(rates.size()), f(rates.size());
+    for (std::size_t r = 0; r < rates.size(); ++r)
+      for (std::int64_t m = 0; m < U; ++m) {
+        const double wu = pi * static_cast<double>(m) / static_cast<double>(U) / g.pitch_u;
+        const double eu = 1 - std::cos(wu * g.pitch_u / rates[r] / 2);
+        for (std::int64_t l = 0; l < V; ++l) {
+          const double wv = pi * static_cast<double>(l) / static_cast<double>(V) / g.pitch_v;
+          const double magnitude = std::abs(b[at(m * V + l)]);
+          p[r] += magnitude * eu;
+          f[r] += magnitude * wave_error_bound(std::array{wu * c * grid.spacing[0] / rates[r],
+                                                          wu * s * grid.spacing[1] / rates[r],
+                                                          wv * grid.spacing[2] / rates[r]});
+        }
+      }
+    projection[at(k)] = std::move(p);
+    gold[at(k)] = std::move(f);
+  });
+  AmplitudeBounds out;
+  const auto sum = [](const std::vector<std::vector<double>>& by_view, std::size_t r) {
+    double total = 0;
+    for (const auto& view : by_view) total += view[r];
+    return total;
+  };
+  for (std::size_t r = 0; r < rates.size(); ++r) {
+    out.projection.emplace_back(rates[r], sum(projection, r));
+    out.gold.emplace_back(rates[r], sum(gold, r));
+  }
+  return out;
+}
+
+}  // namespace vdvr

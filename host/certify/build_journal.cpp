@@ -1,0 +1,110 @@
+#include "host/certify/build_journal.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "vdvr/hash.hpp"
+
+namespace vdvr {
+namespace {
+
+// Hexadecimal floats: equal text means equal bits.
+std::string exact(double value) { return fmt::format("{:a}", value); }
+
+template <class Range>
+std::string exact_list(const Range& values) {
+  std::string text;
+  for (const auto v : values) text += (text.empty() ? "" : ",") + exact(static_cast<double>(v));
+  return text;
+}
+
+template <class T>
+void update(Sha256& sha, const std::vector<T>& values) {
+  sha.update(values.data(), values.size() * sizeof(T));
+}
+
+// The plan is made again by a resumed process: its base samples, which all of the scan and the field went
+// into, stand for it, and for the scan where that has no hash of its own.
+std::string digest(const ProjectionSet& scan, const Plan& plan) {
+  Sha256 sha;
+  update(sha, scan.geometry.theta_rad);
+  update(sha, plan.base.samples);
+  update(sha, plan.fitted);
+  return sha.hex();
+}
+
+const char* name(Closing closing) {
+  return closing == Closing::coarse ? "coarse" : closing == Closing::paper ? "paper" : "none";
+}
+
+const char* name(StorageChoice storage) {
+  switch (storage) {
+    case StorageChoice::f32:
+      return "f32";
+    case StorageChoice::u16:
+      return "u16";
+    case StorageChoice::u8:
+      return "u8";
+    default:
+      return "auto";
+  }
+}
+
+}  // namespace
+
+JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& plan,
+                         const BuildOptions& options, const GoldStream& stream, double tolerance) {
+  const ParallelGeometry& g = scan.geometry;
+  const Index3 blocks = stream.block_bricks();
+  JournalHead head{
+      {"record format", "4"},
+      {"version", VDVR_VERSION},
+      {"device", device.info().name},
+      {"driver", device.info().driver},
+      {"input sha256", scan.report.sha256},
+      {"scan",
+       fmt::format("{} views of {} x {}, pitch {},{}", g.views(), g.columns, g.rows, g.pitch_u, g.pitch_v)},
+      {"center", exact(plan.field.center.value_or(g.center))},
+      {"filter", fmt::format("{} to {}", plan.field.filter, plan.field.cutoff)},
+      {"cells", fmt::format("{}x{}x{}", plan.grid.cells[0], plan.grid.cells[1], plan.grid.cells[2])},
+      {"origin", exact_list(plan.grid.origin)},
+      {"spacing", exact_list(plan.grid.spacing)},
+      {"epsilon", exact(plan.epsilon_abs)},
+      {"rates", fmt::format("u {}x {}, gold {}x", plan.upsampling_u, plan.u_filter, plan.gold_rate)},
+      {"coefficients", plan.settings.coefficients},
+      {"levels", plan.settings.levels},
+      {"terms", plan.settings.terms},
+      {"base", fmt::format("{}", fmt::join(plan.coarsening, ","))},
+      {"granularity", std::to_string(stream.settings().granularity)},
+      {"closing", name(options.closing)},
+      {"storage", name(options.storage)},
+      {"window",
+       options.window ? exact_list(std::array{options.window->first, options.window->second}) : "none"},
+      {"roi", options.roi ? exact_list(*options.roi) : "none"},
+      {"bricks per block, by --max-memory", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
+      {"tolerance of a node", exact(tolerance)},
+      {"plan", digest(scan, plan)}};
+  return head;
+}
+
+void put(ByteWriter& out, const BrickMeasure& m) {
+  out.put(m.brick);
+  out.put(m.total);
+  out.put(m.error);
+  out.put(m.slack);
+  out.put(m.violated);
+  out.put(m.rate);
+}
+
+BrickMeasure get_measure(ByteReader& in) {
+  BrickMeasure m;
+  m.brick = in.get<std::int64_t>();
+  m.total = in.get<float>();
+  m.error = in.get<float>();
+  m.slack = in.get<float>();
+  m.violated = in.get<std::uint32_t>();
+  m.rate = in.get<int>();
+  return m;
+}
+
+}  // namespace vdvr

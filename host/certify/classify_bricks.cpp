@@ -1,0 +1,347 @@
+// The node test at two rates of gold.
+#include "host/certify/classify_bricks.hpp"
+
+#include <algorithm>
+
+#include "host/certify/build_journal.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Of the tolerance: a brick whose coarse slack takes more is not tried on coarse gold once it is refined.
+constexpr double easy_share = 0.48;
+// Of the bricks: how many at most the search for the largest error measures again at once.
+constexpr std::size_t sharpened_share = 32;
+
+bool is_above_base(const LevelTriple& level) { return level != LevelTriple{0, 0, 0}; }
+
+bool any(const std::vector<std::uint8_t>& flags) {
+  return std::find(flags.begin(), flags.end(), 1) != flags.end();
+}
+
+// Whether a field of that level is trilinear in every cell of this gold.
+bool resolves(const GoldStream& gold, const LevelTriple& level) {
+  const LevelTriple finest = gold.settings().finest();
+  return level[0] <= finest[0] && level[1] <= finest[1] && level[2] <= finest[2];
+}
+
+bool passes(const BrickMeasure& m, double tolerance) {
+  return m.total < 0 || static_cast<double>(m.total) <= tolerance;
+}
+
+void put(ByteWriter& out, const AxisErrors& along) {
+  for (const auto& axis : along.of)
+    for (const auto& level : axis)
+      for (const float error : level) out.put(error);
+}
+
+AxisErrors get_along(ByteReader& in) {
+  AxisErrors along;
+  for (auto& axis : along.of)
+    for (auto& level : axis)
+      for (float& error : level) error = in.get<float>();
+  return along;
+}
+
+GoldSettings with_coarse(GoldSettings settings) {
+  if (settings.rate >= 4 && !settings.grid_only && !settings.window) settings.coarse_rate = settings.rate / 2;
+  return settings;
+}
+
+}  // namespace
+
+GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                     const FieldSups& sups, GoldSettings settings) {
+  settings = with_coarse(settings);
+  fine_.emplace(state, scan, upsampler, sups, settings);
+  if (settings.coarse_rate == 0) return;
+  settings.rate = std::exchange(settings.coarse_rate, 0);
+  coarse_.emplace(state, scan, upsampler, sups, settings, fine_->cells());
+}
+
+double GoldRates::arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                             const FieldSups& sups, const GoldStream& fine) {
+  GoldSettings settings = with_coarse(fine.settings());
+  if (settings.coarse_rate == 0) return fine.arithmetic();
+  settings.rate = std::exchange(settings.coarse_rate, 0);
+  const GoldStream coarse(state, scan, upsampler, sups, settings, fine.cells());
+  return std::max(fine.arithmetic(), coarse.arithmetic());
+}
+
+Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
+  // Inside a coarse cell the error may rise by the slack; there the fine test adds its own, a quarter.
+  const bool within = passes(m, tolerance) &&
+                      !(static_cast<double>(m.total) + 0.25 * static_cast<double>(m.slack) > tolerance);
+  if (within) return Verdict::within;
+  return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
+}
+
+ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
+                               Journal* journal, Progress progress, Refuse refuse)
+    : state_(state),
+      gold_(gold),
+      bricks_(bricks),
+      host_(host),
+      journal_(journal),
+      progress_(std::move(progress)),
+      refuse_(std::move(refuse)) {}
+
+bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
+  return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
+}
+
+void ClassifyBricks::classify(const DeviceField& base, double tolerance,
+                              const std::vector<std::uint8_t>& near) {
+  // Nothing of an earlier attempt stays: its levels are of another tolerance, or of another lattice.
+  host_.uncount(tile_bytes_);
+  tile_bytes_ = 0;
+  bounds_ = {};
+  bricks_.level.assign(bricks_.level.size(), LevelTriple{0, 0, 0});
+  bricks_.involved.assign(bricks_.level.size(), 0);
+  for (std::vector<float>& tile : bricks_.samples) tile = {};
+  measures_.assign(bricks_.level.size(), {});
+  along_.assign(bricks_.level.size(), {});
+  coarse_slack_.assign(bricks_.level.size(), -1.0f);
+  std::vector<std::uint8_t> refined = near;
+  if (GoldStream* coarse = gold_.coarse()) {
+    std::vector<std::uint8_t> undecided(near.size(), 0);
+    test(*coarse, base, tolerance, near, "screen", [&](const Levels& l) {
+      const std::size_t id = at(l.base.brick);
+      coarse_slack_[id] = l.base.slack;
+      const Verdict verdict = coarse_verdict(l.base, tolerance);
+      if (verdict != Verdict::beyond) refined[id] = 0;
+      if (verdict == Verdict::undecided) undecided[id] = 1;
+      if (verdict == Verdict::within) take(l);
+    });
+    test(gold_.fine(), base, tolerance, undecided, "screen", [&](const Levels& l) {
+      if (passes(l.base, tolerance)) take(l);
+      else refined[at(l.base.brick)] = 1;
+    });
+    std::vector<std::uint8_t> easy = refined;
+    for (std::size_t i = 0; i < easy.size(); ++i) easy[i] = easy[i] && is_easy(i, tolerance);
+    refine(*coarse, base, tolerance, easy);
+    for (std::size_t i = 0; i < easy.size(); ++i)
+      if (is_above_base(bricks_.level[i])) refined[i] = 0;
+  }
+  refine(gold_.fine(), base, tolerance, refined);
+}
+
+// Level 0 only.
+void ClassifyBricks::test(GoldStream& gold, const DeviceField& base, double tolerance,
+                          const std::vector<std::uint8_t>& selected, const std::string& stage,
+                          const std::function<void(const Levels&)>& visit) {
+  if (!any(selected)) return;
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
+                                                    "bricks to test");
+  gold.run(selected,
+           {[&](GoldStream::Batch& batch) {
+              std::vector<Levels> levels;
+              for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
+                levels.push_back({m, {}, false, {}, 0, 0});
+              return record(batch, std::move(levels), {}, {});
+            },
+            [&](ByteReader in) { read(in, visit); }},
+           journal_, progress_, stage);
+}
+
+// Levels above 0, with their tiles. On coarse gold only levels that it can test are taken.
+void ClassifyBricks::refine(GoldStream& gold, const DeviceField& base, double tolerance,
+                            const std::vector<std::uint8_t>& selected) {
+  if (!any(selected)) return;
+  const bool fine = &gold == &gold_.fine();
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
+                                                    "bricks to classify");
+  const auto taken = [&](const Levels& l) {
+    return fine || (l.base.total >= 0 && l.passes && is_above_base(l.level));
+  };
+  gold.run(
+      selected,
+      {[&](GoldStream::Batch& batch) {
+         std::vector<Levels> levels;
+         Tiles tiles;
+         std::vector<float> samples;
+         for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device, fine)) {
+           levels.push_back({c.base, c.level, c.passes, c.along, 0, 0});
+           if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
+           tiles.emplace_back(c.base.brick, c.level);
+           samples.insert(samples.end(), c.tile.begin(), c.tile.end());
+         }
+         return record(batch, std::move(levels), tiles, samples);
+       },
+       [&](ByteReader in) {
+         read(in, [&](const Levels& l) {
+           if (!taken(l)) return;
+           if (fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
+             refuse_(l.base.slack, tolerance);
+           take(l);
+         });
+         take_tiles(in);
+       }},
+      journal_, progress_, "classify", GoldStream::For::samples);
+}
+
+void ClassifyBricks::take(const Levels& l) {
+  const BrickMeasure& m = l.base;
+  const std::size_t id = at(m.brick);
+  bricks_.involved.at(id) = m.total >= 0;
+  if (m.total < 0) return;
+  measures_[id] = m;
+  bricks_.level[id] = l.level;
+  along_[id] = l.along;
+  const auto slack = static_cast<double>(m.slack);
+  bounds_.total = std::max(bounds_.total, slack);
+  bounds_.projection = std::max(bounds_.projection, static_cast<double>(l.largest_p));
+  bounds_.gold = std::max(bounds_.gold, slack - static_cast<double>(l.smallest_p));
+}
+
+Bytes ClassifyBricks::record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
+                             const std::vector<float>& samples) const {
+  ByteWriter out;
+  const auto p = batch.largest_p();
+  out.put(static_cast<std::uint64_t>(levels.size()));
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    put(out, levels[i].base);
+    out.put(levels[i].level);
+    out.put(static_cast<std::uint8_t>(levels[i].passes));
+    if (is_above_base(levels[i].level)) put(out, levels[i].along);
+    out.put(p[i].first);
+    out.put(p[i].second);
+  }
+  put_tiles(out, tiles, samples);
+  return out.take();
+}
+
+void ClassifyBricks::read(ByteReader& in, const std::function<void(const Levels&)>& visit) {
+  const auto n = in.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < n; ++i) {
+    Levels l;
+    l.base = get_measure(in);
+    l.level = in.get<LevelTriple>();
+    l.passes = in.get<std::uint8_t>() != 0;
+    if (is_above_base(l.level)) l.along = get_along(in);
+    l.largest_p = in.get<float>();
+    l.smallest_p = in.get<float>();
+    visit(l);
+  }
+}
+
+void ClassifyBricks::put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples) {
+  std::vector<std::int64_t> bricks;
+  std::vector<LevelTriple> levels;
+  for (const auto& [brick, level] : tiles) {
+    bricks.push_back(brick);
+    levels.push_back(level);
+  }
+  out.put(bricks);
+  out.put(levels);
+  out.put(samples);
+}
+
+std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
+  const auto bricks = in.get_vector<std::int64_t>();
+  const auto levels = in.get_vector<LevelTriple>();
+  const auto samples = in.get_vector<float>();
+  auto next = samples.begin();
+  const MixedVolume shape = bricks_.shape();
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const std::int64_t size = shape.tile_size(levels.at(i));
+    if (size > samples.end() - next)
+      throw FileError("a journal record lacks samples; start without --resume");
+    const auto end = next + size;
+    std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
+    const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();
+    host_.count(more, "the tiles before closing");
+    host_.uncount(less);
+    tile_bytes_ += more - less;
+    tile.assign(next, end);
+    next = end;
+  }
+  return bricks;
+}
+
+void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
+  gold_.fine().run(raised,
+                   {[&](GoldStream::Batch& batch) {
+                      Tiles tiles;
+                      for (const std::int64_t id : batch.bricks())
+                        tiles.emplace_back(id, bricks_.level[at(id)]);
+                      ByteWriter out;
+                      put_tiles(out, tiles, batch.extract(tiles));
+                      for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
+                      return out.take();
+                    },
+                    [&](ByteReader in) {
+                      for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
+                    }},
+                   journal_, progress_, "repair", GoldStream::For::samples);
+}
+
+void ClassifyBricks::measure_at(GoldStream& gold, const DeviceField& field, double tolerance,
+                                const std::vector<std::uint8_t>& selected, const std::string& stage,
+                                const std::function<void(const BrickMeasure&)>& visit) {
+  if (!any(selected)) return;
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
+                                                    "bricks to measure");
+  gold.run(selected,
+           {[&](GoldStream::Batch& batch) {
+              ByteWriter out;
+              for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), on_device))
+                put(out, m);
+              return out.take();
+            },
+            [&](ByteReader in) {
+              while (!in.empty()) visit(get_measure(in));
+            }},
+           journal_, progress_, stage);
+}
+
+void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
+                             double tolerance, const std::vector<std::uint8_t>& pending,
+                             const std::string& stage) {
+  std::vector<std::uint8_t> rest = pending;
+  if (GoldStream* coarse = gold_.coarse()) {
+    // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.
+    std::vector<std::uint8_t> easy = pending;
+    for (std::size_t i = 0; i < easy.size(); ++i)
+      easy[i] = easy[i] && resolves(*coarse, stored.at(i)) && is_easy(i, tolerance);
+    measure_at(*coarse, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
+      if (coarse_verdict(m, tolerance) != Verdict::within) return;
+      measures_.at(at(m.brick)) = m;
+      rest[at(m.brick)] = 0;
+    });
+  }
+  measure_at(gold_.fine(), field, tolerance, rest, stage,
+             [&](const BrickMeasure& m) { measures_.at(at(m.brick)) = m; });
+}
+
+void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {
+  if (!gold_.coarse()) return;
+  const int rate = gold_.fine().settings().rate;
+  for (;;) {
+    float error = 0;
+    std::vector<std::size_t> loose;
+    for (std::size_t i = 0; i < measures_.size(); ++i)
+      if (measures_[i].rate == rate) error = std::max(error, measures_[i].error);
+    for (std::size_t i = 0; i < measures_.size(); ++i)
+      if (measures_[i].rate < rate && measures_[i].total > error) loose.push_back(i);
+    if (loose.empty()) return;
+    const std::size_t most =
+        std::min(loose.size(), std::max<std::size_t>(64, measures_.size() / sharpened_share));
+    std::partial_sort(loose.begin(), loose.begin() + static_cast<std::ptrdiff_t>(most), loose.end(),
+                      [&](std::size_t a, std::size_t b) { return measures_[a].total > measures_[b].total; });
+    std::vector<std::uint8_t> selected(measures_.size(), 0);
+    for (std::size_t i = 0; i < most; ++i) selected[loose[i]] = 1;
+    measure_at(gold_.fine(), field, tolerance, selected, "verify", [&](const BrickMeasure& m) {
+      // Either test bounds |V - F|.
+      BrickMeasure& known = measures_.at(at(m.brick));
+      const float total = std::min(known.total, m.total < 0 ? known.total : m.total);
+      known = m;
+      known.total = std::max(total, 0.0f);
+    });
+  }
+}
+
+}  // namespace vdvr

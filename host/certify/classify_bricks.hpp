@@ -1,0 +1,122 @@
+// Levels of bricks by the node test, and the measure of stored fields, at two rates of gold
+// (docs/error-bounds.md, section 14). Called by build.cpp and foresee.cpp.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/certify/open_bricks.hpp"
+#include "host/gold/gold_stream.hpp"
+#include "host/opencl/host_memory.hpp"
+
+namespace vdvr {
+
+/// Gold at the rate that certifies, and at half of it where that can decide something: a stored field that is
+/// within the tolerance by the coarse test is so by the theorem of that rate, for an eighth of the work.
+class GoldRates {
+ public:
+  GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+            GoldSettings settings);
+  [[nodiscard]] GoldStream& fine() { return *fine_; }
+  [[nodiscard]] const GoldStream& fine() const { return *fine_; }
+  /// None where rate < 4, where slack does not count or where a window is given.
+  [[nodiscard]] GoldStream* coarse() { return coarse_ ? &*coarse_ : nullptr; }
+
+  /// fp32 error bound of any gold sample of either rate: positions in blocks of coarse gold reach farther.
+  [[nodiscard]] double arithmetic() const {
+    return std::max(fine_->arithmetic(), coarse_ ? coarse_->arithmetic() : 0.0);
+  }
+  /// The same before there are two rates: of those that a build with the settings of `fine` will take.
+  static double arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                           const FieldSups& sups, const GoldStream& fine);
+
+ private:
+  std::optional<GoldStream> fine_, coarse_;
+};
+
+enum class Verdict { within, beyond, undecided };
+/// Of a field measured on coarse gold. Beyond: at one of its nodes, which are nodes of the fine gold too.
+/// Within leaves room for the fine test, which counts a node's error and slack anew, to agree.
+Verdict coarse_verdict(const BrickMeasure& m, double tolerance);
+
+class ClassifyBricks {
+ public:
+  /// What the passes learn besides the levels.
+  struct Bounds {
+    double total = 0;       ///< largest T + P of a tested node
+    double projection = 0;  ///< largest P
+    double gold = 0;        ///< largest T
+  };
+  /// Called with the slack of a brick that even gold cannot bring within the tolerance.
+  using Refuse = std::function<void(float slack, double tolerance)>;
+
+  /// All but `progress` is referred to. `bricks`: levels, involved and tiles are written.
+  ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
+                 Journal* journal, Progress progress, Refuse refuse);
+
+  /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
+  /// that stay at level 0 are measured on the stored base samples, which closing does not change.
+  void classify(const DeviceField& base, double tolerance, const std::vector<std::uint8_t>& near);
+
+  /// Measures a closed field, of the levels `stored`, on the bricks `pending`.
+  void measure(const DeviceField& field, const std::vector<LevelTriple>& stored, double tolerance,
+               const std::vector<std::uint8_t>& pending, const std::string& stage);
+
+  /// Tiles anew for bricks whose level rose.
+  void extract(const std::vector<std::uint8_t>& raised);
+
+  /// Measures on the fine gold the bricks whose coarse total is above every error seen, until none is: then
+  /// the largest error is that of all fine nodes.
+  void sharpen(const DeviceField& field, double tolerance);
+
+  [[nodiscard]] const std::vector<BrickMeasure>& measures() const { return measures_; }
+  /// By brick; of those refined, with levels per axis.
+  [[nodiscard]] const std::vector<AxisErrors>& along() const { return along_; }
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }
+  [[nodiscard]] std::uint64_t tile_bytes() const { return tile_bytes_; }
+
+ private:
+  using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
+  struct Levels {
+    BrickMeasure base;
+    LevelTriple level{};
+    bool passes = false;
+    AxisErrors along{};
+    float largest_p = 0, smallest_p = 0;
+  };
+  void test(GoldStream& gold, const DeviceField& base, double tolerance,
+            const std::vector<std::uint8_t>& selected, const std::string& stage,
+            const std::function<void(const Levels&)>& visit);
+  void refine(GoldStream& gold, const DeviceField& base, double tolerance,
+              const std::vector<std::uint8_t>& selected);
+  void measure_at(GoldStream& gold, const DeviceField& field, double tolerance,
+                  const std::vector<std::uint8_t>& selected, const std::string& stage,
+                  const std::function<void(const BrickMeasure&)>& visit);
+  Bytes record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
+               const std::vector<float>& samples) const;
+  static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
+  void take(const Levels& levels);
+  static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);
+  std::vector<std::int64_t> take_tiles(ByteReader& in);  // of which bricks
+  [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
+
+  opencl::State& state_;
+  GoldRates& gold_;
+  OpenBricks& bricks_;
+  HostMemory& host_;
+  Journal* journal_;
+  Progress progress_;
+  Refuse refuse_;
+  std::vector<BrickMeasure> measures_;
+  std::vector<AxisErrors> along_;
+  std::vector<float> coarse_slack_;  // by brick; negative: not known
+  Bounds bounds_;
+  std::uint64_t tile_bytes_ = 0;  // of bricks_.samples
+};
+
+}  // namespace vdvr

@@ -1,0 +1,137 @@
+// Closing `coarse`: the fine side follows the coarse one. Called by close_boundaries.cpp. Interpolates with
+// the sampler's own lerp, so that the stored samples of a fine brick lie on what its coarse neighbour
+// interpolates.
+#include <algorithm>
+#include <utility>
+
+#include "host/certify/close_boundaries.hpp"
+#include "host/volume/brick_layout.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+float fraction(std::int64_t part, std::int64_t whole) {
+  return static_cast<float>(part) / static_cast<float>(whole);
+}
+
+class Closer {
+ public:
+  Closer(const StoredAs& stored, std::int64_t brick, const std::array<int, 3>& side, std::vector<float>& tile)
+      : stored_(stored),
+        entity_(stored, brick, side),
+        own_(stored.open, brick, stored.level[at(brick)]),
+        tile_(tile) {
+    lowest_ = own_.level;
+    for (const std::int64_t i : entity_.incident())
+      for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min<int>(lowest_[a], stored.level[at(i)][2 - a]);
+    // The coarsest of those that have the entity's own lattice, if any has: its samples are fitted to that.
+    // Only one that reads the base is as coarse as one can be.
+    const auto rank = [&](std::int64_t i) {
+      const LevelTriple& l = stored.level[at(i)];
+      bool same = true;
+      for (const std::size_t a : entity_.along()) same = same && l[2 - a] == lowest_[a];
+      return std::pair(same ? 0 : 1, l[0] + l[1] + l[2]);
+    };
+    owner_ = entity_.incident().front();
+    for (const std::int64_t i : entity_.incident())
+      if (rank(i) < rank(owner_)) owner_ = i;
+    bool unchanged = owner_ == brick && stored.open.lattice.step == 0;
+    for (const std::size_t a : entity_.along()) unchanged = unchanged && lowest_[a] == own_.level[a];
+    if (unchanged) return;
+    take_from_owner();
+    if (entity_.along().size() == 1) fill_edge(entity_.along()[0]);
+    if (entity_.along().size() == 2) fill_face(entity_.along()[0], entity_.along()[1]);
+  }
+
+ private:
+  bool is_on_base(const Index3& i) const {
+    bool on_base = true;
+    for (const std::size_t a : entity_.along())
+      on_base = on_base && i[a] % (std::int64_t{1} << own_.level[a]) == 0;
+    return on_base;
+  }
+  float rounded(float value, const Index3& i) const { return round_to(value, entity_.unit(own_, i)); }
+  float value(const Index3& i) const { return tile_[own_.index(i)]; }
+
+  // At the entity's level all incident bricks take the samples of its owner: at level 0 these are
+  // base samples, and any others may differ from them.
+  void take_from_owner() {
+    const LevelTriple& level = stored_.level[at(owner_)];
+    const TileView owner(stored_.open, owner_, level);
+    Index3 step{};
+    for (std::size_t a = 0; a < 3; ++a) step[a] = std::int64_t{1} << (own_.level[a] - lowest_[a]);
+    entity_.for_each(own_, step, [&](const Index3& i) {
+      const Index3 o = entity_.index_in(owner, own_, i);
+      float v = level == LevelTriple{0, 0, 0} ? base_sample(stored_.open, owner, o)
+                                              : stored_.open.samples[at(owner_)][owner.index(o)];
+      // The base will hold this value for the bricks that take no part.
+      if (entity_.has_outsiders() && is_on_base(i))
+        v = std::clamp(v, stored_.base_limits.first, stored_.base_limits.second);
+      tile_[own_.index(i)] = rounded(v, i);
+    });
+  }
+
+  // Level by level among those that meet here, each from the one below as it is stored: the field of every
+  // incident brick along the edge then runs through the stored samples of the next finer.
+  void fill_edge(std::size_t a) {
+    std::vector<int> levels;
+    for (const std::int64_t i : entity_.incident())
+      if (stored_.level[at(i)][2 - a] <= own_.level[a]) levels.push_back(stored_.level[at(i)][2 - a]);
+    std::sort(levels.begin(), levels.end());
+    levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+    for (std::size_t n = 1; n < levels.size(); ++n) {
+      const std::int64_t coarse = std::int64_t{1} << (own_.level[a] - levels[n - 1]);
+      Index3 step{1, 1, 1};
+      step[a] = std::int64_t{1} << (own_.level[a] - levels[n]);
+      entity_.for_each(own_, step, [&](const Index3& i) {
+        const std::int64_t below = i[a] / coarse * coarse;
+        if (below == i[a]) return;
+        Index3 low = i, high = i;
+        low[a] = below;
+        high[a] = below + coarse;
+        tile_[own_.index(i)] = rounded(vdvr_lerp(value(low), value(high), fraction(i[a] - below, coarse)), i);
+      });
+    }
+  }
+
+  void fill_face(std::size_t p, std::size_t q) {
+    const std::int64_t step_p = std::int64_t{1} << (own_.level[p] - lowest_[p]),
+                       step_q = std::int64_t{1} << (own_.level[q] - lowest_[q]);
+    if (step_p == 1 && step_q == 1) return;
+    entity_.for_each(own_, {1, 1, 1}, [&](const Index3& i) {
+      const std::int64_t lp = i[p] / step_p * step_p, lq = i[q] / step_q * step_q;
+      if (lp == i[p] && lq == i[q]) return;
+      const std::int64_t hp = lp == i[p] ? lp : lp + step_p, hq = lq == i[q] ? lq : lq + step_q;
+      const auto corner = [&](std::int64_t jp, std::int64_t jq) {
+        Index3 j = i;
+        j[p] = jp;
+        j[q] = jq;
+        return value(j);
+      };
+      const float tp = fraction(i[p] - lp, step_p), tq = fraction(i[q] - lq, step_q);
+      const float low = vdvr_lerp(corner(lp, lq), corner(hp, lq), tp),
+                  high = vdvr_lerp(corner(lp, hq), corner(hp, hq), tp);
+      tile_[own_.index(i)] = rounded(vdvr_lerp(low, high, tq), i);
+    });
+  }
+
+  const StoredAs& stored_;
+  Entity entity_;
+  TileView own_;
+  std::vector<float>& tile_;
+  std::int64_t owner_ = 0;
+  std::array<int, 3> lowest_{};  // level of the entity
+};
+
+}  // namespace
+
+std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick) {
+  std::vector<float> tile = stored.open.samples[at(brick)];
+  for_each_part([&](const std::array<int, 3>& side) { Closer(stored, brick, side, tile); });
+  repeat_last_planes(TileView(stored.open, brick, stored.level[at(brick)]), tile);
+  return tile;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,260 @@
+// Stratified sampling of bricks (docs/performance.md).
+#include "host/certify/foresee.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "host/opencl/host_memory.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr std::int64_t layers = 6, timed_blocks = 3;
+constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+Index3 bricks_of(const GoldSettings& s) {
+  Index3 n{};
+  for (std::size_t a = 0; a < 3; ++a) n[a] = (s.grid.cells[a] + s.granularity - 1) / s.granularity;
+  return n;
+}
+
+// The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
+// trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
+// bricks.
+std::vector<double> expected_error(const Volume& base, int granularity, const Index3& bricks) {
+  const Index3 n = base.grid.samples();
+  const auto value = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+    return static_cast<double>(base.samples[at((z * n[1] + y) * n[0] + x)]);
+  };
+  std::vector<double> out(at(bricks[0] * bricks[1] * bricks[2]), 0.0);
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        const double centre = 2 * value(x, y, z);
+        double plus = 0, minus = 0;
+        const auto add = [&](bool inside, double neighbours) {
+          if (!inside) return;
+          plus += std::max(0.0, neighbours - centre);
+          minus += std::max(0.0, centre - neighbours);
+        };
+        const bool in_x = x > 0 && x + 1 < n[0], in_y = y > 0 && y + 1 < n[1], in_z = z > 0 && z + 1 < n[2];
+        add(in_x, in_x ? value(x - 1, y, z) + value(x + 1, y, z) : 0);
+        add(in_y, in_y ? value(x, y - 1, z) + value(x, y + 1, z) : 0);
+        add(in_z, in_z ? value(x, y, z - 1) + value(x, y, z + 1) : 0);
+        const auto brick = [&](std::int64_t i, std::size_t a) {
+          return std::min(i / granularity, bricks[a] - 1);
+        };
+        double& e = out[at((brick(z, 2) * bricks[1] + brick(y, 1)) * bricks[0] + brick(x, 0))];
+        e = std::max(e, std::max(plus, minus) / 8);
+      }
+  return out;
+}
+
+// One stratum per half octave of expected error over tolerance.
+int stratum_of(double error, double tolerance) {
+  return static_cast<int>(
+      std::clamp(std::round(2 * std::log2(std::max(error / tolerance, 1e-9))), -8.0, 16.0));
+}
+
+// What becomes of a brick: level 0 by coarse gold or by fine, a tile from coarse gold or from fine.
+enum Fate { coarse_stays, fine_stays, coarse_refined, fine_refined, fates };
+
+struct Stratum {
+  std::vector<std::int64_t> bricks, candidates;  // all, and those in the layers looked at
+  double seen = 0, tile_samples = 0;
+  std::array<double, fates> share{};  // of the bricks seen
+};
+
+// Whole blocks of the middle slab, at several radii.
+std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n) {
+  std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
+  const Index3 block = stream.block_bricks();
+  const auto begin = [&](std::size_t a, double f) {
+    return static_cast<std::int64_t>(f * static_cast<double>(n[a])) / block[a] * block[a];
+  };
+  const std::int64_t z0 = begin(2, 0.5);
+  for (std::int64_t i = 0; i < timed_blocks; ++i) {
+    // Radii that stand for equal areas of the covered disc: blocks on the axis fit more than most.
+    const double f = 0.5 - 0.5 * std::sqrt((2.0 * static_cast<double>(i) + 1) / (2.0 * timed_blocks));
+    const std::int64_t x0 = begin(0, f), y0 = begin(1, 0.5);
+    for (std::int64_t z = z0; z < std::min(n[2], z0 + block[2]); ++z)
+      for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)
+        for (std::int64_t x = x0; x < std::min(n[0], x0 + block[0]); ++x)
+          selected[at((z * n[1] + y) * n[0] + x)] = 1;
+  }
+  return selected;
+}
+
+// Seconds per upsampled row and per gold sample.
+struct Pace {
+  double row = 0, sample = 0;
+  [[nodiscard]] double operator()(const GoldWork& work) const {
+    return work.rows * row + work.samples * sample;
+  }
+};
+
+Pace pace_of(const GoldSpent& s) {
+  return {(s.slab_seconds + s.table_seconds) / std::max(1.0, s.work.rows),
+          s.block_seconds / std::max(1.0, s.work.samples)};
+}
+
+// How fast each stream was at each purpose; where one had nothing to do, nothing is foreseen for it either.
+class Paces {
+ public:
+  explicit Paces(GoldRates& gold) : gold_(gold) { reset(); }
+  // What was done before does not count.
+  void reset() {
+    for (const bool fine : {false, true})
+      for (const auto purpose : {GoldStream::For::samples, GoldStream::For::measuring})
+        if (GoldStream* s = stream(fine)) before_[{fine, purpose}] = s->spent(purpose);
+  }
+  double seconds(bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
+    GoldStream* s = stream(fine);
+    if (!s) return 0;
+    GoldSpent spent = s->spent(purpose);
+    spent -= before_[{fine, purpose}];
+    return pace_of(spent)(s->work(bricks, purpose));
+  }
+
+ private:
+  GoldStream* stream(bool fine) { return fine ? &gold_.fine() : gold_.coarse(); }
+  GoldRates& gold_;
+  std::map<std::pair<bool, GoldStream::For>, GoldSpent> before_;
+};
+
+// The strata of the bricks, and which of them to look at.
+std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const std::vector<double>& error,
+                                 double tolerance, const Index3& n) {
+  const std::int64_t looked_at = std::min(layers, n[2]);
+  std::vector<std::uint8_t> in_layer(at(n[2]), 0);
+  for (std::int64_t i = 0; i < looked_at; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * looked_at))] = 1;
+  std::map<int, Stratum> strata;
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    if (!near[i]) continue;
+    Stratum& s = strata[stratum_of(error[i], tolerance)];
+    s.bricks.push_back(static_cast<std::int64_t>(i));
+    if (in_layer[at(static_cast<std::int64_t>(i) / (n[0] * n[1]))])
+      s.candidates.push_back(static_cast<std::int64_t>(i));
+  }
+  // Tiles grow with the error to the power 3/2, and so does their spread: sample in that proportion (Neyman).
+  const auto weight = [](int key, const Stratum& s) {
+    return static_cast<double>(s.bricks.size()) * std::pow(2.0, 0.75 * key);
+  };
+  double all_weights = 0;
+  for (const auto& [key, s] : strata) all_weights += weight(key, s);
+  std::mt19937 random(1);
+  for (auto& [key, s] : strata) {
+    std::shuffle(s.candidates.begin(), s.candidates.end(), random);
+    const double wanted = std::max(fewest_of_stratum, sampled_bricks * weight(key, s) / all_weights);
+    s.candidates.resize(std::min(s.candidates.size(), static_cast<std::size_t>(wanted)));
+    // Bricks that err more lie together, as those that are refined do.
+    std::stable_sort(s.bricks.begin(), s.bricks.end(),
+                     [&](std::int64_t a, std::int64_t b) { return error[at(a)] > error[at(b)]; });
+  }
+  return strata;
+}
+
+}  // namespace
+
+Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
+                       const std::vector<float>& stored, double tolerance) {
+  const GoldSettings& settings = gold.fine().settings();
+  const Index3 n = bricks_of(settings);
+  const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
+  const DeviceField field(state, as_mixed(stored, settings));
+  HostMemory host(state);
+  const auto classify = [&](const std::vector<std::uint8_t>& selected) {
+    OpenBricks bricks;
+    bricks.grid = settings.grid;
+    bricks.granularity = settings.granularity;
+    bricks.rate = settings.rate;
+    bricks.coarsening = settings.coarsening;
+    bricks.sampled = false;
+    bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
+    bricks.involved.assign(near.size(), 0);
+    bricks.samples.resize(near.size());
+    ClassifyBricks test(state, gold, bricks, host, nullptr, {}, [](float, double) {});
+    test.classify(field, tolerance, selected);
+    std::vector<std::pair<double, BrickMeasure>> out;
+    const MixedVolume shape = bricks.shape();
+    for (std::size_t i = 0; i < near.size(); ++i)
+      out.emplace_back(bricks.level[i] == LevelTriple{0, 0, 0}
+                           ? 0.0
+                           : static_cast<double>(shape.tile_size(bricks.level[i])),
+                       test.measures()[i]);
+    return out;
+  };
+
+  // One brick builds the kernels; then whole blocks tell the pace of the first pass, and bricks of every
+  // stratum what follows it.
+  std::vector<std::uint8_t> one(near.size(), 0);
+  one[at((n[2] / 2 * n[1] + n[1] / 2) * n[0] + n[0] / 2)] = 1;
+  classify(one);
+  const bool screens = gold.coarse() != nullptr;
+  GoldStream& first = screens ? *gold.coarse() : gold.fine();
+  const auto first_purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
+  Paces large(gold);
+  classify(some_blocks(first, n));
+  const double first_pass = large.seconds(!screens, first_purpose, near);
+
+  const auto error = expected_error(base, settings.granularity, n);
+  std::map<int, Stratum> strata = strata_of(near, error, tolerance, n);
+  std::vector<std::uint8_t> sampled(near.size(), 0);
+  for (const auto& [key, s] : strata)
+    for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
+  Paces small(gold);
+  const auto classes = classify(sampled);
+  for (auto& [key, s] : strata)
+    for (const std::int64_t i : s.candidates) {
+      const auto& [samples, m] = classes[at(i)];
+      s.seen += 1;
+      s.tile_samples += samples;
+      const bool fine = m.rate == settings.rate;
+      if (m.total >= 0)
+        s.share[samples > 0 ? (fine ? fine_refined : coarse_refined) : fine ? fine_stays : coarse_stays] += 1;
+    }
+
+  // A stratum without a brick in the layers takes after the one below it.
+  double tile_samples = 0, mean = 0;
+  std::array<double, fates> share{};
+  std::array<std::vector<std::uint8_t>, fates> bricks;
+  for (auto& b : bricks) b.assign(near.size(), 0);
+  for (const auto& [key, s] : strata) {
+    if (s.seen > 0) {
+      mean = s.tile_samples / s.seen;
+      for (std::size_t f = 0; f < fates; ++f) share[f] = s.share[f] / s.seen;
+    }
+    tile_samples += mean * static_cast<double>(s.bricks.size());
+    std::size_t next = 0;
+    for (const Fate fate : {fine_refined, coarse_refined, fine_stays})
+      for (double i = 0; i < share[fate] * static_cast<double>(s.bricks.size()) && next < s.bricks.size();
+           ++i)
+        bricks[fate][at(s.bricks[next++])] = 1;
+  }
+  Foreseen out;
+  const auto samples = static_cast<double>(base.samples.size());
+  out.samples_ratio =
+      (static_cast<double>(stored.size()) + static_cast<double>(near.size()) + tile_samples) / samples;
+  out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
+  out.seconds = first_pass;
+  const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {
+    out.seconds += small.seconds(fine, purpose, bricks[fate]);
+  };
+  using For = GoldStream::For;
+  if (screens) {
+    add(true, For::measuring, fine_stays);
+    add(false, For::samples, coarse_refined);
+    add(true, For::samples, fine_refined);
+  }
+  // Verification.
+  add(false, For::measuring, coarse_refined);
+  add(true, For::measuring, fine_refined);
+  return out;
+}
+
+}  // namespace vdvr

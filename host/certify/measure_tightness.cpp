@@ -1,0 +1,193 @@
+// Bounds against a finer gold, on the bricks where bounds or chance say to look.
+#include "vdvr/measure_tightness.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "host/fbp/reconstruct_field.hpp"
+#include "host/gold/gold_stream.hpp"
+#include "host/scan/units.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr int granularity = 4, finer = 4;
+constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Bounds of every brick that may hold a covered node.
+struct BrickBounds {
+  std::vector<float> slack, p;
+};
+
+BrickBounds brick_bounds(opencl::State& state, GoldStream& stream, const Volume& base,
+                         const Progress& progress) {
+  const auto near = stream.bricks_near_coverage();
+  const DeviceField field(state, as_mixed(base, granularity));
+  const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
+  BrickBounds out{std::vector<float>(near.size(), -1), std::vector<float>(near.size(), -1)};
+  stream.run(
+      near,
+      [&](GoldStream::Batch& batch) {
+        const auto p = batch.largest_p();
+        const auto m = batch.measure(field, INFINITY, selected);
+        for (std::size_t i = 0; i < m.size(); ++i) {
+          if (m[i].total < 0) continue;
+          // What P and rounding add to a cell's slack; P of the cell at hand is at least the brick's least.
+          out.slack[at(m[i].brick)] =
+              m[i].slack - 2.5f * p[i].second - static_cast<float>(stream.rounding_in_slack());
+          out.p[at(m[i].brick)] = p[i].first;
+        }
+      },
+      progress, "bounds");
+  return out;
+}
+
+void add_largest(std::vector<std::int64_t>& chosen, const std::vector<float>& bound) {
+  std::vector<std::int64_t> order(bound.size());
+  std::iota(order.begin(), order.end(), std::int64_t{0});
+  const auto wanted = order.begin() + static_cast<std::ptrdiff_t>(std::min(bricks_by_bound, order.size()));
+  std::partial_sort(order.begin(), wanted, order.end(),
+                    [&](std::int64_t a, std::int64_t b) { return bound[at(a)] > bound[at(b)]; });
+  for (auto i = order.begin(); i != wanted; ++i)
+    if (bound[at(*i)] >= 0) chosen.push_back(*i);
+}
+
+// Gold and slack of one brick, [z][y][x].
+struct BrickGold {
+  Index3 side{};
+  std::vector<float> gold, slack;
+  [[nodiscard]] std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    return at((z * side[1] + y) * side[0] + x);
+  }
+};
+
+BrickGold brick_gold(GoldStream& stream, std::int64_t brick, std::size_t bricks) {
+  std::vector<std::uint8_t> one(bricks, 0);
+  one[at(brick)] = 1;
+  BrickGold out;
+  stream.run(
+      one,
+      [&](GoldStream::Batch& batch) {
+        batch.for_each_node(brick, [&](const Index3& i, float gold, const Slack& slack) {
+          for (std::size_t a = 0; a < 3; ++a) out.side[a] = std::max(out.side[a], i[a] + 1);
+          out.gold.push_back(gold);
+          out.slack.push_back(std::max(slack.above, slack.below));
+        });
+      },
+      {}, "brick");
+  return out;
+}
+
+// The largest |trilinear interpolation of every finer-th node - fine| over cells whose corners are all
+// tested.
+double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
+  double worst = 0;
+  for (std::int64_t z = 0; z < fine.side[2]; ++z)
+    for (std::int64_t y = 0; y < fine.side[1]; ++y)
+      for (std::int64_t x = 0; x < fine.side[0]; ++x) {
+        const Index3 p{x, y, z};
+        Index3 cell{};
+        Vec3 f{};
+        for (std::size_t a = 0; a < 3; ++a) {
+          cell[a] = std::min(p[a] / finer, coarse.side[a] - 2);
+          f[a] = static_cast<double>(p[a] - cell[a] * finer) / finer;
+        }
+        double sum = 0;
+        bool tested = true;
+        for (std::int64_t c = 0; c < 8; ++c) {
+          const std::int64_t dx = c & 1, dy = c >> 1 & 1, dz = c >> 2;
+          tested = tested && coarse.slack[coarse.index(cell[0] + dx, cell[1] + dy, cell[2] + dz)] >= 0;
+          sum += (dx ? f[0] : 1 - f[0]) * (dy ? f[1] : 1 - f[1]) * (dz ? f[2] : 1 - f[2]) *
+                 static_cast<double>(fine.gold[fine.index((cell[0] + dx) * finer, (cell[1] + dy) * finer,
+                                                          (cell[2] + dz) * finer)]);
+        }
+        if (tested)
+          worst = std::max(worst, std::abs(sum - static_cast<double>(fine.gold[fine.index(x, y, z)])));
+      }
+  return worst;
+}
+
+// All but the scan in `units`.
+Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+                           const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
+                           const Progress& progress) {
+  opencl::State& state = device.state();
+  const FilteredScan filtered =
+      filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
+  Upsampler upsampler(state, filtered);
+  const FieldSups sups = field_sups(state, upsampler, filtered);
+  const auto stream_at = [&](int up, const std::string& filter, int gold) {
+    return GoldStream(state, filtered, upsampler, sups, {grid, granularity, gold, up, filter, {}});
+  };
+  const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
+  GoldStream sharp = stream_at(16, "cubic", rate), given = stream_at(upsampling, u_filter, rate),
+             truth = stream_at(16, "cubic", rate * finer);
+  const BrickBounds t = brick_bounds(state, sharp, base, progress),
+                    p = brick_bounds(state, given, base, progress);
+
+  Tightness out;
+  out.arithmetic = given.arithmetic();
+  std::vector<std::int64_t> chosen, covered;
+  add_largest(chosen, t.slack);
+  add_largest(chosen, p.p);
+  for (std::size_t i = 0; i < t.slack.size(); ++i) {
+    if (t.slack[i] < 0) continue;
+    covered.push_back(static_cast<std::int64_t>(i));
+    out.gold_bound = std::max(out.gold_bound, static_cast<double>(t.slack[i]));
+    out.projection_cells = std::max(out.projection_cells, static_cast<double>(p.p[i]));
+  }
+  std::mt19937 random(1);
+  std::shuffle(covered.begin(), covered.end(), random);
+  covered.resize(std::min(covered.size(), bricks_by_chance));
+  chosen.insert(chosen.end(), covered.begin(), covered.end());
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  out.bricks = static_cast<std::int64_t>(chosen.size());
+
+  const Index3 n{(grid.cells[0] + granularity - 1) / granularity,
+                 (grid.cells[1] + granularity - 1) / granularity, 0};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const std::int64_t id = chosen[i];
+    const BrickGold fine = brick_gold(truth, id, t.slack.size()),
+                    exact = brick_gold(sharp, id, t.slack.size()),
+                    computed = brick_gold(given, id, t.slack.size());
+    out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
+    const Index3 first{id % n[0] * granularity, id / n[0] % n[1] * granularity,
+                       id / n[0] / n[1] * granularity};
+    const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, upsampling, u_filter, rate,
+                                                 first, computed.side);
+    for (std::int64_t z = 0; z < computed.side[2]; ++z)
+      for (std::int64_t y = 0; y < computed.side[1]; ++y)
+        for (std::int64_t x = 0; x < computed.side[0]; ++x) {
+          const std::size_t node = computed.index(x, y, z);
+          if (computed.slack[node] < 0) continue;
+          out.projection_nodes = std::max(out.projection_nodes, static_cast<double>(bound[node]));
+          out.projection_error =
+              std::max(out.projection_error,
+                       std::abs(static_cast<double>(computed.gold[node]) -
+                                static_cast<double>(fine.gold[fine.index(x * finer, y * finer, z * finer)])));
+        }
+    report(progress, "truth", static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
+  }
+  return out;
+}
+
+}  // namespace
+
+Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
+                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
+                            const Progress& progress) {
+  const Units units = units_of(scan);
+  Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, upsampling, u_filter,
+                                 rate, progress);
+  for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_nodes, &t.projection_cells,
+                        &t.projection_error, &t.arithmetic})
+    *value = to_world(*value, units);
+  return t;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,110 @@
+// Geometry of bricks and what they share.
+#include "host/certify/open_bricks.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+}  // namespace
+
+Index3 OpenBricks::counts() const {
+  Index3 n{};
+  for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
+  return n;
+}
+
+Index3 OpenBricks::position(std::int64_t brick) const {
+  const Index3 n = counts();
+  return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+}
+
+std::vector<std::int64_t> incident_bricks(const OpenBricks& b, std::int64_t brick,
+                                          const std::array<int, 3>& side, bool all) {
+  const Index3 n = b.counts(), p = b.position(brick);
+  std::array<std::vector<std::int64_t>, 3> range;
+  for (std::size_t a = 0; a < 3; ++a) {
+    range[a].push_back(p[a]);
+    if (side[a] == 0 && p[a] > 0) range[a].push_back(p[a] - 1);
+    if (side[a] == 2 && p[a] + 1 < n[a]) range[a].push_back(p[a] + 1);
+  }
+  std::vector<std::int64_t> out;
+  for (const std::int64_t z : range[2])
+    for (const std::int64_t y : range[1])
+      for (const std::int64_t x : range[0]) {
+        const std::int64_t i = (z * n[1] + y) * n[0] + x;
+        if (all || i == brick || b.involved[at(i)]) out.push_back(i);
+      }
+  return out;
+}
+
+TileView::TileView(const OpenBricks& b, std::int64_t brick, const LevelTriple& l)
+    : position(b.position(brick)), level{l[2], l[1], l[0]} {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t width =
+        std::min<std::int64_t>(b.granularity, b.grid.cells[a] - position[a] * b.granularity);
+    end[a] = width << level[a] >> b.coarsening[2 - a];
+    last[a] = static_cast<std::int64_t>(b.granularity) << level[a] >> b.coarsening[2 - a];
+  }
+  stride_y = last[0] + 1;
+  stride_z = stride_y * (last[1] + 1);
+}
+
+float base_sample(const OpenBricks& b, const TileView& t, const Index3& i) {
+  const Index3 n = base_samples(b.grid, b.coarsening);
+  Index3 c{};
+  for (std::size_t a = 0; a < 3; ++a)
+    c[a] = std::min((t.position[a] * b.granularity >> b.coarsening[2 - a]) + (i[a] >> t.level[a]), n[a] - 1);
+  return b.base[at((c[2] * n[1] + c[1]) * n[0] + c[0])];
+}
+
+void repeat_last_planes(const TileView& t, std::vector<float>& tile) {
+  if (t.last == t.end) return;
+  for (std::int64_t z = 0; z <= t.last[2]; ++z)
+    for (std::int64_t y = 0; y <= t.last[1]; ++y)
+      for (std::int64_t x = 0; x <= t.last[0]; ++x)
+        tile[t.index({x, y, z})] =
+            tile[t.index({std::min(x, t.end[0]), std::min(y, t.end[1]), std::min(z, t.end[2])})];
+}
+
+Entity::Entity(const StoredAs& stored, std::int64_t brick, const std::array<int, 3>& side)
+    : stored_(stored),
+      side_(side),
+      incident_(incident_bricks(stored.open, brick, side)),
+      all_(incident_bricks(stored.open, brick, side, true)) {
+  std::sort(incident_.begin(), incident_.end());
+  for (std::size_t a = 0; a < 3; ++a)
+    if (side[a] == 1) along_.push_back(a);
+}
+
+double Entity::unit(const TileView& tile, const Index3& i) const {
+  double unit = 0;
+  for (const std::int64_t brick : all_) {
+    const LevelTriple& l = stored_.level[at(brick)];
+    bool stores = true;
+    for (const std::size_t a : along_)
+      stores = stores && tile.level[a] - l[2 - a] <= std::countr_zero(static_cast<std::uint64_t>(i[a]));
+    if (stores) unit = std::max(unit, stored_.unit[at(brick)]);
+  }
+  return unit;
+}
+
+Index3 Entity::index_in(const TileView& other, const TileView& tile, const Index3& i) const {
+  Index3 o{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (side_[a] == 1) {
+      const int shift = other.level[a] - tile.level[a];
+      o[a] = shift >= 0 ? i[a] << shift : i[a] >> -shift;
+    } else {
+      // The border between two positions; the other brick may lie on either side of it.
+      const std::int64_t plane = tile.position[a] + (side_[a] == 2 ? 1 : 0);
+      o[a] = other.position[a] == plane ? 0 : other.end[a];
+    }
+  }
+  return o;
+}
+
+}  // namespace vdvr

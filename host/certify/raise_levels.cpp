@@ -1,0 +1,111 @@
+// The rules by which repair raises levels.
+#include "host/certify/raise_levels.hpp"
+
+#include <algorithm>
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Of linear interpolation along one axis.
+float error(const AxisErrors& along, std::size_t axis, int level, int top) {
+  if (level >= std::min(top, AxisErrors::most_levels)) return 0;
+  const auto& e = along.of[axis][at(level)];
+  return std::max(e[0], e[1]);
+}
+
+void rise(std::uint8_t& level, std::uint8_t to) { level = std::max(level, to); }
+
+class Raise {
+ public:
+  Raise(const OpenBricks& bricks, std::int64_t brick, const AxisErrors* along, std::vector<LevelTriple>& to)
+      : bricks_(bricks),
+        brick_(brick),
+        own_(bricks.level[at(brick)]),
+        top_(bricks.finest()),
+        along_(along),
+        to_(to) {}
+
+  // Bricks that share this part and are coarser along it: what they store there is what was interpolated
+  // from.
+  bool coarser_neighbours(const std::array<int, 3>& side) {
+    bool any = false;
+    for (const std::int64_t j : incident_bricks(bricks_, brick_, side)) {
+      if (j == brick_) continue;
+      const LevelTriple& other = bricks_.level[at(j)];
+      if (!along_) {
+        if (other[0] >= own_[0]) continue;
+        // A base coarser along one axis gives that axis more levels than the others have.
+        for (std::size_t a = 0; a < 3; ++a)
+          rise(to_[at(j)][a], std::min<std::uint8_t>(top_[a], static_cast<std::uint8_t>(other[a] + 1)));
+        any = true;
+        continue;
+      }
+      for (std::size_t a = 0; a < 3; ++a) {
+        if (side[a] != 1 || other[2 - a] >= own_[2 - a]) continue;
+        rise(to_[at(j)][2 - a], static_cast<std::uint8_t>(other[2 - a] + 1));
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  // The others: what they store elsewhere bears on this part only through its owner.
+  bool others(const std::array<int, 3>& side) {
+    bool any = false;
+    for (const std::int64_t j : incident_bricks(bricks_, brick_, side)) {
+      if (j == brick_) continue;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::uint8_t level = bricks_.level[at(j)][a];
+        if (level >= top_[a]) continue;
+        rise(to_[at(j)][a], static_cast<std::uint8_t>(level + 1));
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  // The axis that errs most; where that is not known, the coarsest ones; with isotropic levels, all.
+  bool itself() {
+    if (own_ == top_) return false;
+    // Samples a cell, as log2.
+    const auto density = [&](std::size_t zyx) { return own_[zyx] - bricks_.coarsening[zyx]; };
+    const int lowest = std::min({density(0), density(1), density(2)});
+    std::size_t worst = 3;
+    float gain = 0;
+    for (std::size_t a = 0; along_ && a < 3; ++a) {
+      const int own = own_[2 - a], top = top_[2 - a];
+      const float g = error(*along_, a, own, top) - error(*along_, a, own + 1, top);
+      if (own >= top || g <= gain) continue;
+      worst = a;
+      gain = g;
+    }
+    for (std::size_t a = 0; a < 3; ++a)
+      if (worst < 3 ? a == worst : density(2 - a) == lowest)
+        rise(to_[at(brick_)][2 - a], static_cast<std::uint8_t>(own_[2 - a] + 1));
+    return true;
+  }
+
+ private:
+  const OpenBricks& bricks_;
+  std::int64_t brick_;
+  LevelTriple own_, top_;
+  const AxisErrors* along_;
+  std::vector<LevelTriple>& to_;
+};
+
+}  // namespace
+
+bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
+                  const AxisErrors* along, std::vector<LevelTriple>& to) {
+  Raise raise(bricks, brick, along, to);
+  for (int part = 0; part < 27; ++part) {
+    if (!(violated >> part & 1)) continue;
+    const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
+    if (!raise.coarser_neighbours(side) && !raise.itself() && !raise.others(side)) return false;
+  }
+  return true;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,22 @@
+// Which levels rise where a closed brick violates the node test (docs/error-bounds.md, sections on closing).
+// Called by build.cpp.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "host/certify/open_bricks.hpp"
+#include "host/gold/search_triples.hpp"
+
+namespace vdvr {
+
+/// `violated`: one bit per part of the brick, as in BrickMeasure. A violation on a shared part raises the
+/// bricks there that are coarser along it, by one level in the axes where they are. Any other raises the
+/// brick itself, along the axis that errs most by `along`, or its coarsest axes where that tells nothing; one
+/// of gold raises all who share the part. Without `along` levels are isotropic, and all axes rise. `to`
+/// holds the levels after all raises of this round, from `bricks.level` on: no axis rises by more than one in
+/// a round. False where all are gold already.
+bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
+                  const AxisErrors* along, std::vector<LevelTriple>& to);
+
+}  // namespace vdvr

@@ -1,0 +1,81 @@
+#include "host/certify/result_units.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace vdvr {
+namespace {
+
+void scale(std::optional<double>& value, int exponent) {
+  if (value) value = std::ldexp(*value, exponent);
+}
+
+void scale(ErrorBudget& b, int exponent) {
+  for (ErrorTerm* term : {&b.grid, &b.gold, &b.projection, &b.arithmetic, &b.sampler.buffer})
+    term->value = std::ldexp(term->value, exponent);
+  if (b.sampler.image3d) b.sampler.image3d->value = std::ldexp(b.sampler.image3d->value, exponent);
+}
+
+void scale(std::vector<Bound>& bounds, int exponent) {
+  for (Bound& b : bounds) b.value = std::ldexp(b.value, exponent);
+}
+
+// What rounds below the normal numbers rounds up: a bound stays one.
+void scale_bounds(std::vector<float>& totals, int exponent) {
+  for (float& total : totals) {
+    if (total < 0) continue;  // not tested
+    const float scaled = std::ldexp(total, exponent);
+    total = std::ldexp(scaled, -exponent) < total ? std::nextafter(scaled, INFINITY) : scaled;
+  }
+}
+
+}  // namespace
+
+void scale(MixedVolume& volume, int exponent) {
+  if (exponent == 0) return;
+  scale(volume.base.f32, exponent);
+  for (auto& [kind, block] : volume.tiles) scale(block.f32, exponent);
+  volume.step = std::ldexp(volume.step, exponent);
+}
+
+Plan to_world(Plan plan, const Units& units) {
+  const int density = units.density();
+  plan.grid = to_world(plan.grid, units);
+  plan.base.grid = to_world(plan.base.grid, units);
+  scale(plan.base.samples, density);
+  scale(plan.fitted, density);
+  plan.epsilon_abs = to_world(plan.epsilon_abs, units);
+  plan.reference_range = to_world(plan.reference_range, units);
+  scale(plan.bounds, density);
+  scale(plan.budget, density);
+  return plan;
+}
+
+Certificate to_world(Certificate c, const Units& units) {
+  const int density = units.density();
+  for (double* value :
+       {&c.epsilon_abs, &c.reference_range, &c.total_buffer, &c.measured_max, &c.measured_total})
+    *value = to_world(*value, units);
+  scale(c.total_image3d, density);
+  scale(c.budget, density);
+  scale(c.bounds, density);
+  scale_bounds(c.brick_totals, density);
+  // The largest of the bricks' is the volume's: where they were rounded up, so is that.
+  double more = 0;
+  for (const float total : c.brick_totals)
+    more = std::max(more, static_cast<double>(total) * (1 - 0x1p-21) - c.measured_total);
+  c.measured_total += more;
+  c.total_buffer += more;
+  c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
+  if (c.total_image3d) {
+    *c.total_image3d += more;
+    c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
+  }
+  c.worst_at = to_world(c.worst_at, units);
+  if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
+  if (c.roi) c.roi = to_world(*c.roi, units);
+  return c;
+}
+
+}  // namespace vdvr

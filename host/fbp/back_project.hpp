@@ -1,0 +1,47 @@
+// Back-projection of an upsampled slab onto blocks of sample columns. Called by reconstruct.cpp and
+// gold_stream.cpp.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "host/fbp/filter_projections.hpp"
+
+namespace vdvr {
+
+/// Equal blocks of nx x ny columns; block b's first column lies at `first[b]` (world x, y), the next at +
+/// step.
+struct ColumnBlocks {
+  std::int64_t nx = 0, ny = 0;
+  double step_x = 1, step_y = 1;
+  std::vector<std::array<double, 2>> first;
+  /// [block][y]: first and last column wanted; others keep what `out` held. Empty: all.
+  std::vector<std::array<std::int32_t, 2>> wanted{};
+  /// Of the slab's rows, a multiple of 16 first; -1: all.
+  std::int64_t first_row = 0, rows = -1;
+};
+
+/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear
+/// | cubic. Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out);
+
+/// The same with launch parameters of the caller's, for tests and for tuning.
+void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
+                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnTuning& tuning);
+
+/// Views that are summed before their sum is added to the others': 64 multiply-adds.
+inline std::int64_t view_run(const std::string& filter) { return filter == "cubic" ? 16 : 32; }
+
+/// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
+/// share cache sets.
+std::int64_t column_stride(std::int64_t rows);
+
+/// A bound on the fp32 error of the positions s, in upsampled columns, for such blocks (docs/error-bounds.md,
+/// section 7).
+double position_error(const ParallelGeometry& geometry, const UpsampledColumns& columns,
+                      const ColumnBlocks& blocks);
+
+}  // namespace vdvr

@@ -1,0 +1,272 @@
+// Ramp filter (filter_rows.cpp) and upsampling by dense cosine-series products (batched_product.cpp).
+#include "host/fbp/filter_projections.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/fbp/batched_product.hpp"
+#include "host/fbp/ramp_kernel.hpp"
+#include "host/fbp/view_weights.hpp"
+#include "host/opencl/fft.hpp"
+#include "host/system/huge_pages.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+// The detector row or column at which a position lies, mirrored about the outer edges; -1 where it lies
+// between two. A position is taken for a whole one when it misses it by no more than its own rounding.
+std::int64_t pixel_at(double position, std::int64_t n) {
+  const double nearest = std::round(position);
+  if (!(std::abs(position - nearest) <= 0x1p-50 * (std::abs(position) + static_cast<double>(n)))) return -1;
+  const std::int64_t period = 2 * n, i = static_cast<std::int64_t>(nearest),
+                     m = ((i % period) + period) % period;
+  return m < n ? m : period - 1 - m;
+}
+
+// The pixels of all positions, or nothing unless all are whole: the series passes through its samples, so
+// that no product is needed.
+std::vector<std::int64_t> pixels_at(std::span<const double> positions, std::int64_t n, int order) {
+  std::vector<std::int64_t> pixels;
+  for (const double x : positions) {
+    const std::int64_t pixel = order == 0 ? pixel_at(x, n) : -1;
+    if (pixel < 0) return {};
+    pixels.push_back(pixel);
+  }
+  return pixels;
+}
+
+std::vector<double> positions_of(const UpsampledColumns& columns) {
+  std::vector<double> positions(static_cast<std::size_t>(columns.count));
+  for (std::size_t j = 0; j < positions.size(); ++j)
+    positions[j] = columns.position(static_cast<std::int64_t>(j));
+  return positions;
+}
+
+// Whether the rows z0 .. z0 + 15 follow one another on the detector, as they do unless mirrored or skipped.
+bool consecutive(std::span<const std::int64_t> rows, std::size_t z0) {
+  if (rows.size() - z0 < 16) return false;
+  for (std::size_t z = z0 + 1; z < z0 + 16; ++z)
+    if (rows[z] != rows[z - 1] + 1) return false;
+  return true;
+}
+
+// target[16] = the rows z0 .. z0 + 15 of one detector column; zero beyond the last.
+void copy_rows(const float* column, std::span<const std::int64_t> rows, std::size_t z0, float* target) {
+  for (std::size_t z = 0; z < 16; ++z) target[z] = z0 + z < rows.size() ? column[rows[z0 + z]] : 0.0f;
+}
+
+// What every view's error is bounded by, and the largest filtered samples; refuses what is not finite.
+void measure_views(FilteredScan& out, std::span<const float> data, const ViewWeights& weights,
+                   const RowFilter& filter) {
+  const ParallelGeometry& g = out.geometry;
+  const std::size_t per_view = static_cast<std::size_t>(g.rows * g.columns);
+  std::vector<double> norms(static_cast<std::size_t>(g.views()));
+  parallel_for(g.views(), {}, "", [&](std::int64_t view) {
+    const std::size_t k = static_cast<std::size_t>(view);
+    for (std::int64_t v = 0; v < g.rows; ++v) {
+      double norm = 0;
+      for (std::int64_t u = 0; u < g.columns; ++u) {
+        const double p = data[k * per_view + static_cast<std::size_t>(v * g.columns + u)];
+        norm += p * p;
+      }
+      if (!(std::sqrt(norm) <= norms[k])) norms[k] = std::sqrt(norm);  // NaN stays
+      if (std::isnan(norm)) break;
+    }
+    for (std::size_t i = 0; i < per_view; ++i) {
+      const double m = std::abs(static_cast<double>(out.samples[k * per_view + i]));
+      if (!(m <= out.view_max[k])) out.view_max[k] = m;  // NaN stays
+      if (std::isnan(m)) break;
+    }
+  });
+  for (std::size_t k = 0; k < norms.size(); ++k) {
+    if (!std::isfinite(out.view_max[k]) || !std::isfinite(norms[k]))
+      throw not_finite(static_cast<std::int64_t>(k));
+    out.ramp_error += filter.error(weights.weight[k], norms[k], out.view_max[k]) +
+                      0x1p-126;  // the weighted sample may be flushed
+  }
+}
+
+// The scan's geometry with the centre in use.
+ParallelGeometry used_geometry(const ProjectionSet& scan, const FieldOptions& field, const Units& units) {
+  ParallelGeometry geometry = from_world(scan.geometry, units);
+  if (field.center) geometry.center = *field.center;
+  return geometry;
+}
+
+UpsampledSlab empty_slab(opencl::State& state, const UpsampledColumns& columns, std::size_t rows,
+                         std::int64_t first_view, std::int64_t views) {
+  UpsampledSlab slab;
+  slab.columns = columns;
+  slab.first_view = first_view;
+  slab.views = views;
+  slab.rows = static_cast<std::int64_t>(rows);
+  slab.rows_padded = static_cast<std::int64_t>(opencl::round_up(rows, 16));
+  slab.values = opencl::DeviceArray<float>(
+      state, static_cast<std::uint64_t>(views * columns.count * slab.rows_padded), "upsampled projections");
+  return slab;
+}
+
+}  // namespace
+
+LineIntegrals::LineIntegrals(const ProjectionSet& scan, const Units& units) : scan_(&scan) {
+  if (units.line == 0) return;
+  scaled_ = scan.data;
+  scale(scaled_, -units.line);
+}
+
+FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                                const Progress& progress, FilterMethod method, Precision precision,
+                                const Units& units) {
+  FilteredScan out;
+  out.geometry = used_geometry(scan, field, units);
+  const ParallelGeometry& g = out.geometry;
+  const ViewWeights weights = view_weights(g.theta_rad);
+  out.limited_angle = weights.limited_angle;
+
+  out.fft_length = fft::good_length(2 * g.columns - 1);
+  const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method, precision);
+  out.samples = large_zeros(static_cast<std::size_t>(scan.size()));
+  out.view_max.assign(static_cast<std::size_t>(g.views()), 0.0);
+  const LineIntegrals line_integrals(scan, units);
+  (*filter)(line_integrals.data(), weights.weight, out.samples, progress);
+  measure_views(out, line_integrals.data(), weights, *filter);
+  return out;
+}
+
+std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
+                         const UpsampledColumns& columns, std::int64_t rows) {
+  const auto lanes = static_cast<std::uint64_t>(std::max(column_tuning(device).lanes, 16));
+  return static_cast<std::uint64_t>(geometry.views() * columns.count) *
+         opencl::round_up(static_cast<std::uint64_t>(rows), lanes) * sizeof(float);
+}
+
+DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                           const Units& units)
+    : state_(&state), data_(scan, units), geometry_(used_geometry(scan, field, units)) {
+  weights_ = view_weights(geometry_.theta_rad).weight;
+  filter_ = make_row_filter(state, geometry_, ramp_kernel(field, geometry_.pitch_u, geometry_.columns),
+                            FilterMethod::automatic, Precision::fp32);
+}
+
+std::optional<UpsampledSlab> DirectFilter::operator()(const UpsampledColumns& columns,
+                                                      std::span<const double> rows,
+                                                      const Progress& progress) {
+  const ParallelGeometry& g = geometry_;
+  const auto v = pixels_at(rows, g.rows, 0);
+  if (columns.rate != 1 || columns.first != 0 || columns.pad > g.columns || v.empty()) return std::nullopt;
+  UpsampledSlab slab = empty_slab(*state_, columns, v.size(), 0, g.views());
+  if (!filter_->to_device(data_.data(), weights_, {&slab.values, -columns.pad, columns.count, v}, progress))
+    return std::nullopt;
+  return slab;
+}
+
+std::uint64_t Upsampler::slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const {
+  return vdvr::slab_bytes(state_->info, scan_->geometry, columns, rows);
+}
+
+const Upsampler::Matrix& Upsampler::matrix_u(const UpsampledColumns& columns, int order) {
+  const std::tuple key{columns.rate, columns.pad, columns.count, order};
+  if (const auto found = matrices_.find(key); found != matrices_.end()) return found->second;
+  const std::vector<double> positions = positions_of(columns);
+  const ParallelGeometry& g = scan_->geometry;
+  const auto exact = resampling_matrix(g.columns, positions, order, g.pitch_u, columns.rate);
+  const std::vector<float> rounded(exact.begin(), exact.end());
+  Matrix m{opencl::DeviceArray<float>(*state_, std::span<const float>(rounded), "upsampling matrix"), 0};
+  const auto width = static_cast<std::size_t>(g.columns);
+  for (std::size_t j = 0; j < positions.size(); ++j) {
+    double sum = 0;
+    for (std::size_t i = 0; i < width; ++i) sum += std::abs(exact[j * width + i]);
+    m.gain = std::max(m.gain, sum);
+  }
+  return matrices_.emplace(key, std::move(m)).first->second;
+}
+
+double Upsampler::gain_u(const UpsampledColumns& columns, int order) { return matrix_u(columns, order).gain; }
+
+opencl::DeviceArray<float> Upsampler::row_matrix(std::span<const double> rows, int order, int lattice) {
+  // v and z lie in the same order everywhere, so the transposed matrix is float [z / 16][v][16].
+  const ParallelGeometry& g = scan_->geometry;
+  const auto exact = resampling_matrix(g.rows, rows, order, g.pitch_v, lattice);
+  const std::size_t height = static_cast<std::size_t>(g.rows);
+  std::vector<float> transposed(height * opencl::round_up(rows.size(), 16), 0.0f);
+  for (std::size_t z = 0; z < rows.size(); ++z)
+    for (std::size_t v = 0; v < height; ++v)
+      transposed[(z / 16 * height + v) * 16 + z % 16] = static_cast<float>(exact[z * height + v]);
+  return {*state_, std::span<const float>(transposed), "row resampling matrix"};
+}
+
+void Upsampler::copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u,
+                          std::span<const std::int64_t> v) {
+  const ParallelGeometry& g = scan_->geometry;
+  const std::size_t chunks = static_cast<std::size_t>(slab.rows_padded / 16);
+  slab.values.write_mapped([&](std::span<float> values) {
+    parallel_for(slab.views, {}, "", [&](std::int64_t k) {
+      const float* view = scan_->samples.data() + (slab.first_view + k) * g.columns * g.rows;
+      for (std::size_t c = 0; c < chunks; ++c) {
+        const bool straight = consecutive(v, 16 * c);
+        float* target =
+            values.data() +
+            (c * static_cast<std::size_t>(slab.views) + static_cast<std::size_t>(k)) * u.size() * 16;
+        for (std::size_t n = 0; n < u.size(); ++n, target += 16) {
+          const float* column = view + u[n] * g.rows;
+          if (straight) std::copy_n(column + v[16 * c], 16, target);
+          else copy_rows(column, v, 16 * c, target);
+        }
+      }
+    });
+  });
+}
+
+UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<const double> rows,
+                                    int order_u, int order_v, int row_lattice, std::int64_t first_view,
+                                    std::int64_t views) {
+  const ParallelGeometry& g = scan_->geometry;
+  if (views < 0) views = g.views() - first_view;
+  UpsampledSlab slab = empty_slab(*state_, columns, rows.size(), first_view, views);
+  const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
+  const auto u = pixels_at(positions_of(columns), g.columns, order_u), v = pixels_at(rows, g.rows, order_v);
+  if (!u.empty() && !v.empty()) {
+    copy_slab(slab, u, v);
+    return slab;
+  }
+
+  const std::int64_t per_view = g.columns * (g.rows + slab.rows_padded) * 4;
+  const std::int64_t chunk = std::clamp<std::int64_t>((std::int64_t{32} << 20) / per_view, 1, views);
+  opencl::DeviceArray<float> filtered(*state_, count(chunk * g.columns * g.rows), "filtered chunk");
+  opencl::DeviceArray<float> resampled(*state_, count(chunk * g.columns * slab.rows_padded),
+                                       "rows of a slab");
+  const opencl::DeviceArray<float> matrix_v = row_matrix(rows, order_v, row_lattice);
+  const Matrix& matrix = matrix_u(columns, order_u);
+  for (std::int64_t first = 0; first < views; first += chunk) {
+    const std::int64_t n = std::min(chunk, views - first);
+    filtered.write(std::span<const float>(scan_->samples)
+                       .subspan(static_cast<std::size_t>((first_view + first) * g.columns * g.rows),
+                                static_cast<std::size_t>(n * g.columns * g.rows)));
+    const std::uint64_t resampled_chunk = count(n * g.columns * 16);
+    batched_product(*state_, resampled, filtered, matrix_v,
+                    {.rows = n * g.columns,
+                     .terms = g.rows,
+                     .z_padded = slab.rows_padded,
+                     .run = row_run,
+                     .out_chunk = resampled_chunk,
+                     .v_chunk = count(g.rows * 16)});
+    batched_product(*state_, slab.values, matrix.values, resampled,
+                    {.rows = columns.count,
+                     .terms = g.columns,
+                     .z_padded = slab.rows_padded,
+                     .batches = n,
+                     .run = column_run,
+                     .out_first = count(first * columns.count * 16),
+                     .out_batch = count(columns.count * 16),
+                     .out_chunk = count(views * columns.count * 16),
+                     .v_batch = count(g.columns * 16),
+                     .v_chunk = resampled_chunk});
+  }
+  return slab;
+}
+
+}  // namespace vdvr

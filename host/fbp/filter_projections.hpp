@@ -1,0 +1,128 @@
+// Ramp filter on the device, and upsampling of slabs of rows (docs/geometry.md: ramp first, then upsample).
+// Called by reconstruct.cpp, plan.cpp, gold_stream.cpp.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "host/fbp/cosine_series.hpp"
+#include "host/fbp/filter_rows.hpp"
+#include "host/opencl/array.hpp"
+#include "host/opencl/column_tuning.hpp"
+#include "host/scan/units.hpp"
+#include "vdvr/field_options.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+/// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
+struct FilteredScan {
+  ParallelGeometry geometry;     ///< with the centre in use, in the units of the samples
+  std::vector<float> samples;    ///< [view][u][v]
+  std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
+  std::vector<double> view_max;  ///< max |q| of each view's samples
+  double ramp_error =
+      0;  ///< sum over views of a bound on the error of any filtered sample (docs/error-bounds.md)
+  bool limited_angle = false;
+};
+
+/// What is certified is filtered in double precision and rounded once; fp32 is faster. Geometry and samples
+/// are in `units`. Cost: as RowFilter's. Memory: the filtered scan on the host, one chunk on the device;
+/// where line integrals are scaled, those once more.
+FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                                const Progress& progress = {}, FilterMethod method = FilterMethod::automatic,
+                                Precision precision = Precision::fp64, const Units& units = {});
+
+/// A scan's line integrals in other units: its own data, unless these have to be scaled.
+class LineIntegrals {
+ public:
+  /// Keeps a reference to the scan.
+  LineIntegrals(const ProjectionSet& scan, const Units& units);
+  [[nodiscard]] std::span<const float> data() const {
+    return scaled_.empty() ? std::span<const float>(scan_->data) : std::span<const float>(scaled_);
+  }
+
+ private:
+  const ProjectionSet* scan_;
+  std::vector<float> scaled_;
+};
+
+/// float values[row / 16][view][column][16]: one slab of rows, upsampled in u.
+struct UpsampledSlab {
+  opencl::DeviceArray<float> values;
+  UpsampledColumns columns;
+  std::int64_t first_view = 0, views = 0, rows = 0, rows_padded = 0;
+};
+
+/// Bytes of a slab.
+std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
+                         const UpsampledColumns& columns, std::int64_t rows);
+
+/// Slabs straight from the scan, where columns and rows are the detector's own and the device filters by
+/// products: the filtered scan stays on the device. The values are those of filter_projections in fp32 and
+/// Upsampler.
+class DirectFilter {
+ public:
+  /// Keeps references to the state and the scan. Samples are in `units`.
+  DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+               const Units& units = {});
+  DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
+  DirectFilter& operator=(const DirectFilter&) = delete;
+  /// Nothing where the slab needs upsampling. Cost: views * rows * columns^2 multiply-adds, or half of them.
+  /// Throws InputError for a view that is not finite.
+  std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
+                                          const Progress& progress);
+
+ private:
+  opencl::State* state_;
+  LineIntegrals data_;
+  ParallelGeometry geometry_;
+  std::vector<double> weights_;
+  std::unique_ptr<RowFilter> filter_;
+};
+
+/// Terms of a run of the products along rows and along columns (batched_product.hpp). The former's errors are
+/// grown by the latter's matrix, and it is the smaller one.
+constexpr int row_run = 4, column_run = 16;
+
+/// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.
+class Upsampler {
+ public:
+  Upsampler(opencl::State& state, const FilteredScan& scan) : state_(&state), scan_(&scan) {}
+
+  /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0:
+  /// the rows are multiples of 1 / row_lattice. Views [first_view, first_view + views). Cost: views * rows *
+  /// U * (V + columns) multiply-adds.
+  UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0,
+                           int order_v = 0, int row_lattice = 0, std::int64_t first_view = 0,
+                           std::int64_t views = -1);
+
+  /// The largest absolute row sum of the matrix in u of a value or derivative: how much an error of the
+  /// samples can grow.
+  double gain_u(const UpsampledColumns& columns, int order);
+
+  /// Bytes of one slab.
+  [[nodiscard]] std::uint64_t slab_bytes(const UpsampledColumns& columns, std::int64_t rows) const;
+
+ private:
+  struct Matrix {
+    opencl::DeviceArray<float> values;
+    double gain = 0;
+  };
+  opencl::DeviceArray<float> row_matrix(std::span<const double> rows, int order, int lattice);
+  /// The slab where every column and row is one of the detector's: u, v.
+  void copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u, std::span<const std::int64_t> v);
+  const Matrix& matrix_u(const UpsampledColumns& columns, int order);
+
+  opencl::State* state_;
+  const FilteredScan* scan_;
+  std::map<std::tuple<int, std::int64_t, std::int64_t, int>, Matrix> matrices_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,424 @@
+// The ways to ramp-filter rows. Calls kernels/fbp/filter_rows_fft.cl with clFFT, kernels/fbp/filter_rows.cl, or
+// host_fft.cpp.
+#include "host/fbp/filter_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <type_traits>
+
+#include "host/opencl/column_tuning.hpp"
+#include "host/opencl/fft.hpp"
+#include "host/opencl/host_fft.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double smallest_normal = 0x1p-126;
+
+template <class Real>
+constexpr bool is_double = std::is_same_v<Real, double>;
+template <class Real>
+constexpr double unit_roundoff = is_double<Real> ? 0x1p-53 : 0x1p-24;
+
+// What the one rounding to the sample that is stored adds where all before it was in double precision.
+template <class Real>
+double stored_rounding(double largest) {
+  constexpr double u = unit_roundoff<float>;
+  return is_double<Real> ? u / (1 - u) * largest : 0.0;
+}
+
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+
+cl_int to_int(std::int64_t n) {
+  if (n > INT32_MAX) throw InputError(fmt::format("a size of {} passes 2^31", n));
+  return static_cast<cl_int>(n);
+}
+
+// Views filtered at once: bounded memory, and one FFT plan for all chunks.
+std::int64_t views_per_chunk(const ParallelGeometry& g, std::int64_t bytes_per_view) {
+  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / std::max<std::int64_t>(bytes_per_view, 1), 1,
+                                  g.views());
+}
+
+// The real spectrum of the even kernel, of length n/2 + 1: sums in double precision.
+std::vector<double> kernel_spectrum(const std::vector<double>& g, std::int64_t length) {
+  std::vector<double> cosine(static_cast<std::size_t>(length));
+  for (std::size_t i = 0; i < cosine.size(); ++i)
+    cosine[i] = std::cos(2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(length));
+  std::vector<double> spectrum(static_cast<std::size_t>(length / 2 + 1));
+  parallel_for(length / 2 + 1, {}, "", [&](std::int64_t bin) {
+    const auto k = static_cast<std::size_t>(bin);
+    double sum = g[0];
+    for (std::size_t j = 1; j < g.size(); ++j)
+      sum += 2 * g[j] * cosine[k * j % static_cast<std::size_t>(length)];
+    spectrum[k] = sum;
+  });
+  return spectrum;
+}
+
+// What a transform, the product with the kernel's spectrum and the inverse err (docs/error-bounds.md, section
+// 7).
+class FourierError {
+ public:
+  FourierError(const std::vector<double>& kernel, const std::vector<double>& spectrum, std::int64_t length)
+      : length_(static_cast<double>(length)), taps_(static_cast<double>(kernel.size())) {
+    for (std::size_t i = 0; i < kernel.size(); ++i) kernel_sum_ += (i == 0 ? 1 : 2) * std::abs(kernel[i]);
+    for (const double s : spectrum) spectrum_max_ = std::max(spectrum_max_, std::abs(s));
+  }
+
+  // Of a filtered sample before the weight, for arithmetic that rounds by u.
+  [[nodiscard]] double operator()(double u, double smallest, double row_norm) const {
+    // A stage of radix 16 errs by at most 512 u, its twiddles by 124 u; one stage more packs real rows.
+    const double transform = 700 * u * (std::log2(length_) + 1);
+    // The spectrum: its sum in double precision, and what rounds once.
+    const double spectrum = (taps_ + 40) * 0x1p-53 * kernel_sum_ + u * spectrum_max_;
+    // Two rows can share a transform, whose norm is then that of both.
+    const double relative =
+        std::numbers::sqrt2 * 1.01 * ((2 * transform + 4 * u) * spectrum_max_ + spectrum) * row_norm;
+    // Below the smallest normal number nothing is relative: about ten operations a stage and element lose
+    // that much, and later stages sum up n of them, twice.
+    return relative + 20 * length_ * (std::log2(length_) + 1) * (1 + spectrum_max_) * smallest;
+  }
+
+ private:
+  double length_, taps_, kernel_sum_ = 0, spectrum_max_ = 0;
+};
+
+template <class Real>
+class FourierFilter : public RowFilter {
+ public:
+  FourierFilter(opencl::State& state, const ParallelGeometry& g, const std::vector<double>& kernel)
+      : state_(state), g_(g), length_(fft::good_length(2 * g.columns - 1)) {
+    const std::vector<double> spectrum = kernel_spectrum(kernel, length_);
+    spectrum_.assign(spectrum.begin(), spectrum.end());
+    error_.emplace(kernel, spectrum, length_);
+  }
+
+  void operator()(std::span<const float> rows, std::span<const double> weights, std::span<float> out,
+                  const Progress& progress) override {
+    constexpr auto precision = is_double<Real> ? Precision::fp64 : Precision::fp32;
+    const opencl::Defines defines{{"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}};
+    const auto bytes = static_cast<std::int64_t>(3 * sizeof(Real));
+    const std::int64_t bins = length_ / 2 + 1, chunk = views_per_chunk(g_, g_.rows * length_ * bytes),
+                       row_count = chunk * g_.rows;
+    opencl::DeviceArray<float> chunk_rows(state_, count(row_count * g_.columns), "projection chunk");
+    opencl::DeviceArray<Real> padded(state_, count(row_count * length_), "padded projections");
+    opencl::DeviceArray<Real> transformed(state_, count(row_count * bins * 2), "projection spectra");
+    const opencl::DeviceArray<Real> filter(state_, std::span<const Real>(spectrum_), "ramp filter");
+    opencl::DeviceArray<Real> chunk_weights(state_, count(chunk), "view weights");
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> pad(state_, "fbp/filter_rows_fft",
+                                                                       "pad_rows", defines);
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int> multiply(state_, "fbp/filter_rows_fft",
+                                                                    "multiply_spectrum", defines);
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int> crop(
+        state_, "fbp/filter_rows_fft", "crop_transposed", defines);
+    for (std::int64_t first = 0; first < g_.views(); first += chunk) {
+      report(progress, "filter", static_cast<double>(first) / static_cast<double>(g_.views()));
+      const std::int64_t views = std::min(chunk, g_.views() - first);
+      const std::size_t at = static_cast<std::size_t>(first * g_.rows * g_.columns),
+                        n = static_cast<std::size_t>(views * g_.rows * g_.columns);
+      chunk_rows.write(rows.subspan(at, n));
+      const std::vector<Real> rounded(weights.begin() + first, weights.begin() + first + views);
+      chunk_weights.write(rounded);
+      pad({{count(length_), count(row_count), 1}, {64, 1, 1}}, padded.buffer(), chunk_rows.buffer(),
+          to_int(g_.columns), to_int(length_), to_int(row_count));
+      fft::forward_real(state_, precision, length_, row_count, padded.buffer(), transformed.buffer());
+      multiply({{count(bins), count(row_count), 1}, {64, 1, 1}}, transformed.buffer(), filter.buffer(),
+               to_int(bins), to_int(row_count));
+      fft::inverse_real(state_, precision, length_, row_count, transformed.buffer(), padded.buffer());
+      crop({{count(g_.rows), count(g_.columns), count(views)}, {1, 64, 1}}, chunk_rows.buffer(),
+           padded.buffer(), chunk_weights.buffer(), to_int(g_.columns), to_int(g_.rows), to_int(g_.rows),
+           to_int(length_), to_int(views));
+      chunk_rows.read(out.subspan(at, n));
+    }
+  }
+
+  bool to_device(std::span<const float>, std::span<const double>, const DeviceColumns&,
+                 const Progress&) override {
+    return false;
+  }
+
+  [[nodiscard]] double error(double weight, double row_norm, double largest) const override {
+    return weight * (*error_)(unit_roundoff<Real>, smallest_normal, row_norm) +
+           stored_rounding<Real>(largest);
+  }
+
+ private:
+  opencl::State& state_;
+  const ParallelGeometry& g_;
+  std::int64_t length_;
+  std::vector<Real> spectrum_;
+  std::optional<FourierError> error_;
+};
+
+// On the host, in double precision; two rows are one complex row.
+class HostFilter : public RowFilter {
+ public:
+  HostFilter(const ParallelGeometry& g, const std::vector<double>& kernel)
+      : g_(g),
+        length_(static_cast<std::int64_t>(std::bit_ceil(count(2 * g.columns - 1)))),
+        transform_(length_),
+        spectrum_(static_cast<std::size_t>(length_)) {
+    const std::vector<double> half = kernel_spectrum(kernel, length_);
+    for (std::int64_t i = 0; i < length_; ++i) {
+      const std::int64_t bin = transform_.bin_at(i);
+      // The inverse's 1 / length, a power of two, goes with it.
+      spectrum_[static_cast<std::size_t>(i)] =
+          half[static_cast<std::size_t>(std::min(bin, length_ - bin))] / static_cast<double>(length_);
+    }
+    error_.emplace(kernel, half, length_);
+  }
+
+  void operator()(std::span<const float> rows, std::span<const double> weights, std::span<float> out,
+                  const Progress& progress) override {
+    const auto columns = static_cast<std::size_t>(g_.columns), height = static_cast<std::size_t>(g_.rows);
+    parallel_for(g_.views(), progress, "filter", [&](std::int64_t view) {
+      const auto k = static_cast<std::size_t>(view);
+      const float* from = rows.data() + k * height * columns;
+      float* to = out.data() + k * height * columns;
+      std::vector<std::complex<double>> x(static_cast<std::size_t>(length_));
+      for (std::size_t v = 0; v < height; v += 2) {
+        const bool two = v + 1 < height;
+        for (std::size_t u = 0; u < columns; ++u)
+          x[u] = {static_cast<double>(from[v * columns + u]),
+                  two ? static_cast<double>(from[(v + 1) * columns + u]) : 0.0};
+        std::fill(x.begin() + g_.columns, x.end(), 0.0);
+        transform_.forward(x);
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] *= spectrum_[i];
+        transform_.inverse(x);
+        for (std::size_t u = 0; u < columns; ++u) {
+          to[u * height + v] = static_cast<float>(weights[k] * x[u].real());
+          if (two) to[u * height + v + 1] = static_cast<float>(weights[k] * x[u].imag());
+        }
+      }
+    });
+  }
+
+  bool to_device(std::span<const float>, std::span<const double>, const DeviceColumns&,
+                 const Progress&) override {
+    return false;
+  }
+
+  [[nodiscard]] double error(double weight, double row_norm, double largest) const override {
+    return weight * (*error_)(unit_roundoff<double>, std::numeric_limits<double>::min(), row_norm) +
+           stored_rounding<double>(largest);
+  }
+
+ private:
+  const ParallelGeometry& g_;
+  std::int64_t length_;
+  fft::HostFft transform_;
+  std::vector<double> spectrum_;
+  std::optional<FourierError> error_;
+};
+
+// Whether all taps at even distances but the centre are zero, as those of the unwindowed ramp are.
+bool odd_only(const std::vector<double>& kernel) {
+  for (std::size_t i = 2; i < kernel.size(); i += 2)
+    if (kernel[i] != 0) return false;
+  return true;
+}
+
+// Rows lie as [view][v / 16][u][16] on the device: 16 rows share every tap.
+template <class Real>
+class ProductFilter : public RowFilter {
+ public:
+  ProductFilter(opencl::State& state, const ParallelGeometry& g, const std::vector<double>& kernel)
+      : state_(state),
+        g_(g),
+        columns_(static_cast<std::size_t>(g.columns)),
+        step_(odd_only(kernel) ? 2 : 1),
+        offset_((g.columns + step_ - 1) / step_ + 1),
+        centre_(static_cast<Real>(kernel[0])) {
+    // Eight columns are summed at once, and the last of them may lie beyond the detector: zeros there.
+    std::vector<Real> taps(static_cast<std::size_t>(2 * offset_ + 8), Real{0});
+    for (std::size_t i = 0; i < taps.size(); ++i) {
+      const std::int64_t e = static_cast<std::int64_t>(i) - offset_, distance = std::abs(step_ * (e + 1) - 1);
+      if (distance < g.columns) taps[i] = static_cast<Real>(kernel[static_cast<std::size_t>(distance)]);
+    }
+    taps_ = opencl::DeviceArray<Real>(state, std::span<const Real>(taps), "ramp filter");
+    double sum = kernel[0] * kernel[0];
+    for (std::size_t j = 1; j < columns_; ++j) {
+      sum += 2 * kernel[j] * kernel[j];
+    }
+    norm_ = std::sqrt(sum);
+  }
+
+  void operator()(std::span<const float> rows, std::span<const double> weights, std::span<float> out,
+                  const Progress& progress) override {
+    std::vector<std::int64_t> all(static_cast<std::size_t>(g_.rows));
+    std::iota(all.begin(), all.end(), 0);
+    Chunk chunk(state_, g_, padded(all));
+    const std::int64_t view_size = chunk.view_size;
+    opencl::DeviceArray<float> product(state_, count(chunk.most_views * view_size), "filtered chunk");
+    const std::size_t per_view = static_cast<std::size_t>(g_.rows) * columns_;
+    while (next(chunk, rows, weights, all, progress)) {
+      launch(chunk, product, 0, g_.columns, 0, view_size, g_.columns * 16);
+      product.read_mapped([&](std::span<const float> source) {
+        parallel_for(chunk.views, {}, "", [&](std::int64_t k) {
+          scatter(
+              source.subspan(static_cast<std::size_t>(k * view_size), static_cast<std::size_t>(view_size)),
+              out.subspan(static_cast<std::size_t>(chunk.first + k) * per_view, per_view));
+        });
+      });
+    }
+  }
+
+  bool to_device(std::span<const float> rows, std::span<const double> weights, const DeviceColumns& target,
+                 const Progress& progress) override {
+    Chunk chunk(state_, g_, padded(target.rows));
+    while (next(chunk, rows, weights, target.rows, progress)) {
+      launch(chunk, *target.values, target.first, target.count, chunk.first * target.count * 16,
+             target.count * 16, g_.views() * target.count * 16);
+      const std::vector<cl_int> broken = chunk.broken.to_host();
+      for (std::int64_t k = 0; k < chunk.views; ++k)
+        if (broken[static_cast<std::size_t>(k)] != 0) throw not_finite(chunk.first + k);
+    }
+    return true;
+  }
+
+  // A sum in runs of 16 rounds each term at most 16 times within its run and once per run after it; the
+  // centre's term, the tap, the weight and the product with it round once each, and the tap in double
+  // precision at most 8 times before. The sum of |terms| is at most norm(kernel) norm(row).
+  [[nodiscard]] double error(double weight, double row_norm, double largest) const override {
+    const double n = 16 + std::ceil(static_cast<double>(columns_) / 16) + 12;
+    const double gamma = n * unit_roundoff<Real> / (1 - n * unit_roundoff<Real>);
+    // Each fused operation, and each tap, may lose this much.
+    const double underflow = (2 + row_norm) * 2 * static_cast<double>(columns_) * smallest_normal;
+    return weight * (gamma * norm_ * row_norm + underflow) + stored_rounding<Real>(largest);
+  }
+
+ private:
+  // Views [first, first + views), as many at once as a cache may hold: what is gathered is filtered at once.
+  struct Chunk {
+    Chunk(opencl::State& state, const ParallelGeometry& g, std::int64_t rows_padded)
+        : z_padded(rows_padded),
+          view_size(rows_padded * g.columns),
+          most_views(std::clamp<std::int64_t>((std::int64_t{16} << 20) / (4 * view_size), 1, g.views())),
+          in(state, count(most_views * view_size), "projection chunk"),
+          weights(state, count(most_views), "view weights"),
+          broken(state, count(most_views), "views that are not finite") {}
+    std::int64_t z_padded, view_size, most_views, first = 0, views = 0;
+    opencl::DeviceArray<float> in;
+    opencl::DeviceArray<Real> weights;
+    opencl::DeviceArray<cl_int> broken;
+  };
+
+  static std::int64_t padded(std::span<const std::int64_t> rows) {
+    return static_cast<std::int64_t>(opencl::round_up(rows.size(), 16));
+  }
+
+  // Puts the next views' rows on the device; false after the last.
+  bool next(Chunk& chunk, std::span<const float> scan, std::span<const double> weights,
+            std::span<const std::int64_t> rows, const Progress& progress) const {
+    chunk.first += chunk.views;
+    chunk.views = std::min(chunk.most_views, g_.views() - chunk.first);
+    if (chunk.views == 0) return false;
+    report(progress, "filter", static_cast<double>(chunk.first) / static_cast<double>(g_.views()));
+    const std::size_t per_view = static_cast<std::size_t>(g_.rows) * columns_,
+                      size = static_cast<std::size_t>(chunk.view_size);
+    chunk.in.write_mapped([&](std::span<float> target) {
+      parallel_for(chunk.views, {}, "", [&](std::int64_t k) {
+        gather(scan.subspan(static_cast<std::size_t>(chunk.first + k) * per_view, per_view), rows,
+               target.subspan(static_cast<std::size_t>(k) * size, size));
+      });
+    });
+    const std::vector<Real> rounded(weights.begin() + chunk.first,
+                                    weights.begin() + chunk.first + chunk.views);
+    chunk.weights.write(rounded);
+    chunk.broken.fill(0);
+    return true;
+  }
+
+  // [v][u] -> [z / 16][u][16] of the detector rows wanted, zero beyond the last.
+  void gather(std::span<const float> view, std::span<const std::int64_t> rows,
+              std::span<float> target) const {
+    for (std::size_t z0 = 0; z0 < rows.size(); z0 += 16) {
+      float* to = target.data() + z0 * columns_;
+      const std::size_t n = std::min<std::size_t>(16, rows.size() - z0);
+      if (n < 16) std::fill(to, to + 16 * columns_, 0.0f);
+      for (std::size_t z = 0; z < n; ++z) {
+        const float* from = view.data() + static_cast<std::size_t>(rows[z0 + z]) * columns_;
+        for (std::size_t u = 0; u < columns_; ++u) to[16 * u + z] = from[u];
+      }
+    }
+  }
+
+  // `out`: columns [out_first, out_first + out_columns) of each view, mirrored beyond the edges.
+  void launch(const Chunk& chunk, opencl::DeviceArray<float>& out, std::int64_t out_first,
+              std::int64_t out_columns, std::int64_t out_begin, std::int64_t out_view,
+              std::int64_t out_chunk) const {
+    const ColumnTuning tuning = column_tuning(state_.info);
+    // As many bytes in a vector of sums.
+    const int lanes = is_double<Real> ? std::max(1, tuning.lanes / 2) : tuning.lanes;
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, Real, cl_int, cl_int, cl_int,
+                   cl_int, cl_int, cl_int, cl_ulong, cl_ulong, cl_ulong>
+        kernel(state_, "fbp/filter_rows", "filter_rows",
+               {{"VDVR_LANES", std::to_string(lanes)},
+                {"VDVR_STEP", std::to_string(step_)},
+                {"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}});
+    const std::int64_t groups = (g_.columns + 8 * step_ - 1) / (8 * step_) * step_;
+    kernel({{count(chunk.z_padded / lanes), count(groups), count(chunk.views)},
+            {tuning.local[0], tuning.local[1], 1}},
+           out.buffer(), chunk.broken.buffer(), chunk.in.buffer(), taps_.buffer(), chunk.weights.buffer(),
+           centre_, to_int(offset_), to_int(g_.columns), to_int(chunk.z_padded), to_int(chunk.views),
+           to_int(out_first), to_int(out_columns), count(out_begin), count(out_view), count(out_chunk));
+  }
+
+  // [v / 16][u][16] -> [u][v].
+  void scatter(std::span<const float> product, std::span<float> out) const {
+    const std::size_t height = static_cast<std::size_t>(g_.rows);
+    for (std::size_t u = 0; u < columns_; ++u)
+      for (std::size_t v0 = 0; v0 < height; v0 += 16)
+        std::copy_n(product.data() + v0 * columns_ + 16 * u, std::min<std::size_t>(16, height - v0),
+                    out.data() + u * height + v0);
+  }
+
+  opencl::State& state_;
+  const ParallelGeometry& g_;
+  std::size_t columns_;
+  std::int64_t step_, offset_;
+  Real centre_;
+  opencl::DeviceArray<Real> taps_;
+  double norm_ = 0;
+};
+
+bool has_double(const opencl::State& state) {
+  return state.device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
+}
+
+}  // namespace
+
+InputError not_finite(std::int64_t view) {
+  return InputError(fmt::format(
+      "view {} of the scan is not finite after filtering in fp32; check or scale its line integrals", view));
+}
+
+std::unique_ptr<RowFilter> make_row_filter(opencl::State& state, const ParallelGeometry& geometry,
+                                           const std::vector<double>& kernel, FilterMethod method,
+                                           Precision precision) {
+  if (precision == Precision::fp64 && !has_double(state)) method = FilterMethod::host;
+  if (method == FilterMethod::automatic)
+    method = geometry.columns <= column_tuning(state.info).product_columns ? FilterMethod::product
+                                                                           : FilterMethod::fourier;
+  if (method == FilterMethod::host) return std::make_unique<HostFilter>(geometry, kernel);
+  const auto made = [&]<class Real>(Real) -> std::unique_ptr<RowFilter> {
+    if (method == FilterMethod::product)
+      return std::make_unique<ProductFilter<Real>>(state, geometry, kernel);
+    return std::make_unique<FourierFilter<Real>>(state, geometry, kernel);
+  };
+  return precision == Precision::fp64 ? made(double{}) : made(float{});
+}
+
+}  // namespace vdvr

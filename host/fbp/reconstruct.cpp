@@ -1,0 +1,236 @@
+// Uniform FBP in slabs of rows and blocks of columns. Called by the command line and by plan.cpp (the 1x base
+// volume).
+#include "vdvr/reconstruct.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <future>
+#include <optional>
+
+#include "host/fbp/back_project.hpp"
+#include "host/fbp/coverage.hpp"
+#include "host/fbp/reconstruct_field.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/scan/units.hpp"
+#include "host/system/huge_pages.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+namespace {
+
+// Laps of device work; without a receiver nothing waits.
+class StageWatch {
+ public:
+  explicit StageWatch(StageSeconds* seconds) : seconds_(seconds) {}
+  void lap(opencl::State& state, const std::string& stage) {
+    if (!seconds_) return;
+    opencl::finish(state, stage);
+    const auto now = std::chrono::steady_clock::now();
+    (*seconds_)[stage] += std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  StageSeconds* seconds_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+std::vector<double> detector_rows(const ParallelGeometry& g, double first_z, double step,
+                                  std::int64_t count) {
+  std::vector<double> rows(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = (first_z + static_cast<double>(i) * step) / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1);
+  return rows;
+}
+
+double kept_margin(const Grid& grid, int rate) {
+  const double cell = std::hypot(grid.spacing[0], grid.spacing[1]);
+  return cell * (1 + 1.0 / rate) * (1 + 1e-6);
+}
+
+UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int upsampling) {
+  // Everything that may be kept, and the stencil around it.
+  return upsampled_columns(g.columns, upsampling, (kept_margin(grid, 1) + grid.spacing[0]) / g.pitch_u);
+}
+
+namespace {
+
+using SlabMaker = std::function<UpsampledSlab(const UpsampledColumns&, std::span<const double>)>;
+
+// Rows of a slab whose projections take half of what is left.
+std::int64_t slab_rows(const opencl::State& state, const ParallelGeometry& g, const UpsampledColumns& columns,
+                       std::int64_t all) {
+  const std::uint64_t budget = state.memory.left() / 2;
+  const auto bytes = [&](std::int64_t rows) { return slab_bytes(state.info, g, columns, rows); };
+  std::int64_t rows = std::min<std::int64_t>(all, 256);
+  while (rows > 16 && bytes(rows) > budget) rows = (rows + 1) / 2;
+  if (bytes(rows) > std::min(budget, state.info.max_allocation)) {
+    throw ResourceError(fmt::format(
+        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise --max-memory "
+        "or lower --upsampling",
+        g.views(), columns.count, static_cast<double>(bytes(rows)) / (1 << 20), rows));
+  }
+  return rows;
+}
+
+// By row y, the first and last column that is kept: the region is convex, so that all between them are.
+std::vector<std::array<std::int32_t, 2>> kept_columns(const ParallelGeometry& g, const Grid& grid) {
+  const Coverage coverage(g);
+  const Index3 n = grid.samples();
+  std::vector<std::array<std::int32_t, 2>> kept(static_cast<std::size_t>(n[1]));
+  parallel_for(n[1], {}, "", [&](std::int64_t y) {
+    const auto keep = [&](std::int64_t x) {
+      const Vec3 p = grid.position({x, y, 0});
+      return coverage.margin(p[0], p[1]) >= -kept_margin(grid, 1);
+    };
+    std::int64_t first = 0, last = n[0] - 1;
+    while (first <= last && !keep(first)) ++first;
+    while (last > first && !keep(last)) --last;
+    // An empty row wants nothing, wherever its neighbour's interval lies.
+    if (first > last) kept[static_cast<std::size_t>(y)] = {static_cast<std::int32_t>(n[0]), -1};
+    else
+      kept[static_cast<std::size_t>(y)] = {static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)};
+  });
+  return kept;
+}
+
+// Columns of z become rows of x. The planes of a volume lie a power of two apart and would share a few cache
+// sets: 16 of them are gathered aside and written row by row.
+void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
+                   std::array<std::int32_t, 2> kept, float* target, std::int64_t plane) {
+  const std::int64_t width = kept[1] - kept[0] + 1, aside = width + 16;
+  if (width <= 0) return;
+  std::vector<float> rows(static_cast<std::size_t>(16 * aside));
+  for (std::int64_t first = 0; first < nz; first += 16) {
+    const float* from = columns.data() + kept[0] * stride + first;
+    for (std::int64_t x = 0; x < width; ++x, from += stride)
+      for (std::int64_t z = 0; z < 16; ++z) rows[static_cast<std::size_t>(z * aside + x)] = from[z];
+    for (std::int64_t z = 0; z < std::min<std::int64_t>(16, nz - first); ++z)
+      std::copy_n(rows.data() + z * aside, width, target + (first + z) * plane + kept[0]);
+  }
+}
+
+Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
+                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Progress& progress, StageWatch& watch) {
+  const Index3 n = grid.samples();
+  const UpsampledColumns columns = columns_for(g, grid, upsampling);
+  const std::int64_t rows = slab_rows(state, g, columns, n[2]);
+  // A slab's columns take at most a quarter of what it leaves.
+  const std::int64_t wanted =
+      static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
+  const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
+
+  // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
+  // left.
+  std::future<std::vector<float>> samples = std::async(std::launch::async | std::launch::deferred, [&] {
+    return large_zeros(static_cast<std::size_t>(grid.sample_count()));
+  });
+  const auto kept = kept_columns(g, grid);
+  if (std::none_of(kept.begin(), kept.end(), [](const auto& k) { return k[0] <= k[1]; }))
+    throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+  Volume volume{grid, {}};
+  for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
+    const std::int64_t nz = std::min(rows, n[2] - z0), stride = column_stride(nz);
+    const UpsampledSlab slab = make_slab(
+        columns,
+        detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz));
+    opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(band * n[0] * stride),
+                                   "reconstructed columns");
+    for (std::int64_t y0 = 0; y0 < n[1]; y0 += band) {
+      report(progress, "reconstruct",
+             (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) /
+                 static_cast<double>(n[2]));
+      const std::int64_t ny = std::min(band, n[1] - y0);
+      const ColumnBlocks blocks{
+          n[0],
+          ny,
+          grid.spacing[0],
+          grid.spacing[1],
+          {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}},
+          {kept.begin() + y0, kept.begin() + y0 + ny}};
+      back_project(state, g, slab, blocks, u_filter, out);
+      watch.lap(state, "back-project");
+      if (samples.valid()) volume.samples = samples.get();
+      out.read_mapped([&](std::span<const float> columns_host) {
+        parallel_for(ny, {}, "", [&](std::int64_t y) {
+          transpose_row(columns_host.subspan(static_cast<std::size_t>(y * n[0] * stride)), stride, nz,
+                        kept[static_cast<std::size_t>(y0 + y)],
+                        volume.samples.data() + (z0 * n[1] + y0 + y) * n[0], n[0] * n[1]);
+        });
+      });
+      watch.lap(state, "read back");
+    }
+  }
+  return volume;
+}
+
+}  // namespace
+
+Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
+                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Progress& progress, StageSeconds* seconds) {
+  StageWatch watch(seconds);
+  const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
+    UpsampledSlab slab = upsampler(columns, rows);
+    watch.lap(state, "upsample");
+    return slab;
+  };
+  return reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, u_filter, progress, watch);
+}
+
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
+                   const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
+  StageWatch watch(seconds);
+  if (options.upsampling < 1 || options.upsampling > 64 ||
+      (options.upsampling & (options.upsampling - 1)) != 0)
+    throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
+  if (options.u_filter != "linear" && options.u_filter != "cubic")
+    throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
+  opencl::State& state = device.state();
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
+  // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
+  // it.
+  std::optional<DirectFilter> direct;
+  if (options.upsampling == 1) direct.emplace(state, scan, options.field, units);
+  std::optional<FilteredScan> filtered;
+  std::optional<Upsampler> upsampler;
+  const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
+    if (direct && !filtered) {
+      std::optional<UpsampledSlab> slab = (*direct)(columns, rows, progress);
+      watch.lap(state, "filter");
+      if (slab) return std::move(*slab);
+    }
+    if (!filtered) {
+      // Without upsampling nothing is certified.
+      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic,
+                                    direct ? Precision::fp32 : Precision::fp64, units);
+      watch.lap(state, "filter");
+      upsampler.emplace(state, *filtered);
+    }
+    UpsampledSlab slab = (*upsampler)(columns, rows);
+    watch.lap(state, "upsample");
+    return slab;
+  };
+  ParallelGeometry geometry = from_world(scan.geometry, units);
+  if (options.field.center) geometry.center = *options.field.center;
+  Volume volume = reconstruct_slabs(state, geometry, make_slab, from_world(grid, units), options.upsampling,
+                                    options.u_filter, progress, watch);
+  if (units.are_world()) return volume;
+  volume.grid = grid;
+  check_densities(to_world(largest_magnitude(volume.samples), units));
+  scale(volume.samples, units.density());
+  return volume;
+}
+
+}  // namespace vdvr

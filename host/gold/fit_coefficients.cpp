@@ -1,0 +1,153 @@
+// Fits lattices on the device. Launches kernels/gold/fit_coefficients.cl.
+#include "host/gold/fit_coefficients.hpp"
+
+#include <algorithm>
+
+#include "host/opencl/kernel.hpp"
+
+namespace vdvr {
+namespace {
+
+// Of the middle of the errors around a sample: 1 would overshoot, since a shift moves the interpolant around
+// the neighbours too.
+constexpr float share = 0.8f;
+// Room for 16-lane reads that begin at the last node of the last column.
+constexpr std::uint64_t room = 64;
+// Of 16 nodes of a column, a bit each.
+constexpr std::int64_t most_runs = 32;
+
+cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+template <class T>
+void grow(opencl::State& state, opencl::DeviceArray<T>& array, std::uint64_t size, const char* what) {
+  if (array.size() >= size) return;
+  array = {};  // before the next one is allocated
+  array = opencl::DeviceArray<T>(state, size, what);
+  array.fill(0);  // 16 lanes read beyond what is interpolated
+}
+
+}  // namespace
+
+void LatticeFit::shape_for(const Index3& spacing) {
+  const GoldBlocks& b = blocks_;
+  const auto reach = [&](std::size_t a) { return b.halo / spacing[a]; };
+  const auto samples = [&](std::int64_t nodes, std::size_t a) {
+    return to_int((nodes - 1) / spacing[a] + 1 + 2 * reach(a));
+  };
+  level_.shape = {to_int(spacing[0]), to_int(spacing[1]), to_int(spacing[2]),
+                  to_int(reach(0)),   to_int(reach(1)),   to_int(reach(2)),
+                  samples(b.nx, 0),   samples(b.ny, 1),   samples(b.nz, 2)};
+}
+
+// Bits of the runs of 16 nodes in which nodes low .. high lie; a longer column's last bit stands for the
+// rest.
+cl_uint LatticeFit::runs_between(std::int64_t low, std::int64_t high) const {
+  const auto run = [&](std::int64_t node) {
+    return std::clamp<std::int64_t>((node + blocks_.halo) / 16, 0, most_runs - 1);
+  };
+  return static_cast<cl_uint>((std::uint64_t{2} << run(high)) - (std::uint64_t{1} << run(low)));
+}
+
+// A step looks half a spacing around a sample, the next one at what its neighbours did: nodes within as many
+// spacings of the boxes, less a half, take part, and the lattice's columns on and beside those.
+void LatticeFit::mark(const std::vector<NodeBox>& wanted, int steps) {
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const std::int64_t wide = b.nx + 2 * b.halo, deep = b.ny + 2 * b.halo;
+  host_wanted_.assign(at(b.count * wide * deep), 0);
+  host_needed_.assign(at(b.count * l.cx * l.cy), 0);
+  const std::int64_t halves = std::max(2 * steps - 1, 0), dx = (halves * l.spacing_x + 1) / 2,
+                     dy = (halves * l.spacing_y + 1) / 2, dz = (halves * l.spacing_z + 1) / 2;
+  for (const NodeBox& w : wanted) {
+    const cl_uint runs = runs_between(w.first[2] - dz, w.last[2] + dz);
+    const std::int64_t x0 = std::max(w.first[0] - dx + b.halo, std::int64_t{0}),
+                       x1 = std::min(w.last[0] + dx + b.halo, wide - 1),
+                       y0 = std::max(w.first[1] - dy + b.halo, std::int64_t{0}),
+                       y1 = std::min(w.last[1] + dy + b.halo, deep - 1);
+    for (std::int64_t y = y0; y <= y1; ++y)
+      for (std::int64_t x = x0; x <= x1; ++x) host_wanted_[at((w.block * deep + y) * wide + x)] |= runs;
+    // Of the lattice, whose first column need not lie on the halo's rim.
+    const std::int64_t from_x = b.halo - std::int64_t{l.reach_x} * l.spacing_x,
+                       from_y = b.halo - std::int64_t{l.reach_y} * l.spacing_y;
+    const auto below = [](std::int64_t node, std::int64_t spacing) {
+      return std::max<std::int64_t>(node / spacing - 1, 0);
+    };
+    for (std::int64_t y = below(y0 - from_y, l.spacing_y); y < l.cy && (y - 2) * l.spacing_y <= y1 - from_y;
+         ++y)
+      for (std::int64_t x = below(x0 - from_x, l.spacing_x); x < l.cx && (x - 2) * l.spacing_x <= x1 - from_x;
+           ++x)
+        host_needed_[at((w.block * l.cy + y) * l.cx + x)] |= runs;
+  }
+  grow(state_, wanted_, host_wanted_.size(), "nodes where samples are fitted");
+  wanted_.write(host_wanted_);
+  grow(state_, needed_, host_needed_.size(), "columns of a lattice");
+  needed_.write(host_needed_);
+}
+
+void LatticeFit::reserve(std::uint64_t gold, int steps) {
+  const VdvrLattice& l = level_.shape;
+  const std::uint64_t columns = count(blocks_.count * l.cx * l.cy);
+  grow(state_, level_.samples, columns * count(l.cz), "samples of a level");
+  grow(state_, level_.along, columns * count(blocks_.gold_stride) + room, "interpolated columns");
+  if (steps == 0) return;
+  grow(state_, errors_, gold, "errors of an interpolant");
+  grow(state_, low_, columns * count(blocks_.gold_stride), "smallest errors");
+  grow(state_, high_, columns * count(blocks_.gold_stride), "largest errors");
+}
+
+// One step.
+void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
+                     float curvature) {
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
+               blocks = to_int(b.count);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl::Buffer, VdvrLattice, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_float>
+      err(state_, "gold/fit_coefficients", "lattice_errors");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl::Buffer, cl::Buffer,
+                 VdvrLattice, cl_int, cl_int, cl_int, cl_int, cl_int>
+      pool(state_, "gold/fit_coefficients", "pool_errors");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_float>
+      shift(state_, "gold/fit_coefficients", "shift_lattice");
+  const std::uint64_t chunks = count(b.gold_stride / 16);
+  const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1, deep = (l.cy - 1) * l.spacing_y + 1;
+  err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors_.buffer(), level_.along.buffer(),
+      gold.buffer(), margin.buffer(), b.lowest, wanted_.buffer(), l, nx, ny, halo, stride, blocks, curvature);
+  pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low_.buffer(), high_.buffer(),
+       errors_.buffer(), margin.buffer(), b.lowest, wanted_.buffer(), needed_.buffer(), l, nx, ny, halo,
+       stride, blocks);
+  shift({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
+        low_.buffer(), high_.buffer(), needed_.buffer(), l, halo, stride, blocks, to_int(b.z_first),
+        to_int(b.z_last), share);
+}
+
+const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gold,
+                                           const opencl::DeviceArray<float>& margin,
+                                           const std::vector<NodeBox>& wanted, const Index3& spacing,
+                                           int steps, float curvature) {
+  shape_for(spacing);
+  mark(wanted, steps);
+  reserve(gold.size(), steps);
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
+               blocks = to_int(b.count);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int, cl_int>
+      take(state_, "gold/fit_coefficients", "take_lattice");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int> interpolate(
+      state_, "gold/fit_coefficients", "interpolate_lattice");
+  take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
+       gold.buffer(), needed_.buffer(), l, nx, ny, halo, stride, blocks);
+  for (int step = 0;; ++step) {
+    interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, level_.along.buffer(),
+                level_.samples.buffer(), needed_.buffer(), l, halo, stride, blocks);
+    if (step == steps) return level_;
+    fit(gold, margin, curvature);
+  }
+}
+
+}  // namespace vdvr

@@ -1,0 +1,442 @@
+// What is done to a batch of gold blocks: fit, classify, extract, measure. Called by build.cpp, plan.cpp,
+// foresee.cpp. Launches kernels/gold/classify.cl and verify.cl.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "host/fbp/reconstruct_field.hpp"
+#include "host/gold/gold_stream.hpp"
+#include "host/opencl/kernel.hpp"
+
+namespace vdvr {
+namespace {
+
+cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
+std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Of what rounding may move a sample: the worst node is seldom one of the samples that rounding moves most.
+// Without room a brick at the tolerance is raised by repair, for twice its samples; with all of it too many
+// bricks begin finer.
+constexpr float rounding_share = 0.25f;
+
+}  // namespace
+
+// Mirrors TileRequest of kernels/gold/classify.cl.
+struct GoldStream::Batch::TileRequest {
+  cl_int block, node_x, node_y, node_z;
+  cl_int spacing_x, spacing_y, spacing_z;
+  cl_int side_x, side_y, side_z;
+  cl_int last_x, last_y, last_z;
+  cl_int pad;
+  cl_ulong offset;
+};
+
+std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const { return place_.at(brick); }
+
+// Equal blocks by their first bricks in x and y, and the selected bricks in them.
+void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
+                               const std::vector<std::uint8_t>& selected) {
+  const Grid& grid = settings_.grid;
+  const std::int64_t g = settings_.granularity;
+  const std::int64_t across = (grid.cells[0] + g - 1) / g, deep = (grid.cells[1] + g - 1) / g;
+  first_brick_.clear();
+  bricks_.clear();
+  place_.clear();
+  shape_.count = static_cast<std::int64_t>(first.size());
+  for (std::size_t b = 0; b < first.size(); ++b) {
+    const auto [bx, by] = first[b];
+    first_brick_.push_back({bx, by, first_z});
+    for (std::int64_t dz = 0; dz < bricks_z_; ++dz)
+      for (std::int64_t dy = 0; dy < bricks_y_; ++dy)
+        for (std::int64_t dx = 0; dx < bricks_x_; ++dx) {
+          const std::int64_t brick = ((first_z + dz) * deep + by + dy) * across + bx + dx;
+          if (!selected[at(brick)]) continue;
+          bricks_.push_back(brick);
+          place_[brick] = {static_cast<std::int64_t>(b), dx, dy, dz};
+        }
+  }
+}
+
+Index3 GoldStream::Batch::spacing_of(const LevelTriple& level) const {
+  Index3 spacing{};
+  for (std::size_t a = 0; a < 3; ++a)
+    spacing[a] = std::int64_t{settings_.rate} << settings_.coarsening[2 - a] >> level[2 - a];
+  return spacing;
+}
+
+std::size_t GoldStream::Batch::slot(std::int64_t brick) const {
+  const auto [b, x, y, z] = place(brick);
+  return at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+}
+
+std::vector<std::uint8_t> GoldStream::Batch::flags(const std::vector<std::int64_t>& bricks) const {
+  std::vector<std::uint8_t> out(at(shape_.count * bricks_z_ * bricks_y_ * bricks_x_), 0);
+  for (const std::int64_t brick : bricks) out[slot(brick)] = 1;
+  return out;
+}
+
+const LevelSamples& GoldStream::Batch::lattice(const LevelTriple& level,
+                                               const std::vector<std::int64_t>& bricks) {
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
+  std::vector<NodeBox> boxes;
+  for (const std::int64_t brick : bricks) {
+    const auto [b, x, y, z] = place(brick);
+    boxes.push_back({b, {x * side, y * side, z * side}, {(x + 1) * side, (y + 1) * side, (z + 1) * side}});
+  }
+  const int steps = !settings_.midrange             ? 0
+                    : level == LevelTriple{0, 0, 0} ? base_fit_steps
+                                                    : level_fit_steps;
+  return fit_(gold_, margin_, boxes, spacing_of(level), steps, settings_.curvature);
+}
+
+GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, const Index3& spacing,
+                                                          std::uint64_t offset) const {
+  const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  const auto side = [&](std::size_t a) { return to_int(g * rate / spacing[a] + 1); };
+  const auto [b, x, y, z] = place(brick);
+  const auto& first = first_brick_[at(b)];
+  TileRequest r{};
+  r.block = to_int(b);
+  r.node_x = to_int(x * g * rate);
+  r.node_y = to_int(y * g * rate);
+  r.node_z = to_int(z * g * rate);
+  r.spacing_x = to_int(spacing[0]);
+  r.spacing_y = to_int(spacing[1]);
+  r.spacing_z = to_int(spacing[2]);
+  r.side_x = side(0);
+  r.side_y = side(1);
+  r.side_z = side(2);
+  r.last_x = to_int(std::min(shape_.nx - 1, (settings_.grid.cells[0] - first[0] * g) * rate));
+  r.last_y = to_int(std::min(shape_.ny - 1, (settings_.grid.cells[1] - first[1] * g) * rate));
+  r.last_z = to_int(shape_.nz - 1);
+  r.offset = offset;
+  return r;
+}
+
+opencl::Defines GoldStream::Batch::brick_nodes() const {
+  return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
+}
+
+// Per brick of the blocks, [block][z][y][x].
+struct GoldStream::Batch::Results {
+  opencl::DeviceArray<cl_int> total, error, slack, violated;
+};
+
+GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& field, float tolerance,
+                                                          const opencl::DeviceArray<std::uint8_t>& selected) {
+  const std::uint64_t n = blocks(), size = n * count(bricks_x_ * bricks_y_ * bricks_z_);
+  Results r{{state_, size, "brick totals"},
+            {state_, size, "brick errors"},
+            {state_, size, "brick slack"},
+            {state_, size, "violations"}};
+  r.total.fill(-1);
+  r.error.fill(0);
+  r.slack.fill(-1);
+  r.violated.fill(0);
+  std::vector<cl_int4> firsts;
+  for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
+  const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
+                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+      kernel(state_, "gold/measure", "measure_nodes", field.defines);
+  const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
+  kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
+         r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),
+         field.bricks.buffer(), field.grid, gold_.buffer(), above_.buffer(), below_.buffer(),
+         margin_.buffer(), first.buffer(), selected.buffer(), shape_.lowest, to_int(shape_.nx),
+         to_int(shape_.ny), to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), settings_.rate,
+         to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)),
+         tolerance);
+  return r;
+}
+
+std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, float tolerance,
+                                                     const opencl::DeviceArray<std::uint8_t>& selected) {
+  const Results r = run_measure(field, tolerance, selected);
+  const auto totals = r.total.to_host(), errors = r.error.to_host(), slacks = r.slack.to_host(),
+             bits = r.violated.to_host();
+  std::vector<BrickMeasure> out;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+    BrickMeasure m;
+    m.brick = brick;
+    m.rate = settings_.rate;
+    if (totals[i] >= 0) {
+      m.total = std::bit_cast<float>(totals[i]);
+      m.error = std::bit_cast<float>(errors[i]);
+      m.slack = std::bit_cast<float>(slacks[i]);
+      m.violated = static_cast<std::uint32_t>(bits[i]);
+    }
+    out.push_back(m);
+  }
+  return out;
+}
+
+std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::int64_t>& bricks) {
+  constexpr int most = AxisErrors::most_levels;
+  Index3 levels{};
+  for (std::size_t a = 0; a < 3; ++a) levels[a] = std::min<int>(settings_.finest()[2 - a], most);
+  if (!settings_.anisotropic || *std::max_element(levels.begin(), levels.end()) == 0 || bricks.empty())
+    return std::vector<AxisErrors>(bricks.size());
+  const std::int64_t n = shape_.count;
+  const std::vector<std::uint8_t> wanted = flags(bricks);
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
+                                                    "bricks to look at");
+  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(std::int64_t{6} * most),
+                                     "errors along axes");
+  errors.fill(0);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+      kernel(state_, "gold/classify", "axis_errors", brick_nodes());
+  kernel({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, errors.buffer(),
+         on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_.lowest, to_int(shape_.nx),
+         to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo), to_int(shape_.gold_stride),
+         to_int(levels[0]), to_int(levels[1]), to_int(levels[2]), most, to_int(bricks_x_), to_int(bricks_y_),
+         to_int(bricks_z_), to_int(n));
+  const auto bits = errors.to_host();
+  std::vector<AxisErrors> out(bricks.size());
+  for (std::size_t i = 0; i < bricks.size(); ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t l = 0; l < at(most); ++l)
+        for (std::size_t sign = 0; sign < 2; ++sign)
+          out[i].of[a][l][sign] =
+              std::bit_cast<float>(bits[((slot(bricks[i]) * 3 + a) * at(most) + l) * 2 + sign]);
+  return out;
+}
+
+// The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
+std::vector<float> GoldStream::Batch::errors_at(const LevelTriple& level,
+                                                const std::vector<std::int64_t>& bricks) {
+  const std::int64_t n = shape_.count;
+  const std::vector<std::uint8_t> wanted = flags(bricks);
+  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
+                                                    "bricks to test");
+  const LevelSamples& samples = lattice(level, bricks);
+  opencl::DeviceArray<cl_int> error(state_, wanted.size(), "brick errors");
+  error.fill(-1);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float,
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, VdvrLattice, cl_int, cl_int, cl_int, cl_int>
+      level_error(state_, "gold/classify", "level_error", brick_nodes());
+  level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
+              on_device.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
+              margin_.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz),
+              to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), samples.shape,
+              to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+  const auto bits = error.to_host();
+  std::vector<float> out;
+  for (const std::int64_t brick : bricks) {
+    const cl_int b = bits[slot(brick)];
+    out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
+  }
+  return out;
+}
+
+namespace {
+
+// Equal tiles, in the order of the bricks.
+void give_tiles(const std::vector<BrickClass*>& bricks, const std::vector<float>& samples) {
+  const std::size_t size = bricks.empty() ? 0 : samples.size() / bricks.size();
+  for (std::size_t i = 0; i < bricks.size(); ++i)
+    bricks[i]->tile.assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
+                           samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
+}
+
+}  // namespace
+
+struct GoldStream::Batch::Candidate {
+  BrickClass* result;
+  TripleSearch::Brick search;
+};
+
+// Round by round: every brick names its next level, and bricks that name the same are tested together.
+void GoldStream::Batch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
+                                   float tolerance) {
+  while (!candidates.empty()) {
+    std::map<LevelTriple, std::vector<Candidate>> by_level;
+    for (Candidate& c : candidates)
+      if (const auto level = search.next(c.search, tolerance)) by_level[*level].push_back(std::move(c));
+    candidates.clear();
+    for (auto& [level, group] : by_level) {
+      std::vector<std::int64_t> bricks, passed;
+      for (const Candidate& c : group) bricks.push_back(c.result->base.brick);
+      const std::vector<float> errors = errors_at(level, bricks);
+      std::vector<BrickClass*> results;
+      for (std::size_t i = 0; i < group.size(); ++i) {
+        if (!(errors[i] <= tolerance)) continue;
+        passed.push_back(bricks[i]);
+        results.push_back(group[i].result);
+      }
+      give_tiles(results, copy_tiles(level, passed, &fit_.last()));
+      for (std::size_t i = 0; i < group.size(); ++i) {
+        BrickClass& result = *group[i].result;
+        const float total =
+            errors[i] + rounding_share * static_cast<float>(rounding_of(result.tile, settings_.lattice));
+        if (total <= tolerance) {
+          result.level = level;
+          result.passes = true;
+        } else {
+          result.tile.clear();
+          search.fail(group[i].search, level, total);
+          candidates.push_back(std::move(group[i]));
+        }
+      }
+    }
+  }
+}
+
+std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, float tolerance,
+                                                    const opencl::DeviceArray<std::uint8_t>& selected,
+                                                    bool gold_too) {
+  std::vector<BrickClass> out;
+  for (const BrickMeasure& m : measure(base, tolerance, selected)) {
+    BrickClass c;
+    c.base = m;
+    c.base.violated = 0;
+    c.passes = m.total < 0 || m.total <= tolerance;
+    out.push_back(std::move(c));
+  }
+  std::vector<std::int64_t> open;
+  for (const BrickClass& c : out)
+    if (!c.passes) open.push_back(c.base.brick);
+  const auto errors = axis_errors(open);
+  std::vector<Candidate> candidates;
+  for (BrickClass& c : out)
+    if (!c.passes) {
+      c.along = errors[candidates.size()];
+      candidates.push_back({&c, {c.along, c.base.slack}});
+    }
+  try_levels(candidates, TripleSearch(settings_), tolerance);
+
+  // A tile needs a level above 0, even where the base is gold.
+  LevelTriple finest = settings_.finest();
+  if (finest == LevelTriple{0, 0, 0}) finest = {1, 1, 1};
+  std::vector<std::int64_t> bricks;
+  std::vector<BrickClass*> results;
+  for (BrickClass& c : out) {
+    if (c.passes) continue;
+    c.level = finest;
+    bricks.push_back(c.base.brick);
+    results.push_back(&c);
+  }
+  if (gold_too) give_tiles(results, copy_tiles(finest, bricks, nullptr));
+  return out;
+}
+
+std::vector<std::pair<float, float>> GoldStream::Batch::largest_p() {
+  const auto p = p_.to_host();
+  const std::int64_t g = settings_.granularity, rate = settings_.rate, cells_x = bricks_x_ * g,
+                     cells_y = bricks_y_ * g, cells_z = (shape_.nz - 1) / rate;
+  std::vector<std::pair<float, float>> out;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    std::pair<float, float> range{0.0f, INFINITY};
+    for (std::int64_t k = z * g; k < std::min((z + 1) * g, cells_z); ++k)
+      for (std::int64_t j = y * g; j < (y + 1) * g; ++j)
+        for (std::int64_t i = x * g; i < (x + 1) * g; ++i) {
+          const float v = p[at(((b * cells_z + k) * cells_y + j) * cells_x + i)];
+          range = {std::max(range.first, v), std::min(range.second, v)};
+        }
+    out.push_back(range);
+  }
+  return out;
+}
+
+// Tiles of one level from its lattice, concatenated.
+std::vector<float> GoldStream::Batch::copy_tiles(const LevelTriple& level,
+                                                 const std::vector<std::int64_t>& bricks,
+                                                 const LevelSamples* lattice) {
+  if (bricks.empty()) return {};
+  std::vector<TileRequest> requests;
+  std::uint64_t total = 0, size = 0;
+  for (const std::int64_t brick : bricks) {
+    requests.push_back(request(brick, spacing_of(level), total));
+    size = count(std::int64_t{requests[0].side_x} * requests[0].side_y * requests[0].side_z);
+    total += size;
+  }
+  const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
+  const opencl::DeviceArray<TileRequest> on_device(state_, std::span<const TileRequest>(requests),
+                                                   "tile requests");
+  // Samples at the gold rate are gold, and gold lies as its own lattice would.
+  const VdvrLattice gold{1,
+                         1,
+                         1,
+                         to_int(shape_.halo),
+                         to_int(shape_.halo),
+                         to_int(shape_.halo),
+                         to_int(shape_.nx + 2 * shape_.halo),
+                         to_int(shape_.ny + 2 * shape_.halo),
+                         to_int(shape_.gold_stride)};
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, VdvrLattice,
+                 cl_float>
+      kernel(state_, "gold/classify", "extract_tiles", brick_nodes());
+  kernel({{size, requests.size(), 1}, {64, 1, 1}}, out.buffer(),
+         (lattice ? lattice->samples : gold_).buffer(), margin_.buffer(), on_device.buffer(),
+         to_int(static_cast<std::int64_t>(requests.size())), to_int(shape_.nx), to_int(shape_.ny),
+         to_int(shape_.halo), lattice ? lattice->shape : gold, static_cast<cl_float>(-settings_.kept()));
+  return out.to_host();
+}
+
+std::vector<float> GoldStream::Batch::extract(
+    const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
+  std::map<LevelTriple, std::vector<std::size_t>> by_level;
+  for (std::size_t i = 0; i < tiles.size(); ++i) by_level[tiles[i].second].push_back(i);
+  std::vector<std::vector<float>> parts(tiles.size());
+  for (const auto& [level, members] : by_level) {
+    std::vector<std::int64_t> bricks;
+    for (const std::size_t i : members) bricks.push_back(tiles[i].first);
+    const bool is_gold = spacing_of(level) == Index3{1, 1, 1};
+    const auto samples = copy_tiles(level, bricks, is_gold ? nullptr : &lattice(level, bricks));
+    const std::size_t size = samples.size() / members.size();
+    for (std::size_t i = 0; i < members.size(); ++i)
+      parts[members[i]].assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
+                               samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
+  }
+  std::vector<float> out;
+  for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
+  return out;
+}
+
+void GoldStream::Batch::fit_base(std::vector<float>& base) {
+  const Grid& grid = settings_.grid;
+  const Index3 n = grid.samples();
+  const std::int64_t g = settings_.granularity, rate = settings_.rate;
+  const LevelSamples& fitted = lattice({0, 0, 0}, bricks_);
+  const VdvrLattice& l = fitted.shape;
+  const std::vector<float> samples = fitted.samples.to_host(), &margins = margins_;
+  const auto kept = static_cast<float>(-kept_margin(grid, 1));
+  for (std::size_t b = 0; b < first_brick_.size(); ++b) {
+    const auto& first = first_brick_[b];
+    for (std::int64_t z = 0; z <= std::min(bricks_z_ * g, grid.cells[2] - first[2] * g); ++z)
+      for (std::int64_t y = 0; y <= std::min(bricks_y_ * g, grid.cells[1] - first[1] * g); ++y)
+        for (std::int64_t x = 0; x <= std::min(bricks_x_ * g, grid.cells[0] - first[0] * g); ++x) {
+          const std::int64_t column =
+              (static_cast<std::int64_t>(b) * (shape_.ny + 2 * shape_.halo) + y * rate + shape_.halo) *
+                  (shape_.nx + 2 * shape_.halo) +
+              x * rate + shape_.halo;
+          if (!(margins[at(column)] >= kept)) continue;
+          const std::int64_t from =
+              ((static_cast<std::int64_t>(b) * l.cy + y + l.reach_y) * l.cx + x + l.reach_x) * l.cz + z +
+              l.reach_z;
+          base[at(((first[2] * g + z) * n[1] + first[1] * g + y) * n[0] + first[0] * g + x)] =
+              samples[at(from)];
+        }
+  }
+}
+
+float GoldStream::Batch::largest_value() const {
+  const std::vector<float> gold = gold_.to_host(), margins = margin_.to_host();
+  const std::int64_t h = shape_.halo, wide = shape_.nx + 2 * h, deep = shape_.ny + 2 * h;
+  float largest = 0;
+  for (std::int64_t column = 0; column < shape_.count * wide * deep; ++column) {
+    if (!(margins[at(column)] >= 0)) continue;
+    for (std::int64_t z = std::max(-h, shape_.z_first); z <= std::min(shape_.nz - 1 + h, shape_.z_last); ++z)
+      largest = std::max(largest, std::fabs(gold[at(column * shape_.gold_stride + z + h)]));
+  }
+  return largest;
+}
+
+}  // namespace vdvr

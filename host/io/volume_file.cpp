@@ -1,0 +1,142 @@
+// Uniform volumes as MetaImage or NRRD: any scalar type in, float32 out; volume_stack.cpp reads the rest.
+// Layout float samples[z][y][x], x fastest. Called by `simulate --volume`, `probe`, `render --method dvr`,
+// `reconstruct`, `export`.
+#include "vdvr/volume_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <vector>
+
+#include "host/io/raster_file.hpp"
+#include "host/io/volume_stack.hpp"
+#include "host/system/atomic_file.hpp"
+#include "host/system/limits.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+std::string mha_header(const Grid& grid) {
+  const Index3 n = grid.samples();
+  const bool known = grid.unit == "mm" || grid.unit == "um" || grid.unit == "cm";
+  const std::string unit = known ? "DistanceUnits = " + grid.unit : "Comment = unit: " + grid.unit;
+  return fmt::format(
+      "ObjectType = Image\nNDims = 3\n{}\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData "
+      "= False\n"
+      "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {} {} {}\nElementSpacing = {} {} {}\nDimSize = {} {} "
+      "{}\n"
+      "ElementType = MET_FLOAT\nElementDataFile = LOCAL\n",
+      unit, grid.origin[0], grid.origin[1], grid.origin[2], grid.spacing[0], grid.spacing[1], grid.spacing[2],
+      n[0], n[1], n[2]);
+}
+
+std::string nrrd_header(const Grid& grid) {
+  const Index3 n = grid.samples();
+  return fmt::format(
+      "NRRD0004\ntype: float\ndimension: 3\nspace dimension: 3\nsizes: {} {} {}\n"
+      "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nspace units: \"{}\" \"{}\" "
+      "\"{}\"\n"
+      "endian: little\nencoding: raw\nspace origin: ({},{},{})\n\n",
+      n[0], n[1], n[2], grid.spacing[0], grid.spacing[1], grid.spacing[2], grid.unit, grid.unit, grid.unit,
+      grid.origin[0], grid.origin[1], grid.origin[2]);
+}
+
+void append_little_endian(std::ofstream& file, const std::vector<float>& samples) {
+  if constexpr (std::endian::native == std::endian::little) {
+    file.write(reinterpret_cast<const char*>(samples.data()),
+               static_cast<std::streamsize>(samples.size() * sizeof(float)));
+  } else {
+    for (const float sample : samples) {
+      const auto bits = std::bit_cast<std::uint32_t>(sample);
+      for (int b = 0; b < 4; ++b) file.put(static_cast<char>(bits >> (8 * b)));
+    }
+  }
+}
+
+}  // namespace
+
+bool is_volume_input(const std::filesystem::path& path) {
+  return is_volume_path(path) || is_tiff_path(path) || hdf5_volume_path(path) || is_tiff_folder(path);
+}
+
+std::filesystem::path file_of_volume(const std::filesystem::path& path) {
+  const auto parts = hdf5_volume_path(path);
+  return parts ? parts->first : path;
+}
+
+bool is_volume_path(const std::filesystem::path& path) {
+  const std::string e = extension_of(path);
+  return e == ".mha" || e == ".mhd" || e == ".nrrd" || e == ".nhdr";
+}
+
+Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  if (const auto parts = hdf5_volume_path(path))
+    return read_hdf5_volume(parts->first, parts->second, max_memory_bytes);
+  if (is_tiff_path(path) || is_tiff_folder(path)) return read_tiff_volume(path, max_memory_bytes);
+  if (!is_volume_path(path))
+    throw FileError(fmt::format(
+        "{}: not a volume by its name (.mha, .mhd, .nrrd, .nhdr, .tif, FILE.h5:/dataset, a folder "
+        "of TIFF slices)",
+        path.string()));
+  io::RasterSamples source(io::read_raster_header(path), max_memory_bytes);
+  const io::RasterHeader& header = source.header();
+  Volume volume;
+  for (std::size_t a = 0; a < 3; ++a) {
+    // One sample bounds no cell, so there is nothing to interpolate in.
+    if (header.samples[a] < 2)
+      throw FileError(fmt::format("{}: {} samples, but each axis needs at least two", path.string(),
+                                  io::shape_text(header.samples)));
+    volume.grid.cells[a] = header.samples[a] - 1;
+  }
+  volume.grid.origin = header.origin;
+  volume.grid.spacing = header.spacing;
+  if (!header.unit.empty()) volume.grid.unit = header.unit;
+  const std::uint64_t bytes = io::checked_bytes(header.samples, sizeof(float), path.string());
+  io::require_memory(bytes, max_memory_bytes, path.string());
+  volume.samples.resize(bytes / sizeof(float));
+  std::vector<double> block(
+      static_cast<std::size_t>(std::min<std::int64_t>(1 << 20, volume.grid.sample_count())));
+  for (std::size_t first = 0; first < volume.samples.size(); first += block.size()) {
+    const std::size_t n = std::min(block.size(), volume.samples.size() - first);
+    source.read(static_cast<std::int64_t>(first), static_cast<std::int64_t>(n), block.data());
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto value = static_cast<float>(block[i]);
+      if (!std::isfinite(value))
+        throw FileError(
+            fmt::format("{}: sample {} is {}, not a finite float", path.string(), first + i, block[i]));
+      volume.samples[first + i] = value;
+    }
+  }
+  return volume;
+}
+
+void write_volume(const std::filesystem::path& path, const Volume& volume) {
+  const std::string extension = extension_of(path);
+  if (extension != ".mha" && extension != ".nrrd")
+    throw InputError(fmt::format("{}: volumes are written as .mha or .nrrd", path.string()));
+  if (static_cast<std::int64_t>(volume.samples.size()) != volume.grid.sample_count())
+    throw InputError(fmt::format("{}: {} samples for a grid of {}", path.string(), volume.samples.size(),
+                                 io::shape_text(volume.grid.samples())));
+  if (volume.grid.unit.find_first_of("\n\r\"") != std::string::npos)
+    throw InputError(fmt::format("{}: a unit may not hold quotes or line ends", path.string()));
+  io::AtomicFile target(path);
+  std::ofstream file(target.temporary(), std::ios::binary | std::ios::trunc);
+  file << (extension == ".mha" ? mha_header(volume.grid) : nrrd_header(volume.grid));
+  append_little_endian(file, volume.samples);
+  file.close();
+  if (!file) throw ResourceError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+  target.commit();
+}
+
+}  // namespace vdvr

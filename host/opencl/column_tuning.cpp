@@ -1,0 +1,25 @@
+// The recorded table of launch parameters. A row is what `vdvr bench tune` found fastest on a device of that
+// class.
+#include "host/opencl/column_tuning.hpp"
+
+namespace vdvr {
+namespace {
+
+// CPUs: vectors of z per work-item, and eight columns that share positions; two vectors share the weights.
+// Measured with PoCL 3.1 on AVX-512. GPUs: neighbouring work-items take neighbouring z, so that loads
+// coalesce, and their FFTs outrun a dense product; reasoned, not measured.
+const ColumnTuning recorded[] = {
+    {.device_class = "cpu",
+     .lanes = 16,
+     .tile = 8,
+     .vectors = 2,
+     .local = {1, 16, 16},
+     .product_columns = 2048},
+    {.device_class = "gpu", .lanes = 1, .tile = 1, .vectors = 1, .local = {32, 4, 2}, .product_columns = 0},
+};
+
+}  // namespace
+
+ColumnTuning column_tuning(const DeviceInfo& device) { return recorded[device.is_gpu ? 1 : 0]; }
+
+}  // namespace vdvr

@@ -1,0 +1,27 @@
+// How the kernels that carry columns of z are launched, by device class: never changes what they compute
+// beyond rounding. Called by the launchers of back_project.cl and batched_product.cl, filter_rows.cpp and
+// gold_stream.cpp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "vdvr/device.hpp"
+
+namespace vdvr {
+
+/// One row of the recorded table (host/opencl/column_tuning.cpp); `vdvr bench tune` measures candidates.
+struct ColumnTuning {
+  std::string device_class = "cpu";
+  int lanes = 16;   ///< samples of z per work-item: VDVR_LANES
+  int tile = 8;     ///< columns of a back-projection's work-item: VDVR_TILE, 1 or 8
+  int vectors = 1;  ///< of z per work-item of a back-projection: VDVR_VECTORS, 1 or 2
+  std::array<std::uint64_t, 3> local{1, 16, 16};  ///< work-group
+  /// Rows of at most so many columns are ramp-filtered by a matrix product, others by FFT.
+  std::int64_t product_columns = 2048;
+};
+
+ColumnTuning column_tuning(const DeviceInfo& device);
+
+}  // namespace vdvr

@@ -1,0 +1,245 @@
+#include "host/picture/error_slice.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/picture/bitmap_font.hpp"
+#include "host/volume/region_of_interest.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/reconstruct.hpp"
+
+namespace vdvr {
+namespace {
+
+using Colour = std::array<std::uint8_t, 3>;
+
+constexpr Colour kPaper{24, 24, 24}, kInk{230, 230, 230}, kNotCompared{64, 64, 64};
+constexpr Colour kAbove{0, 255, 255};  // above the tolerance: a hue that the map does not have
+constexpr std::int64_t kCaption = kErrorCaption, kMargin = 8, kBar = 10;
+
+/// Dark to light with rising luminance, so that it reads in print too; e in [0, 1].
+Colour error_colour(double e) {
+  static constexpr std::array<std::array<double, 3>, 5> stops{
+      {{0, 0, 8}, {80, 18, 120}, {190, 55, 85}, {248, 142, 10}, {252, 255, 165}}};
+  const double x = std::clamp(e, 0.0, 1.0) * 4;
+  const auto i = std::min<std::size_t>(3, static_cast<std::size_t>(x));
+  const double t = x - static_cast<double>(i);
+  Colour c{};
+  for (std::size_t k = 0; k < 3; ++k)
+    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * stops[i][k] + t * stops[i + 1][k]));
+  return c;
+}
+
+void put(Image& image, std::int64_t x, std::int64_t y, const Colour& colour) {
+  std::copy(colour.begin(), colour.end(), image.rgb.begin() + (y * image.width + x) * 3);
+}
+
+/// The slice's own axes as the slice pictures have them: across z, x to the right and y down; otherwise z
+/// down.
+struct Axes {
+  std::size_t across, down, normal;
+};
+Axes axes_of(int axis) {
+  if (axis == 2) return {0, 1, 2};
+  return axis == 1 ? Axes{0, 2, 1} : Axes{1, 2, 0};
+}
+
+/// Pixels of the slice, as the samples of a grid that is one thin cell thick.
+struct PixelGrid {
+  Grid grid;
+  std::int64_t width = 0, height = 0;
+  std::size_t plane = 0;  ///< 0 or 1: which of the grid's two planes is the slice
+};
+
+PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o) {
+  const Axes a = axes_of(o.axis);
+  const auto length = [&](std::size_t k) { return static_cast<double>(volume.cells[k]) * volume.spacing[k]; };
+  const double lo = volume.origin[a.normal], hi = lo + length(a.normal);
+  if (!(o.position >= lo && o.position <= hi))
+    throw InputError(
+        fmt::format("the slice at {} misses the volume, which reaches from {} to {}", o.position, lo, hi));
+  const std::int64_t wide = o.width, high = o.height - kCaption;
+  if (wide < 160 || high < 16)
+    throw InputError(fmt::format("an error picture needs at least 160x{} pixels, not {}x{}", 16 + kCaption,
+                                 o.width, o.height));
+  const double pixel =
+      std::max(length(a.across) / static_cast<double>(wide), length(a.down) / static_cast<double>(high));
+  const auto count = [&](std::size_t k) {
+    return std::max<std::int64_t>(2, std::llround(length(k) / pixel));
+  };
+  PixelGrid p;
+  p.width = std::min(wide, count(a.across));
+  p.height = std::min(high, count(a.down));
+  p.grid.unit = volume.unit;
+  const auto lay = [&](std::size_t k, std::int64_t n) {
+    // Pixel centres, half a pixel inside the box.
+    p.grid.spacing[k] = length(k) / static_cast<double>(n);
+    p.grid.origin[k] = volume.origin[k] + 0.5 * p.grid.spacing[k];
+    p.grid.cells[k] = n - 1;
+  };
+  lay(a.across, p.width);
+  lay(a.down, p.height);
+  p.grid.cells[a.normal] = 1;
+  p.grid.spacing[a.normal] = std::min(pixel, 0.5 * (hi - lo));
+  p.plane = o.position + p.grid.spacing[a.normal] > hi ? 1 : 0;
+  p.grid.origin[a.normal] = o.position - static_cast<double>(p.plane) * p.grid.spacing[a.normal];
+  return p;
+}
+
+/// A number in the characters that the caption's font has.
+std::string number(double value) { return fmt::format("{:.4g}", value); }
+
+void draw_caption(Image& image, double epsilon, const std::string& text) {
+  const std::string low = "0", high = fmt::format("epsilon {}", number(epsilon));
+  const std::int64_t top = image.height - kCaption + kMargin;
+  const std::int64_t left = kMargin + std::int64_t{2} * kFontAdvance;
+  const std::int64_t right =
+      image.width - kMargin - static_cast<std::int64_t>(high.size() + 1) * kFontAdvance;
+  draw_text(image, kMargin, top + 1, low, 1, kInk);
+  draw_text(image, right + kFontAdvance, top + 1, high, 1, kInk);
+  for (std::int64_t x = left; x < right; ++x)
+    for (std::int64_t y = top; y < top + kBar; ++y)
+      put(image, x, y, error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
+  const int scale =
+      static_cast<std::int64_t>(text.size()) * kFontAdvance * 2 + 2 * kMargin <= image.width ? 2 : 1;
+  draw_text(image, kMargin, top + kBar + 6, text, scale, kInk);
+}
+
+ErrorSlice empty_slice(const ErrorSliceOptions& o) {
+  ErrorSlice s;
+  s.image = {o.width, o.height, {}};
+  s.image.rgb.resize(static_cast<std::size_t>(o.width * o.height * 3));
+  for (std::int64_t i = 0; i < o.width * o.height; ++i) put(s.image, i, 0, kPaper);
+  s.errors = {o.width, o.height - kCaption, {}};
+  s.errors.values.assign(static_cast<std::size_t>(s.errors.width * s.errors.height),
+                         std::numeric_limits<float>::quiet_NaN());
+  return s;
+}
+
+/// Compares every pixel and colours it.
+void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, const Volume& f,
+             const ParallelGeometry& geometry, const MixedVolume& volume, const Certificate& c) {
+  const double center = c.field.center.value_or(geometry.center);
+  const Index3 samples = pixels.grid.samples();
+  const std::int64_t left = (result.image.width - pixels.width) / 2;
+  const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
+  for (std::int64_t y = 0; y < pixels.height; ++y) {
+    for (std::int64_t x = 0; x < pixels.width; ++x) {
+      Index3 at{};
+      at[axes.across] = x;
+      at[axes.down] = y;
+      at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
+      const Vec3 point = pixels.grid.position(at);
+      const double truth = static_cast<double>(
+          f.samples[static_cast<std::size_t>((at[2] * samples[1] + at[1]) * samples[0] + at[0])]);
+      const bool compared = is_covered(geometry, center, point) && is_inside(c.roi, point) &&
+                            (!c.window || (truth >= c.window->first && truth <= c.window->second));
+      if (!compared) {
+        put(result.image, left + x, top + y, kNotCompared);
+        continue;
+      }
+      const double error = std::abs(static_cast<double>(sample_at(volume, point)) - truth);
+      ++result.pixels;
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] =
+          static_cast<float>(error);
+      if (std::isnan(error) || error > result.max_error) {  // a NaN stays the largest
+        result.max_error = error;
+      }
+      const bool within = error <= c.epsilon_abs;
+      put(result.image, left + x, top + y, within ? error_colour(error / c.epsilon_abs) : kAbove);
+    }
+  }
+}
+
+}  // namespace
+
+ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                       const Certificate& certificate, const ErrorSliceOptions& options,
+                       const Progress& progress) {
+  const PixelGrid pixels = pixel_grid(volume.grid, options);
+  const ReconstructOptions exact{certificate.field, 16, "cubic"};
+  const Volume f = reconstruct(device, scan, pixels.grid, exact, progress);
+  ErrorSlice result = empty_slice(options);
+  compare(result, pixels, axes_of(options.axis), f, scan.geometry, volume, certificate);
+  draw_caption(result.image, certificate.epsilon_abs,
+               fmt::format("largest |V - F| = {} = {:.1f} % of epsilon, at {} = {}", number(result.max_error),
+                           100 * result.max_error / certificate.epsilon_abs, "xyz"[options.axis],
+                           number(options.position)));
+  return result;
+}
+
+namespace {
+
+/// By brick, or of all bricks alike; infinite where nothing is known.
+std::vector<float> bounds_of(const MixedVolume& volume, const Certificate& c, bool image3d) {
+  if (image3d && !c.total_image3d)
+    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+  if (!c.brick_totals.empty()) return brick_bounds(c, image3d);
+  return std::vector<float>(volume.level.size(),
+                            static_cast<float>(image3d ? *c.total_image3d : c.total_buffer));
+}
+
+Colour bound_colour(float bound, double epsilon) {
+  if (!std::isfinite(bound)) return kNotCompared;
+  const auto b = static_cast<double>(bound);
+  return b <= epsilon ? error_colour(b / epsilon) : kAbove;
+}
+
+std::string share_text(double bound, double epsilon) {
+  return fmt::format("|V - F| <= {} = {:.1f} % of epsilon", number(bound), 100 * bound / epsilon);
+}
+
+}  // namespace
+
+ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool image3d,
+                       const ErrorSliceOptions& options) {
+  const std::vector<float> bounds = bounds_of(volume, c, image3d);
+  const Index3 n = volume.bricks();
+  const PixelGrid pixels = pixel_grid(volume.grid, options);
+  const Axes axes = axes_of(options.axis);
+  ErrorSlice result = empty_slice(options);
+  const std::int64_t left = (result.image.width - pixels.width) / 2;
+  const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
+  for (std::int64_t y = 0; y < pixels.height; ++y)
+    for (std::int64_t x = 0; x < pixels.width; ++x) {
+      Index3 at{};
+      at[axes.across] = x;
+      at[axes.down] = y;
+      at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
+      const Vec3 point = pixels.grid.position(at);
+      const Index3 brick = brick_at(volume, point);
+      const float bound =
+          is_inside(c.roi, point)
+              ? bounds[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
+              : std::numeric_limits<float>::infinity();
+      put(result.image, left + x, top + y, bound_colour(bound, c.epsilon_abs));
+      if (!std::isfinite(bound)) continue;
+      ++result.pixels;
+      result.max_error = std::max(result.max_error, static_cast<double>(bound));
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = bound;
+    }
+  draw_caption(result.image, c.epsilon_abs,
+               fmt::format("{} where covered, {}", share_text(result.max_error, c.epsilon_abs),
+                           image3d ? "image3d" : "buffer"));
+  return result;
+}
+
+Image bound_picture(const FloatImage& bounds, double epsilon) {
+  Image image{bounds.width, bounds.height + kCaption, {}};
+  image.rgb.resize(static_cast<std::size_t>(image.width * image.height * 3));
+  for (std::int64_t i = 0; i < image.width * image.height; ++i) put(image, i, 0, kPaper);
+  double most = 0;
+  for (std::int64_t i = 0; i < bounds.width * bounds.height; ++i) {
+    const float bound = bounds.values[static_cast<std::size_t>(i)];
+    if (std::isnan(bound)) continue;
+    put(image, i, 0, bound_colour(bound, epsilon));
+    if (std::isfinite(bound)) most = std::max(most, static_cast<double>(bound));
+  }
+  draw_caption(image, epsilon, share_text(most, epsilon) + " of what is seen");
+  return image;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,72 @@
+// Cameras. Called by the render, run and bench commands.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "vdvr/camera.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom) {
+  if (!std::isfinite(azimuth_deg) || !std::isfinite(elevation_deg))
+    throw InputError(
+        fmt::format("--azimuth {} and --elevation {} must be finite", azimuth_deg, elevation_deg));
+  if (!(zoom > 0) || !std::isfinite(zoom)) throw InputError(fmt::format("--zoom {} must be positive", zoom));
+  double diagonal2 = 0;
+  Camera camera;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double side = static_cast<double>(grid.cells[a]) * grid.spacing[a];
+    camera.focal_point[a] = grid.origin[a] + side / 2;
+    diagonal2 += side * side;
+  }
+  const double degree = std::numbers::pi / 180;
+  // Whole quarter turns give exact zeros, so that rays run parallel to the axes where the user means them to.
+  const auto sine = [&](double deg) { return std::fmod(deg, 180) == 0 ? 0.0 : std::sin(deg * degree); };
+  const auto cosine = [&](double deg) {
+    return std::fmod(std::abs(deg), 180) == 90 ? 0.0 : std::cos(deg * degree);
+  };
+  const double ca = cosine(azimuth_deg), sa = sine(azimuth_deg), ce = cosine(elevation_deg),
+               se = sine(elevation_deg);
+  // As in VTK: a positive azimuth moves the camera to its right, a positive elevation towards view-up, here
+  // -z.
+  const Vec3 towards_eye{ce * sa, ce * ca, -se};
+  const double half_angle = camera.view_angle_deg / 2 * degree;
+  const double distance = std::sqrt(diagonal2) / 2 / std::sin(half_angle);
+  for (std::size_t a = 0; a < 3; ++a) camera.position[a] = camera.focal_point[a] + distance * towards_eye[a];
+  // The derivative of towards_eye by elevation: -z at elevation 0, and defined at the poles too.
+  camera.view_up = {-se * sa, -se * ca, -ce};
+  camera.view_angle_deg = 2 * std::atan(std::tan(half_angle) / zoom) / degree;
+  return camera;
+}
+
+Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optional<Vec3>& view_up,
+               double view_angle_deg) {
+  Camera camera{position, focal_point, view_up.value_or(Vec3{0, 0, -1}), view_angle_deg};
+  const auto finite = [](const Vec3& v) {
+    return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
+  };
+  if (!finite(position) || !finite(focal_point) || !finite(camera.view_up))
+    throw InputError("the camera's position, focal point and view-up must be finite");
+  if (!(view_angle_deg > 0 && view_angle_deg < 180))
+    throw InputError(
+        fmt::format("--camera-view-angle {} must lie between 0 and 180 degrees", view_angle_deg));
+  const Vec3 view{focal_point[0] - position[0], focal_point[1] - position[1], focal_point[2] - position[2]};
+  const Vec3& up = camera.view_up;
+  const double length = std::hypot(view[0], view[1], view[2]), up_length = std::hypot(up[0], up[1], up[2]);
+  if (!(length > 0)) throw InputError("--camera-position and --camera-focal-point are the same point");
+  const double across = std::hypot(view[1] * up[2] - view[2] * up[1], view[2] * up[0] - view[0] * up[2],
+                                   view[0] * up[1] - view[1] * up[0]);
+  constexpr double parallel = 1e-6;  // of the sine between them: fp32 rays turn by less
+  if (across > parallel * length * up_length) return camera;
+  if (view_up)
+    throw InputError(up_length > 0 ? "--camera-view-up is parallel to the direction of view; choose another"
+                                   : "--camera-view-up is 0,0,0; it must have a direction");
+  // As a slice across z shows it: seen from -z, x to the right and y down.
+  camera.view_up = {0, view[2] > 0 ? -1.0 : 1.0, 0};
+  return camera;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,33 @@
+// Uploads a stored field as it is stored: integers stay integers.
+#include "host/sampler/device_field.hpp"
+
+namespace vdvr {
+
+opencl::Defines field_defines(const MixedVolume& v, RecordKind records) {
+  return {{"VDVR_SAMPLE_TYPES", std::to_string(sample_types(v))},
+          {"VDVR_RECORDS", std::to_string(static_cast<int>(records))}};
+}
+
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
+    : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v))) {}
+
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records)
+    : samples(state, sample_buffer_bytes(v), "certified samples"),
+      bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
+      grid(sampler_grid(v)),
+      defines(field_defines(v, records.kind())) {
+  const auto put = [&](const SampleBlock& block, std::uint64_t first) {
+    samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
+  };
+  put(v.base, 0);
+  const auto offsets = tile_offsets(v);
+  for (const auto& [triple, block] : v.tiles) put(block, offsets.at(triple));
+}
+
+opencl::Defines coarse_defines(const VdvrGrid& grid) {
+  return {{"VDVR_COARSE_X", std::to_string(grid.coarse_x)},
+          {"VDVR_COARSE_Y", std::to_string(grid.coarse_y)},
+          {"VDVR_COARSE_Z", std::to_string(grid.coarse_z)}};
+}
+
+}  // namespace vdvr

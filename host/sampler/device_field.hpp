@@ -1,0 +1,26 @@
+// A stored field on the device: sample buffer, brick records, and what kernels must be compiled for to read
+// them. Called by gold_stream.cpp, verify_field.cpp and resident_volume.cpp; read by mixed_sampler.h.
+#pragma once
+
+#include "host/opencl/array.hpp"
+#include "host/volume/brick_layout.hpp"
+
+namespace vdvr {
+
+/// VDVR_SAMPLE_TYPES and VDVR_RECORDS: what kernels that read this volume through such records are compiled
+/// for.
+opencl::Defines field_defines(const MixedVolume& volume, RecordKind records);
+
+struct DeviceField {
+  DeviceField(opencl::State& state, const MixedVolume& volume);
+  DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records);
+  opencl::DeviceArray<std::uint8_t> samples;  ///< host/volume/brick_layout.hpp
+  opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
+  VdvrGrid grid;
+  opencl::Defines defines;  ///< field_defines()
+};
+
+/// VDVR_COARSE_X, _Y, _Z, for kernels that read bricks through packet_sampler.h.
+opencl::Defines coarse_defines(const VdvrGrid& grid);
+
+}  // namespace vdvr

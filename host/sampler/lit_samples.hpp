@@ -1,0 +1,53 @@
+// Lit samples: the stored field on the device as float32 with its gradient beside each sample, 8 bytes
+// together, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it is
+// stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
+#pragma once
+
+#include <vector>
+
+#include "host/sampler/device_field.hpp"
+#include "shared/lit_params.h"
+
+namespace vdvr {
+
+/// Where lit samples lie; from levels alone. Host only.
+class LitLayout {
+ public:
+  explicit LitLayout(const MixedVolume& volume);
+  [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  [[nodiscard]] std::uint64_t bytes() const;  ///< samples and records on the device
+  /// No brick has a tile, and the base is as fine as the grid.
+  [[nodiscard]] bool is_uniform() const { return is_uniform_; }
+
+ private:
+  friend class LitSamples;
+  struct Block {
+    VdvrLitBlock params;
+    std::vector<std::uint32_t> bricks;  ///< of its tiles
+  };
+  std::vector<Block> blocks_;           ///< base first
+  std::vector<std::uint32_t> records_;  ///< two words a brick (mixed_sampler.h)
+  std::uint64_t samples_ = 0;
+  bool is_uniform_ = false;
+};
+
+class LitSamples {
+ public:
+  /// `range`: width of the field's values, which sets the unit of gradients: components up to half of it per
+  /// smallest spacing fit, to 1/1022 of it; longer gradients keep their direction. Throws ResourceError.
+  /// Cost: some tens of nanoseconds a sample and core.
+  LitSamples(opencl::State& state, const DeviceField& field, const LitLayout& layout, const Grid& world,
+             float range);
+  [[nodiscard]] const cl::Buffer& samples() const { return samples_.buffer(); }
+  [[nodiscard]] const cl::Buffer& bricks() const { return bricks_.buffer(); }
+  /// `step` is the unit of gradients, per density and smallest spacing.
+  [[nodiscard]] const VdvrGrid& grid() const { return grid_; }
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  opencl::DeviceArray<cl_uint2> samples_;
+  opencl::DeviceArray<std::uint32_t> bricks_;
+  VdvrGrid grid_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,288 @@
+// What the device's texture unit does to weights and constants, and which sampler is faster (method:
+// docs/error-bounds.md, samplers). Called by `devices --probe`, the certificate's sampler term and raycast()
+// for --sampler auto. Launches: read_points, rate_image, rate_buffer of kernels/sampler/probe_sampler.cl.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <random>
+
+#include "host/opencl/kernel.hpp"
+#include "vdvr/sampler.hpp"
+
+namespace vdvr {
+namespace {
+
+using opencl::DeviceArray;
+
+constexpr std::uint32_t kSide = 64;
+const opencl::Defines kDefines{{"VDVR_SAMPLE_TYPES", "1"}};  // the rates are those of float32
+
+struct ProbePoint {
+  std::array<std::uint32_t, 3> cell{};
+  std::array<double, 3> fraction{};
+};
+
+// A cube of samples, as the device reads them.
+struct Tile {
+  std::vector<double> truth;
+  cl::Image3D image;
+};
+
+template <class T>
+cl::Image3D make_image(opencl::State& state, const std::vector<T>& values, cl_channel_type format) {
+  const DeviceArray<T> staged(state, std::span<const T>(values), "probe tile");
+  try {
+    cl::Image3D image(state.context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, format), kSide, kSide, kSide);
+    state.queue.enqueueCopyBufferToImage(staged.buffer(), image, 0, cl::array<cl::size_type, 3>{0, 0, 0},
+                                         cl::array<cl::size_type, 3>{kSide, kSide, kSide});
+    state.queue.finish();
+    return image;
+  } catch (const cl::Error& e) {
+    throw DeviceError(fmt::format("probe image of {}^3 texels on '{}': {} {}", kSide, state.info.name,
+                                  e.what(), opencl::code_name(e.err())));
+  }
+}
+
+// Values in [0, 1], rounded to what a normalised format holds.
+template <class T>
+Tile make_normalised(opencl::State& state, const std::vector<float>& values, cl_channel_type format) {
+  constexpr double most = std::numeric_limits<T>::max();
+  Tile tile;
+  std::vector<T> codes;
+  for (const float v : values) {
+    codes.push_back(static_cast<T>(std::lround(std::clamp(static_cast<double>(v), 0.0, 1.0) * most)));
+    tile.truth.push_back(codes.back() / most);
+  }
+  tile.image = make_image(state, codes, format);
+  return tile;
+}
+
+Tile make_tile(opencl::State& state, const std::vector<float>& values, SampleType type) {
+  if (type == SampleType::u16) return make_normalised<std::uint16_t>(state, values, CL_UNORM_INT16);
+  if (type == SampleType::u8) return make_normalised<std::uint8_t>(state, values, CL_UNORM_INT8);
+  return {{values.begin(), values.end()}, make_image(state, values, CL_FLOAT)};
+}
+
+std::vector<float> cube(const std::function<double(double, double, double)>& f) {
+  std::vector<float> values;
+  values.reserve(kSide * kSide * kSide);
+  for (std::uint32_t z = 0; z < kSide; ++z)
+    for (std::uint32_t y = 0; y < kSide; ++y)
+      for (std::uint32_t x = 0; x < kSide; ++x) values.push_back(static_cast<float>(f(x, y, z)));
+  return values;
+}
+
+std::vector<float> read_points(opencl::State& state, const cl::Image3D& image,
+                               const std::vector<ProbePoint>& points) {
+  std::vector<cl_float4> where;
+  for (const auto& p : points) {
+    cl_float4 c{{0, 0, 0, 0}};
+    for (std::size_t a = 0; a < 3; ++a) c.s[a] = static_cast<float>(p.cell[a] + p.fraction[a] + 0.5);
+    where.push_back(c);
+  }
+  const DeviceArray<cl_float4> in(state, std::span<const cl_float4>(where), "probe points");
+  const DeviceArray<float> out(state, points.size(), "probe values");
+  opencl::Kernel<cl::Image3D, cl::Buffer, cl_uint, cl::Buffer> kernel(state, "sampler/probe_sampler", "read_points",
+                                                                      kDefines);
+  kernel({{points.size(), 1, 1}, {64, 1, 1}}, image, in.buffer(), static_cast<cl_uint>(points.size()),
+         out.buffer());
+  return out.to_host();
+}
+
+// Fractions are multiples of 2^-14 and coordinates below 64, so that every coordinate is exact in fp32 and
+// what is measured is the unit's, not the coordinate's rounding.
+std::vector<ProbePoint> weight_points(std::size_t axis) {
+  std::vector<ProbePoint> points;
+  for (std::uint32_t i = 0; i < (1u << 14); ++i) {
+    ProbePoint p{{7, 11, 13}, {0, 0, 0}};
+    // An odd multiplier visits every cell of the row with every kind of fraction.
+    p.cell[axis] = i * 29u % (kSide - 1);
+    p.fraction[axis] = static_cast<double>(i) * 0x1p-14;
+    points.push_back(p);
+  }
+  return points;
+}
+
+std::vector<ProbePoint> scattered_points() {
+  std::mt19937 random(20060301);
+  std::vector<ProbePoint> points(1u << 15);
+  for (auto& p : points)
+    for (std::size_t a = 0; a < 3; ++a) {
+      p.cell[a] = static_cast<std::uint32_t>(random() % (kSide - 1));
+      p.fraction[a] = static_cast<double>(random() % (1u << 14)) * 0x1p-14;
+    }
+  return points;
+}
+
+// The weight itself: a comb of 0 and 1 along one axis, constant along the others. Returns the largest error.
+double measure_weights(opencl::State& state, std::size_t axis, SampleType type) {
+  const auto tile = cube([axis](double x, double y, double z) {
+    return std::fmod(axis == 0 ? x : axis == 1 ? y : z, 2.0);
+  });
+  const auto points = weight_points(axis);
+  const auto values = read_points(state, make_tile(state, tile, type).image, points);
+  double worst = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double f = points[i].fraction[axis], truth = points[i].cell[axis] % 2 == 0 ? f : 1 - f;
+    const double error = std::abs(static_cast<double>(values[i]) - truth);
+    // NaN counts as the largest error there is.
+    if (!(error <= worst)) worst = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
+  }
+  return worst;
+}
+
+// The exact trilinear value and the cell's largest neighbour difference per axis, summed.
+std::pair<double, double> trilinear(const std::vector<double>& tile, const ProbePoint& p) {
+  const auto at = [&](std::uint32_t dx, std::uint32_t dy, std::uint32_t dz) -> double {
+    return tile[((p.cell[2] + dz) * kSide + p.cell[1] + dy) * kSide + p.cell[0] + dx];
+  };
+  double value = 0, difference = 0;
+  for (std::uint32_t c = 0; c < 8; ++c) {
+    double weight = 1;
+    for (std::size_t a = 0; a < 3; ++a) weight *= (c >> a) & 1u ? p.fraction[a] : 1 - p.fraction[a];
+    value += weight * at(c & 1u, (c >> 1) & 1u, c >> 2);
+  }
+  for (std::uint32_t a = 0; a < 3; ++a) {
+    double largest = 0;
+    for (std::uint32_t c = 0; c < 8; ++c) {
+      if ((c >> a) & 1u) continue;
+      const std::uint32_t d = c | (1u << a);
+      largest =
+          std::max(largest, std::abs(at(d & 1u, (d >> 1) & 1u, d >> 2) - at(c & 1u, (c >> 1) & 1u, c >> 2)));
+    }
+    difference += largest;
+  }
+  return {value, difference};
+}
+
+// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude, or to
+// the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
+// weights err even where all samples are equal.
+double measure_constants(opencl::State& state, double delta, SampleType type) {
+  std::mt19937 random(7);
+  const bool normalised = type != SampleType::f32;
+  std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
+  // Normalised formats hold 0 to 1 only.
+  const double offset = normalised ? 0 : 100, slope = normalised ? 0.01 : 1;
+  const std::vector<std::vector<float>> tiles{
+      cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; }),
+      cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; }),
+      cube([&](double x, double y, double z) {
+        return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
+      }),
+      cube([&](double, double, double) { return uniform(random); })};
+  const auto points = scattered_points();
+  double rho = 0;
+  for (const auto& values : tiles) {
+    const Tile tile = make_tile(state, values, type);
+    const auto read = read_points(state, tile.image, points);
+    double magnitude = normalised ? 1 : 0;
+    for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto [truth, difference] = trilinear(tile.truth, points[i]);
+      const double beyond = (std::abs(static_cast<double>(read[i]) - truth) - delta * difference) / magnitude;
+      if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
+    }
+  }
+  return rho;
+}
+
+// Charges delta; says for which class.
+std::string charge(FilterProbe& p) {
+  // A unit that rounds to 8 fraction bits may add a few ulp of its own; 2^-20 keeps it in its class.
+  constexpr double slack = 0x1p-20;
+  double least = 0;
+  std::string note;
+  if (p.weight_error <= 0x1p-22) {
+    least = 0x1p-22;
+    note = "weights in fp32";
+  } else if (p.weight_error <= 0x1p-9 + slack) {
+    least = 0x1p-9;
+    note = "weights rounded to 8 fraction bits or better";
+  } else if (p.weight_error <= 0x1p-8 + slack) {
+    least = 0x1p-8;
+    note = "weights truncated to 8 fraction bits";
+  } else {
+    least = 1.5 * p.weight_error;
+    note = fmt::format("weights err by {:.3g}, more than truncation to 8 bits; 1.5 times that is charged",
+                       p.weight_error);
+  }
+  p.delta = std::max(least, p.weight_error);
+  return note;
+}
+
+std::string measure_filter(opencl::State& state, FilterProbe& p, SampleType type) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    p.weight_error = std::max(p.weight_error, measure_weights(state, axis, type));
+  std::string note = charge(p);
+  p.constant_error = measure_constants(state, p.delta, type);
+  return note;
+}
+
+// Samples per second: the best of three runs after one that compiles and warms up.
+template <class Kernel, class Field>
+double measure_rate(opencl::State& state, Kernel& kernel, const Field& field,
+                    const DeviceArray<float>& sums) {
+  const auto count = static_cast<cl_uint>(sums.size());
+  const auto run = [&](cl_uint steps) {
+    const auto start = std::chrono::steady_clock::now();
+    kernel({{count, 1, 1}, {64, 1, 1}}, field, kSide, count, steps, sums.buffer());
+    opencl::finish(state, "sampler rate");
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  run(1);
+  // Lengthen the run until it can be timed: a GPU needs some thousand times the work of a CPU.
+  cl_uint steps = 64;
+  double seconds = run(steps);
+  while (seconds < 0.01 && steps < (1u << 16)) seconds = run(steps *= 4);
+  for (int i = 0; i < 2; ++i) seconds = std::min(seconds, run(steps));
+  return static_cast<double>(count) * steps / seconds;
+}
+
+SamplerProbe measure(opencl::State& state) {
+  SamplerProbe p;
+  const auto tile =
+      cube([](double x, double y, double z) { return std::sin(0.3 * x) * std::cos(0.2 * y) + 0.01 * z; });
+  const DeviceArray<float> samples(state, std::span<const float>(tile), "probe samples");
+  const DeviceArray<float> sums(state, 1u << 14, "probe sums");
+  opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(state, "sampler/probe_sampler",
+                                                                                  "rate_buffer", kDefines);
+  p.buffer_rate = measure_rate(state, buffer_kernel, samples.buffer(), sums);
+  p.chosen = "buffer";
+  p.image3d = state.info.linear_float_image;
+  if (!p.image3d) {
+    p.note = "no CL_R / CL_FLOAT 3D image with the linear filter";
+    return p;
+  }
+  p.note = measure_filter(state, p, SampleType::f32);
+  p.u16.image3d = state.info.linear_u16_image;
+  p.u8.image3d = state.info.linear_u8_image;
+  if (p.u16.image3d) measure_filter(state, p.u16, SampleType::u16);
+  if (p.u8.image3d) measure_filter(state, p.u8, SampleType::u8);
+  opencl::Kernel<cl::Image3D, cl_uint, cl_uint, cl_uint, cl::Buffer> image_kernel(state, "sampler/probe_sampler",
+                                                                                  "rate_image", kDefines);
+  p.image3d_rate = measure_rate(state, image_kernel, make_tile(state, tile, SampleType::f32).image, sums);
+  if (p.image3d_rate > p.buffer_rate && std::isfinite(p.weight_error)) p.chosen = "image3d";
+  return p;
+}
+
+}  // namespace
+
+SamplerProbe probe_sampler(Device& device) {
+  // By device, for the process' life: the answer belongs to the hardware and its driver, not to a context.
+  static std::mutex mutex;
+  static std::map<cl_device_id, SamplerProbe> known;
+  const std::lock_guard lock(mutex);
+  opencl::State& state = device.state();
+  const auto found = known.find(state.device());
+  if (found != known.end()) return found->second;
+  return known[state.device()] = measure(state);
+}
+
+}  // namespace vdvr

@@ -1,0 +1,123 @@
+// What ResidentVolume holds on the device, and how tiles are regrouped into 3D images.
+//
+// Atlas: one image texel[z][y][x] per sample type, CL_R of CL_FLOAT, CL_UNORM_INT16 or CL_UNORM_INT8. The
+// base volume lies at (0, 0, 0) of its type's. The tiles of a triple stand on one another along z in columns
+// of sx x sy texels; because a triple's tiles are contiguous in the sample buffer, one buffer-to-image copy
+// fills a column. Columns of one triple fill shelves along x; shelves follow one another along y, below the
+// base. So tiles of any size fit any device's limits on each axis. Called by: raycast.cpp, sampler_terms.cpp.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/render/bake.hpp"
+#include "host/sampler/device_field.hpp"
+#include "host/sampler/lit_samples.hpp"
+#include "vdvr/resident_volume.hpp"
+
+namespace vdvr {
+
+/// What a device allows for the atlas; tests pass small ones.
+struct ImageLimits {
+  std::array<bool, 3> linear{false, false, false};  ///< by SampleType: readable with the linear filter
+  std::array<std::uint64_t, 3> size{0, 0, 0};       ///< texels, x, y, z
+  std::uint64_t image_bytes = 0;                    ///< of one image
+  std::uint64_t bytes = 0;                          ///< of all
+};
+ImageLimits image_limits(const DeviceInfo& info, std::uint64_t memory_left);
+
+/// The columns of one triple's tiles.
+struct AtlasShelves {
+  std::array<std::uint64_t, 3> tile{1, 1, 1};  ///< texels, x, y, z
+  std::uint64_t first_y = 0;                   ///< of its first shelf
+  std::uint64_t columns_per_shelf = 1, tiles_per_column = 1, tiles = 0;
+
+  /// Texel of tile i's first sample.
+  [[nodiscard]] std::array<std::uint64_t, 3> origin(std::uint64_t i) const {
+    const std::uint64_t column = i / tiles_per_column;
+    return {column % columns_per_shelf * tile[0], first_y + column / columns_per_shelf * tile[1],
+            i % tiles_per_column * tile[2]};
+  }
+};
+
+struct AtlasLayout {
+  bool fits = false;
+  std::string reason;  ///< why it does not, or its size
+  /// Texels x, y, z of the image of each SampleType; 0 where the volume has no such samples.
+  std::array<std::array<std::uint64_t, 3>, 3> size{};
+  std::map<TileKind, AtlasShelves> shelves;  ///< in the image of the tiles' type
+  [[nodiscard]] std::uint64_t bytes() const;
+  /// The longest side of any image.
+  [[nodiscard]] std::uint64_t longest() const;
+};
+/// The smallest atlas found within the limits. Host only; microseconds to milliseconds.
+AtlasLayout pack_atlas(const MixedVolume& volume, const ImageLimits& limits);
+
+/// Distance of each brick, in bricks (largest axis), to the nearest one of another class, at most 255; 0 for
+/// bricks of class 0. [bz][by][bx].
+std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& classes, const Index3& bricks);
+
+struct ResidentVolume::Impl {
+  Impl(Device& device, const MixedVolume& volume, const ImageLimits& limits);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  /// The atlas by SampleType, built on first use; types that do not occur share another's image. Throws
+  /// ResourceError when the device has no room for it any more.
+  const std::array<cl::Image3D, 3>& atlas();
+  /// As DeviceField::defines, for kernels that read the atlas.
+  [[nodiscard]] const opencl::Defines& atlas_defines() const { return atlas_defines_; }
+  /// Brick records whose places are texels; after atlas().
+  const cl::Buffer& atlas_bricks() const { return atlas_bricks_.buffer(); }
+  /// Samples with gradients, made on first use. Throws ResourceError when the device has no room for them.
+  const LitSamples& lit();
+  /// Whether they were made or would fit what is left.
+  [[nodiscard]] bool lit_fits() const;
+  /// [bz][by][bx] min, max over the samples of the closed brick; on the device from the first call on.
+  const cl::Buffer& ranges();
+  [[nodiscard]] std::uint64_t bytes() const;  ///< on the device, between frames
+
+  opencl::State* state;
+  Grid grid;
+  std::vector<cl_float2> host_ranges;  ///< what ranges() holds
+  std::pair<float, float> value_range{0, 0};
+  float largest = 0;        ///< that a texel can decode to, in magnitude
+  int highest_level = 0;    ///< of any brick and axis: log2 of samples per cell
+  bool is_uniform = false;  ///< every brick reads a float32 base as fine as the grid
+  AtlasLayout layout;
+  LitLayout lit_layout;
+
+  /// Kept between frames so that a frame allocates nothing but its picture.
+  struct FrameCache {
+    opencl::DeviceArray<cl_float4> picture, table;
+    opencl::DeviceArray<cl_uint> row_samples;
+    opencl::DeviceArray<cl_uchar> distance;
+    std::vector<float> distance_key;  ///< what `distance` was computed for
+    BakedTransfer baked;              ///< what `table` holds
+    std::vector<double> table_key;    ///< what `baked` was made from
+  } frame;
+
+  std::optional<DeviceField> field;
+  opencl::DeviceArray<float> bounds;  ///< ResidentVolume::set_bounds
+
+ private:
+  void set_texels(const MixedVolume& volume, PackedRecords& records) const;
+  void fill_image(const cl::Image3D& image, SampleType type);
+
+  Index3 base_samples_{};
+  std::map<TileKind, std::uint64_t> offsets_;
+  std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
+  std::vector<std::uint32_t> texel_records_;
+  opencl::Defines atlas_defines_;
+  std::optional<std::array<cl::Image3D, 3>> atlas_;
+  opencl::DeviceArray<std::uint32_t> atlas_bricks_;
+  opencl::DeviceArray<cl_float2> ranges_;
+  std::optional<LitSamples> lit_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,349 @@
+// A scan from whatever file holds it: told apart by content, read block by block, pre-processed in double,
+// rounded to float once; then the centre. Layout float data[view][v][u]. Called by every command that takes a
+// scan; calls host/io readers, host/scan/preprocess.cpp and host/scan/find_center.cpp.
+#include "vdvr/read_scan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <future>
+#include <numbers>
+#include <thread>
+
+#include "host/io/hdf5.hpp"
+#include "host/io/raster_file.hpp"
+#include "host/scan/find_center.hpp"
+#include "host/scan/hdf5_scan.hpp"
+#include "host/scan/preprocess.hpp"
+#include "host/scan/raster_scan.hpp"
+#include "host/scan/scan_folder.hpp"
+#include "host/system/atomic_file.hpp"
+#include "host/system/limits.hpp"
+#include "host/system/rehearsal.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/hash.hpp"
+
+namespace vdvr {
+namespace {
+
+namespace fs = std::filesystem;
+
+// --- which reader ---
+
+// The signature may follow a user block of 512, 1024, ... bytes (HDF5 File Format Specification, III.A).
+bool is_hdf5(const fs::path& path) {
+  const std::string signature("\x89HDF\r\n\x1a\n", 8);
+  std::ifstream file(path, std::ios::binary);
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(path, error);
+  for (std::uint64_t at = 0; !error && at + signature.size() <= size; at = at == 0 ? 512 : 2 * at) {
+    std::string start(signature.size(), '\0');
+    file.seekg(static_cast<std::streamoff>(at));
+    if (!file.read(start.data(), static_cast<std::streamsize>(start.size()))) return false;
+    if (start == signature) return true;
+  }
+  return false;
+}
+
+bool is_json(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  char c = 0;
+  file >> std::ws >> c;
+  return c == '{';
+}
+
+io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& folder) {
+  std::error_code error;
+  const auto status = fs::status(path, error);
+  if (!fs::exists(status)) throw FileError(path.string() + ": no such file or folder");
+  folder = fs::is_directory(status);
+  const bool raster = !folder && io::is_raster_file(path);
+  if (options.angles_file && !raster)
+    throw InputError(path.string() +
+                     ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
+  if (folder) return io::open_scan_folder(path, options.max_memory_bytes);
+  if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
+  if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
+  if (is_hdf5(path)) return io::open_hdf5_scan(path);
+  if (raster) {
+    if (!options.angles_file)
+      throw InputError(path.string() + ": a stack needs its angles; give them with --angles-file");
+    return io::open_raster_scan(path, *options.angles_file);
+  }
+  if (is_json(path)) {
+    if (path.filename() != "scan.json")
+      throw FileError(path.string() + ": a scan's description is named scan.json");
+    folder = true;
+    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes);
+  }
+  throw FileError(path.string() +
+                  ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "
+                  "or NRRD stack; or its first bytes are missing");
+}
+
+// --- geometry and memory ---
+
+ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
+  ParallelGeometry g;
+  g.columns = raw.columns;
+  g.rows = raw.rows;
+  g.pitch_u = raw.pitch_u;
+  g.pitch_v = raw.pitch_v;
+  g.unit = raw.unit;
+  for (const double pitch : {g.pitch_u, g.pitch_v})
+    if (!(pitch > 0) || !std::isfinite(pitch))
+      throw FileError(fmt::format("{}: pitch {}; it must be positive", name, pitch));
+  if (raw.projections.count < 1) throw FileError(fmt::format("{}: holds no projections", name));
+  for (std::size_t k = 0; k < raw.theta_deg.size(); ++k) {
+    if (!std::isfinite(raw.theta_deg[k]))
+      throw FileError(fmt::format("{}: angle {} is {}", name, k, raw.theta_deg[k]));
+    g.theta_rad.push_back(raw.theta_deg[k] * (std::numbers::pi / 180));
+  }
+  return g;
+}
+
+// Views per block: about 32 MiB as double keeps reads long and memory small.
+std::int64_t block_views(const io::RawScan& raw) {
+  constexpr std::int64_t block_samples = std::int64_t{1} << 22;
+  return std::clamp<std::int64_t>(block_samples / (raw.rows * raw.columns), 1, raw.projections.count);
+}
+
+void require_room(const io::RawScan& raw, const ScanOptions& options, const std::string& name) {
+  const std::array<std::int64_t, 3> all{raw.projections.count, raw.rows, raw.columns};
+  const std::array<std::int64_t, 3> block{block_views(raw), raw.rows, raw.columns};
+  const std::uint64_t bytes =
+      io::checked_bytes(all, sizeof(float), name) + 2 * io::checked_bytes(block, sizeof(double), name);
+  io::require_memory(bytes, options.max_memory_bytes, name + ": the projections");
+}
+
+// --- samples ---
+
+// Runs `work(k)` for k < count on all cores; the first exception comes out here.
+template <typename Work>
+void for_each_view(std::int64_t count, const Work& work) {
+  const std::int64_t workers = std::clamp<std::int64_t>(std::thread::hardware_concurrency(), 1, count);
+  // Later, in this thread, where the system has no thread left.
+  constexpr auto thread_or_later = std::launch::async | std::launch::deferred;
+  std::vector<std::future<void>> running;
+  for (std::int64_t w = 0; w < workers; ++w)
+    running.push_back(std::async(thread_or_later, [&work, w, workers, count] {
+      for (std::int64_t k = w; k < count; k += workers) work(k);
+    }));
+  for (auto& r : running) r.wait();
+  for (auto& r : running) r.get();
+}
+
+void require_finite(std::span<const double> view, const io::RawScan& raw, std::int64_t k) {
+  for (std::size_t i = 0; i < view.size(); ++i)
+    if (!std::isfinite(static_cast<float>(view[i])))
+      throw FileError(fmt::format("{}: line integral [{}][{}][{}] is {}; it must be a finite float",
+                                  raw.projections.name(k), k, static_cast<std::int64_t>(i) / raw.columns,
+                                  static_cast<std::int64_t>(i) % raw.columns, view[i]));
+}
+
+void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& progress) {
+  const std::int64_t size = raw.rows * raw.columns, step = block_views(raw);
+  FlatField field;
+  if (raw.counts) {
+    field = make_flat_field(raw.flats, raw.darks, raw.rows, raw.columns, raw.integer);
+    scan.report.transmission_floor = field.floor;
+  }
+  scan.data.resize(static_cast<std::size_t>(raw.projections.count * size));
+  std::vector<double> block(static_cast<std::size_t>(step * size));
+  std::vector<std::int64_t> dead(static_cast<std::size_t>(step));
+  std::atomic<bool> rounds = false;
+  for (std::int64_t first = 0; first < raw.projections.count; first += step) {
+    const std::int64_t n = std::min(step, raw.projections.count - first);
+    raw.projections.read(first, n, block.data());
+    for_each_view(n, [&](std::int64_t k) {
+      const std::span<double> view(block.data() + k * size, static_cast<std::size_t>(size));
+      if (raw.counts)
+        dead[static_cast<std::size_t>(k)] =
+            to_line_integrals(view, raw.rows, raw.columns, field, raw.projections.name(first + k));
+      else {
+        require_finite(view, raw, first + k);
+        if (std::any_of(view.begin(), view.end(),
+                        [](double p) { return static_cast<double>(static_cast<float>(p)) != p; }))
+          rounds = true;
+      }
+      if (!raw.air_columns.empty()) subtract_air_background(view, raw.rows, raw.columns, raw.air_columns);
+      std::transform(view.begin(), view.end(), scan.data.begin() + (first + k) * size,
+                     [](double p) { return static_cast<float>(p); });
+    });
+    for (std::int64_t k = 0; k < n; ++k) scan.report.dead_pixels += dead[static_cast<std::size_t>(k)];
+    report(progress, "read", static_cast<double>(first + n) / static_cast<double>(raw.projections.count));
+  }
+  scan.report.air_background = !raw.air_columns.empty();
+  if (rounds)
+    scan.report.notes.push_back(
+        "the scan holds float64 or wide integers: F is that of its values rounded to float32");
+}
+
+// --- report ---
+
+// One file: its own hash. Several: the hash of the sorted lines "sha256 name\n".
+std::string hash_of(const io::RawScan& raw, bool folder) {
+  if (!folder && raw.files.size() == 1) return sha256_of_file(raw.files.front().second);
+  std::vector<std::string> lines;
+  for (const auto& [name, path] : raw.files) lines.push_back(sha256_of_file(path) + " " + name + "\n");
+  std::sort(lines.begin(), lines.end());
+  lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+  std::string text;
+  for (const auto& line : lines) text += line;
+  return sha256_of_text(text);
+}
+
+// Length and time of last change: what tells that somebody wrote into a file while it was read.
+std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps_of(const io::RawScan& raw) {
+  std::vector<std::pair<std::uintmax_t, fs::file_time_type>> stamps;
+  for (const auto& file : raw.files) {
+    std::error_code gone;
+    const std::uintmax_t bytes = fs::file_size(file.second, gone);
+    stamps.emplace_back(bytes, fs::last_write_time(file.second, gone));
+  }
+  return stamps;
+}
+
+std::string name_of(const fs::path& path, bool folder) {
+  fs::path whole = fs::absolute(path).lexically_normal();
+  if (folder && whole.filename() == "scan.json") whole = whole.parent_path();
+  if (!whole.has_filename()) whole = whole.parent_path();
+  return whole.filename().string();
+}
+
+void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
+                   ProjectionSet& scan) {
+  ParallelGeometry& g = scan.geometry;
+  InputReport& r = scan.report;
+  if (options.center) {
+    g.center = *options.center;
+    r.center_source = "option";
+  } else if (raw.center) {
+    g.center = *raw.center;
+    r.center_source = "file";
+  } else if (const auto found = find_center(scan)) {
+    g.center = found->center;
+    r.center_source = "found";
+    r.notes.push_back(
+        fmt::format("centre of rotation found from {}: column {:.2f} (mirror symmetry explains {:.1f} %)",
+                    found->method, found->center, 100 * found->quality));
+  } else {
+    g.center = 0.5 * static_cast<double>(g.columns - 1);
+    r.center_source = "default";
+    r.notes.push_back(fmt::format(
+        "centre of rotation assumed in the detector's middle, column {}: the views do not tell; give "
+        "--center where it is elsewhere",
+        g.center));
+  }
+  const double last = static_cast<double>(g.columns) - 0.5;
+  if (!(g.center >= -0.5 && g.center <= last)) {
+    const std::string text = fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}",
+                                         path.string(), g.center, last);
+    if (options.center) throw InputError(text);
+    throw FileError(text);
+  }
+}
+
+// A description that may name an HDF5 file: by its member, or by a letter of it written as \\u0068.
+bool may_name_hdf5(const fs::path& description) {
+  std::error_code error;
+  if (!fs::is_regular_file(description, error)) return false;
+  constexpr std::uintmax_t largest = 16u << 20;  // the reader refuses a larger one
+  std::string text(std::min(fs::file_size(description, error), largest), '\0');
+  std::ifstream file(description, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text.find("hdf5") != std::string::npos || text.find('\\') != std::string::npos;
+}
+
+bool holds_hdf5(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return may_name_hdf5(path / "scan.json");
+  if (!fs::is_regular_file(path, error)) return false;
+  return is_hdf5(path) || (path.filename() == "scan.json" && may_name_hdf5(path));
+}
+
+// Everything that comes from the files, and nothing kept.
+void read_frames(const fs::path& path, const ScanOptions& options) {
+  bool folder = false;
+  const io::RawScan raw = open_scan(path, options, folder);
+  static_cast<void>(geometry_of(raw, path.string()));
+  require_room(raw, options, path.string());
+  const std::int64_t step = block_views(raw);
+  std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
+  for (const io::Frames* frames : {&raw.projections, &raw.flats, &raw.darks})
+    for (std::int64_t first = 0; first < frames->count; first += step)
+      frames->read(first, std::min(step, frames->count - first), block.data());
+}
+
+ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+  if (holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  bool folder = false;
+  const io::RawScan raw = open_scan(path, options, folder);
+  ProjectionSet scan;
+  scan.report.name = name_of(path, folder);
+  scan.report.format = raw.format;
+  scan.report.notes = raw.notes;
+  scan.geometry = geometry_of(raw, path.string());
+  require_room(raw, options, path.string());
+  const auto before = stamps_of(raw);
+  read_samples(raw, scan, progress);
+  scan.report.sha256 = hash_of(raw, folder);
+  if (const auto after = stamps_of(raw); after != before) {
+    const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();
+    throw FileError(fmt::format("{}: was changed while it was read; start again once it is whole",
+                                raw.files[static_cast<std::size_t>(changed)].second.string()));
+  }
+  if (scan.report.dead_pixels > 0)
+    scan.report.notes.push_back(
+        fmt::format("{} of {} samples were dead and got the median of their neighbours",
+                    scan.report.dead_pixels, scan.size()));
+  if (options.angles_file)
+    scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
+                                sha256_of_file(*options.angles_file));
+  choose_center(path, raw, options, scan);
+  return scan;
+}
+
+}  // namespace
+
+ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+  try {
+    return read_whole(path, options, progress);
+  } catch (const std::bad_alloc&) {
+    throw ResourceError(path.string() + ": not enough memory to read the scan");
+  }
+}
+
+void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  const std::array<std::int64_t, 3> shape{g.views(), g.rows, g.columns};
+  if (std::any_of(shape.begin(), shape.end(), [](std::int64_t n) { return n < 1; }) ||
+      static_cast<std::int64_t>(scan.data.size()) != scan.size())
+    throw InputError(fmt::format("{}: {} samples for {} projections", path.string(), scan.data.size(),
+                                 io::shape_text(shape)));
+  std::vector<double> theta_deg;
+  for (const double t : g.theta_rad) theta_deg.push_back(t * (180 / std::numbers::pi));
+  io::AtomicFile target(path);
+  io::Hdf5File file = io::Hdf5File::create(target.temporary());
+  file.create_group("/exchange");
+  // One chunk per view, cut into rows where a chunk would pass HDF5's 4 GiB.
+  constexpr std::int64_t chunk_samples = std::int64_t{1} << 26;
+  const std::array<std::int64_t, 3> chunk{1, std::clamp<std::int64_t>(chunk_samples / g.columns, 1, g.rows),
+                                          g.columns};
+  file.write("/exchange/data", shape, chunk, scan.data.data());
+  file.write_attribute("/exchange/data", "description", "line integrals");
+  file.write_attribute("/exchange/data", "axes", "theta:y:x");
+  file.write_attribute("/exchange/data", "unit", g.unit);
+  file.write_attribute("/exchange/data", "pitch_u", g.pitch_u);
+  file.write_attribute("/exchange/data", "pitch_v", g.pitch_v);
+  file.write_attribute("/exchange/data", "center", g.center);
+  file.write("/exchange/theta", theta_deg);
+  file.write_attribute("/exchange/theta", "units", "degrees");
+  file.close();
+  target.commit();
+}
+
+}  // namespace vdvr

@@ -1,0 +1,134 @@
+// Whole-or-nothing output files. Called by every writer.
+#include "host/system/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+#include <set>
+#include <vector>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr::io {
+namespace {
+
+std::filesystem::path folder_of(const std::filesystem::path& target) {
+  return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+}
+
+void sync_path(const std::filesystem::path& path, int flags) {
+  const int fd = ::open(path.c_str(), flags);
+  if (fd < 0) return;  // a file system that cannot be synced still renames atomically
+  const int failed = ::fsync(fd);
+  const int why = errno;
+  ::close(fd);
+  if (failed != 0 && (why == ENOSPC || why == EDQUOT || why == EIO))
+    throw ResourceError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(why)));
+}
+
+struct Temporaries {
+  std::mutex lock;
+  std::set<std::filesystem::path> paths;
+};
+Temporaries& temporaries() {
+  static Temporaries all;
+  return all;
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
+  const auto folder = folder_of(target_);
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw FileError(fmt::format("{}: folder '{}' does not exist", target_.string(), folder.string()));
+  std::string name = (folder / ("." + target_.filename().string() + ".XXXXXX")).string();
+  const int fd = ::mkstemp(name.data());
+  if (fd < 0) {
+    const std::string why = std::strerror(errno);
+    if (errno == ENOSPC) throw ResourceError(fmt::format("{}: disk full", target_.string()));
+    throw FileError(fmt::format("{}: cannot write into '{}': {}", target_.string(), folder.string(), why));
+  }
+  ::fchmod(fd, 0644);
+  ::close(fd);
+  temporary_ = name;
+  note_temporary(temporary_);
+}
+
+AtomicFile::~AtomicFile() {
+  std::error_code ignored;
+  if (committed_) return;
+  std::filesystem::remove(temporary_, ignored);
+  forget_temporary(temporary_);
+}
+
+void AtomicFile::commit() {
+  sync_path(temporary_, O_RDONLY);
+  std::error_code error;
+  std::filesystem::rename(temporary_, target_, error);
+  if (error)
+    throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
+  committed_ = true;
+  forget_temporary(temporary_);
+  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+void note_temporary(const std::filesystem::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.paths.insert(path);
+}
+
+void forget_temporary(const std::filesystem::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.paths.erase(path);
+}
+
+void remove_temporaries() {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  std::error_code ignored;
+  for (const auto& path : all.paths) std::filesystem::remove(path, ignored);
+  all.paths.clear();
+}
+
+void remove_leftovers(const std::filesystem::path& target) {
+  constexpr std::size_t random_letters = 6;  // mkstemp's
+  const std::string start = "." + target.filename().string() + ".";
+  std::error_code ignored;
+  std::vector<std::filesystem::path> found;
+  for (std::filesystem::directory_iterator entry(folder_of(target), ignored), end; entry != end;
+       entry.increment(ignored)) {
+    const std::string name = entry->path().filename().string();
+    if (name.size() == start.size() + random_letters && name.starts_with(start) &&
+        entry->is_regular_file(ignored))
+      found.push_back(entry->path());
+  }
+  for (const auto& path : found) std::filesystem::remove(path, ignored);
+}
+
+void write_file(const std::filesystem::path& path, const std::string& bytes) {
+  AtomicFile file(path);
+  const int fd = ::open(file.temporary().c_str(), O_WRONLY | O_TRUNC);
+  if (fd < 0) throw FileError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n = ::write(fd, bytes.data() + done, bytes.size() - done);
+    if (n < 0) {
+      const std::string why = std::strerror(errno);
+      ::close(fd);
+      throw ResourceError(fmt::format("{}: write failed after {} bytes: {}", path.string(), done, why));
+    }
+    done += static_cast<std::size_t>(n);
+  }
+  ::close(fd);
+  file.commit();
+}
+
+}  // namespace vdvr::io

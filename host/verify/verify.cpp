@@ -1,0 +1,391 @@
+// Measures a stored certificate again (docs/error-bounds.md, "What verify does"). Shares with build only the
+// sampler header and what describes the scan: view weights, ramp kernel, covered region.
+#include "vdvr/verify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <random>
+
+#include "host/sampler/sampler_terms.hpp"
+#include "host/scan/units.hpp"
+#include "host/verify/verify_attack.hpp"
+#include "host/verify/verify_field.hpp"
+#include "host/verify/verify_scope.hpp"
+#include "host/verify/verify_seams.hpp"
+#include "host/verify/verify_terms.hpp"
+#include "host/volume/region_of_interest.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
+#include "vdvr/reconstruct.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+Index3 place_of(const MixedVolume& v, std::int64_t brick) {
+  const Index3 n = v.bricks();
+  return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+}
+
+// The layers of bricks a sample is drawn from: each costs the filtered rows of its heights, so they are few.
+// The certificate's worst node is in one of them, the others are spread over the volume.
+std::vector<std::int64_t> layers_to_sample(std::int64_t count, std::int64_t worst, std::mt19937& random) {
+  constexpr std::int64_t most = 3;
+  std::vector<std::int64_t> layers{worst};
+  const std::int64_t others = std::min(count, most) - 1;
+  for (std::int64_t i = 0; i < others; ++i) {
+    const std::int64_t first = i * count / others, last = (i + 1) * count / others - 1;
+    const std::int64_t layer =
+        std::uniform_int_distribution<std::int64_t>(first, std::max(first, last))(random);
+    if (std::find(layers.begin(), layers.end(), layer) == layers.end()) layers.push_back(layer);
+  }
+  return layers;
+}
+
+// Every brick, or for each level the wanted share of its bricks and the one that holds the certificate's
+// worst node.
+std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate& stored,
+                                        const VerifyOptions& options) {
+  const std::size_t n = v.level.size();
+  std::vector<std::uint8_t> selected(n, options.exhaustive ? 1 : 0);
+  const std::vector<std::uint8_t> by_roi = bricks_of(stored.roi, v.grid, v.granularity);
+  if (!options.exhaustive) {
+    const Index3 counts = v.bricks(), worst = brick_at(v, stored.worst_at);
+    std::mt19937 random(options.seed);
+    std::vector<std::int64_t> layers = layers_to_sample(counts[2], worst[2], random);
+    std::map<LevelTriple, std::vector<std::size_t>> strata;
+    for (const std::int64_t z : layers)
+      for (std::int64_t i = z * counts[0] * counts[1]; i < (z + 1) * counts[0] * counts[1]; ++i)
+        if (by_roi[at(i)]) strata[v.level[at(i)]].push_back(at(i));
+    const double share =
+        options.fraction * static_cast<double>(counts[2]) / static_cast<double>(layers.size());
+    for (auto& [level, members] : strata) {
+      std::shuffle(members.begin(), members.end(), random);
+      const auto wanted = std::max<std::size_t>(
+          8, static_cast<std::size_t>(std::ceil(share * static_cast<double>(members.size()))));
+      for (std::size_t i = 0; i < std::min(wanted, members.size()); ++i) selected[members[i]] = 1;
+    }
+    selected[at((worst[2] * counts[1] + worst[1]) * counts[0] + worst[0])] = 1;
+  }
+  for (std::size_t i = 0; i < n; ++i)
+    if (!by_roi[i]) selected[i] = 0;
+  return selected;
+}
+
+// The corner of a gold cell where V is farthest from F, and the stored sample nearest to it.
+SamplePlace worst_sample(const MixedVolume& v, const ExactField& field, std::int64_t brick,
+                         const Index3& cell, int rate) {
+  const Index3 b = place_of(v, brick);
+  const BrickSamples stored(v, b);
+  SamplePlace p;
+  p.brick = brick;
+  p.brick_at = b;
+  p.level = v.level[at(brick)];
+  const bool base = p.level == LevelTriple{0, 0, 0};
+  const std::array<int, 3> levels = stored.level();
+  const Index3 in_base = first_base_sample(v, b);
+  std::vector<Vec3> points;
+  std::vector<double> values;
+  std::vector<Index3> nodes;
+  for (std::int64_t corner = 0; corner < 8; ++corner) {
+    std::array<float, 3> at_cell{};
+    Vec3 world{};
+    Index3 node{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      node[a] = cell[a] + (corner >> a & 1);
+      const double c = static_cast<double>(b[a] * v.granularity) + static_cast<double>(node[a]) / rate;
+      at_cell[a] = static_cast<float>(c);
+      world[a] = v.grid.origin[a] + c * v.grid.spacing[a];
+    }
+    nodes.push_back(node);
+    points.push_back(world);
+    values.push_back(static_cast<double>(stored.at(at_cell[0], at_cell[1], at_cell[2])));
+  }
+  const std::vector<double> F = field.at(points);
+  std::size_t worst = 0;
+  for (std::size_t i = 1; i < 8; ++i)
+    if (std::abs(values[i] - F[i]) > std::abs(values[worst] - F[worst])) worst = i;
+  p.world = points[worst];
+  p.value = values[worst];
+  p.field = F[worst];
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t per_sample = std::int64_t{rate} << v.coarsening[2 - a] >> levels[a];
+    p.sample[a] = (nodes[worst][a] + per_sample / 2) / per_sample + (base ? in_base[a] : 0);
+  }
+  p.dataset = "/base";
+  if (!base) {
+    const StoredTile tile = stored_tile(v, at(brick));
+    p.dataset = fmt::format("/tiles/{}{}{}", p.level[0], p.level[1], p.level[2]);
+    if (tile.kind.part > 0) p.dataset += fmt::format("_{}", tile.kind.part);
+    p.tile = static_cast<std::uint32_t>(tile.number);
+  }
+  return p;
+}
+
+std::string place_text(const SamplePlace& p) {
+  const std::string where = p.dataset == "/base" ? p.dataset : fmt::format("{} tile {}", p.dataset, p.tile);
+  return fmt::format(
+      "at ({:.6g}, {:.6g}, {:.6g}), where V is {:.6g} and F {:.6g}: brick {} of level ({}, {}, {}), {} "
+      "sample ({}, {}, {}) (z, y, x)",
+      p.world[0], p.world[1], p.world[2], p.value, p.field, p.brick, p.level[0], p.level[1], p.level[2],
+      where, p.sample[2], p.sample[1], p.sample[0]);
+}
+
+// Which samplers must hold: those promised that this device has.
+void judge(const Certificate& stored, const SamplerTerms& sampler, VerifyResult& r) {
+  r.total_buffer = r.measured_total + sampler.buffer.value;
+  if (sampler.image3d) r.total_image3d = r.measured_total + sampler.image3d->value;
+  r.total = r.total_buffer;
+  if (stored.holds_buffer) r.holds_buffer = r.total_buffer <= stored.epsilon_abs;
+  if (stored.holds_image3d.value_or(false) && r.total_image3d) {
+    r.holds_image3d = *r.total_image3d <= stored.epsilon_abs;
+    r.total = std::max(r.total, *r.total_image3d);
+  }
+  if (!r.holds_buffer && !r.holds_image3d) r.failure = "the certificate holds for no sampler of this device";
+  else r.holds = r.holds_buffer.value_or(true) && r.holds_image3d.value_or(true);
+}
+
+// The finest gold on which bricks are tested again: its T is a thousandth of that at 2x. Cell coordinates of
+// its nodes are exact in fp32.
+int finest_rate(const MixedVolume& v) {
+  constexpr int wanted = 64;
+  const std::int64_t cells = *std::max_element(v.grid.cells.begin(), v.grid.cells.end());
+  int rate = v.rate;
+  while (2 * rate <= std::max(wanted, 2 * v.rate) && cells * 2 * rate <= (1 << 24)) rate *= 2;
+  return rate;
+}
+
+// What is known of bricks from all rates of gold at which they were tested: every rate bounds |V - F|, and a
+// finer one by less (docs/error-bounds.md, "What verify does").
+class TestedBricks {
+ public:
+  struct Brick {
+    double total = -1;  // the smallest bound of all rates; negative: not tested
+    double error = 0;   // the largest |V - F| at a node of any rate
+    double least = 0;   // what |V - F| is at least: that, less what F was computed with
+    double finer = 0;   // the same at rates beyond the volume's own
+    Index3 cell{};      // where the bound is attained
+    int rate = 0;       // and at which rate
+    int tried = 0;      // the finest rate at which it was tested
+  };
+  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, const Progress& progress)
+      : field_(field), volume_(volume), attack_(attack), progress_(progress), bricks_(volume.level.size()) {}
+
+  void test(const std::vector<std::uint8_t>& selected, int rate, VerifyResult& result) {
+    std::vector<Brick> now(bricks_.size());
+    field_.run(
+        selected, rate,
+        [&](const VerifyField::Piece& p) {
+          if (p.total < 0) return;
+          Brick& b = now[at(p.brick)];
+          b.error = std::max(b.error, p.error);
+          if (rate == volume_.rate) {
+            attack_.consider(p);
+            result.cells_tested += p.cells;
+            result.nodes_tested += p.nodes;
+          }
+          if (p.total <= b.total) return;
+          b.total = p.total;
+          b.cell = p.worst_cell;
+        },
+        progress_);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (!selected[i]) continue;
+      // Cells that only the coarser gold tested hold no point of which the certificate speaks.
+      if (rate > volume_.rate) now[i].total = std::max(0.0, now[i].total);
+      if (now[i].total >= 0) take(bricks_[i], now[i], rate);
+    }
+  }
+
+  /// Tests bricks again on finer gold, the worst first, until none may err by more than `limit`. Ends early
+  /// where one does so at a node, or still may at the finest rate.
+  void settle(double limit, VerifyResult& result) {
+    const int finest = finest_rate(volume_);
+    for (std::size_t most = 8;; most *= 2) {
+      std::vector<std::size_t> over;
+      for (std::size_t i = 0; i < bricks_.size(); ++i)
+        if (bricks_[i].total > limit) over.push_back(i);
+      const bool hopeless = std::any_of(over.begin(), over.end(), [&](std::size_t i) {
+        return !(bricks_[i].least <= limit) || bricks_[i].tried >= finest;
+      });
+      if (over.empty() || hopeless) return;
+      most = std::min(most, over.size());
+      std::partial_sort(over.begin(), over.begin() + static_cast<std::ptrdiff_t>(most), over.end(),
+                        [&](std::size_t a, std::size_t b) { return bricks_[a].total > bricks_[b].total; });
+      over.resize(most);
+      int rate = finest;
+      for (const std::size_t i : over) rate = std::min(rate, 2 * bricks_[i].tried);
+      std::vector<std::uint8_t> selected(bricks_.size(), 0);
+      for (const std::size_t i : over) selected[i] = bricks_[i].tried < rate;
+      test(selected, rate, result);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Brick>& bricks() const { return bricks_; }
+
+ private:
+  void take(Brick& known, const Brick& now, int rate) {
+    known.error = std::max(known.error, now.error);
+    known.tried = rate;
+    double& least = rate > volume_.rate ? known.finer : known.least;
+    least = std::max(least, now.error - field_.arithmetic());
+    if (known.total >= 0 && known.total <= now.total) return;
+    known.total = now.total;
+    known.cell = now.cell;
+    known.rate = rate;
+  }
+
+  VerifyField& field_;
+  const MixedVolume& volume_;
+  TotalAttack& attack_;
+  const Progress& progress_;
+  std::vector<Brick> bricks_;
+};
+
+// What the promised samplers that this device has leave of epsilon for |V - F| itself.
+double left_by_samplers(const Certificate& stored, const SamplerTerms& sampler) {
+  double taken = stored.holds_buffer ? sampler.buffer.value : 0;
+  if (stored.holds_image3d.value_or(false) && sampler.image3d)
+    taken = std::max(taken, sampler.image3d->value);
+  return stored.epsilon_abs - taken;
+}
+
+// The sampler terms again, and the least that an image sampler can have.
+Differences check_samplers(Device& device, const MixedVolume& volume, const Certificate& stored,
+                           const FieldSlopes& slopes, const SamplerTerms& found) {
+  SamplerProbe ideal;
+  ideal.image3d = ideal.u16.image3d = ideal.u8.image3d = true;
+  const SamplerTerms least = sampler_terms(slopes, volume.grid, ideal, 1, stored.epsilon_abs, volume.rate);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  return compare_samplers(found, least, same_device, stored);
+}
+
+// Adds what differs to the verdict.
+void add_differences(VerifyResult& r) {
+  if (r.differences.empty()) return;
+  r.holds = false;
+  for (std::size_t i = 0; i < r.differences.size(); ++i)
+    r.failure +=
+        fmt::format("{}{}", r.failure.empty() ? "the certificate is not that of these projections: " : "; ",
+                    r.differences[i]);
+}
+
+}  // namespace
+
+VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                    const Certificate& stored, const VerifyOptions& options, const Progress& progress) {
+  opencl::State& state = device.state();
+  ParallelGeometry used = scan.geometry;
+  if (stored.field.center) used.center = *stored.field.center;
+  check_scan(used);
+  const std::uint64_t bytes = static_cast<std::uint64_t>(scan.size()) * sizeof(double);
+  state.memory.take(bytes, "cosine coefficients of the filtered projections");
+  struct Give {
+    opencl::State& state;
+    std::uint64_t bytes;
+    ~Give() { state.memory.give(bytes); }
+  } const give{state, bytes};
+  const ExactField exact(scan, stored.field, progress);
+  const FieldSlopes slopes = field_slopes(volume);
+  const SamplerTerms sampler =
+      sampler_terms(slopes, volume.grid, probe_sampler(device), atlas_length(device.info(), volume),
+                    stored.epsilon_abs, volume.rate, sampler_underflow(device.info()));
+
+  VerifyResult result;
+  result.differences = compare_scope(scan, used, volume, stored);
+  const auto also = [&](Differences more) {
+    result.differences.insert(result.differences.end(), std::make_move_iterator(more.begin()),
+                              std::make_move_iterator(more.end()));
+  };
+  also(check_samplers(device, volume, stored, slopes, sampler));
+  const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
+  TotalAttack attack(volume, stored);
+  result.epsilon_abs = stored.epsilon_abs;
+  result.bricks = static_cast<std::int64_t>(volume.level.size());
+  VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
+  TestedBricks tested(field, volume, attack, progress);
+  tested.test(selected, volume.rate, result);
+  result.arithmetic = field.arithmetic();
+  tested.settle(left_by_samplers(stored, sampler), result);
+  tested.settle(stored.measured_total + stored.budget.arithmetic.value, result);
+
+  std::int64_t worst = -1, broken = -1;
+  const std::vector<TestedBricks::Brick>& bricks = tested.bricks();
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const TestedBricks::Brick& b = bricks[i];
+    if (b.total < 0) continue;
+    ++result.bricks_tested;
+    result.measured_max = std::max(result.measured_max, b.error);
+    if (b.tried > volume.rate) ++result.bricks_finer;
+    result.finest_rate = std::max(result.finest_rate, b.tried);
+    // With a window a brick of which build tested nothing may have cells here, whose range is widened by
+    // more.
+    const bool promised = !stored.brick_totals.empty() && (stored.brick_totals[i] >= 0 || !stored.window);
+    if (promised) {
+      const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
+      // Between gold nodes the certificate's bound holds with the sampler's rounding.
+      if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
+        broken = static_cast<std::int64_t>(i);
+    }
+    if (b.total <= result.measured_total && worst >= 0) continue;
+    result.measured_total = b.total;
+    worst = static_cast<std::int64_t>(i);
+  }
+  if (worst < 0) {
+    result.failure = "no tested brick holds a covered gold cell";
+    add_differences(result);
+    return result;
+  }
+  const auto place = [&](std::int64_t brick) {
+    return worst_sample(volume, exact, brick, bricks[at(brick)].cell, bricks[at(brick)].rate);
+  };
+  result.worst = place(worst);
+  result.worst_at = result.worst.world;
+  judge(stored, sampler, result);
+  if (!result.holds && result.failure.empty())
+    result.failure = fmt::format("|V - F| may reach {:.6g} > epsilon {:.6g} {}", result.total,
+                                 stored.epsilon_abs, place_text(result.worst));
+  // Nodes are where V is certified without T: no total can lie below what is measured there.
+  const double promised = std::max(stored.total_buffer, stored.total_image3d.value_or(stored.total_buffer));
+  if (result.holds && !(result.measured_max - result.arithmetic <= promised)) {
+    result.holds = false;
+    result.failure = fmt::format("|V - F| reaches {:.6g}, above the total {:.6g} of the certificate, {}",
+                                 result.measured_max, promised, place_text(result.worst));
+  }
+  if (result.holds && broken >= 0) {
+    result.holds = false;
+    result.failure = fmt::format("|V - F| exceeds the certificate's bound {:.6g} of one brick, {}",
+                                 stored.brick_totals[at(broken)], place_text(place(broken)));
+  }
+  const TotalAttack::Outcome points = attack.run(exact, progress);
+  result.points_evaluated = points.points;
+  result.worst_share = points.worst_share;
+  if (result.holds && !points.failure.empty()) {
+    result.holds = false;
+    result.failure = points.failure;
+  }
+  // Rates that name no gold have been found already.
+  if (result.differences.empty())
+    also(compare_terms(device, scan, exact, volume, stored, selected, options.exhaustive, progress));
+  add_differences(result);
+  if (options.exhaustive) {
+    const Seams seams = compare_seams(volume);
+    result.seams = seams.different;
+    if (seams.different > 0) {
+      result.holds = false;
+      result.failure += fmt::format(
+          "{}{} samples that two bricks share differ, first at ({:.6g}, {:.6g}, {:.6g}) between bricks {} "
+          "and {}",
+          result.failure.empty() ? "" : "; ", seams.different, seams.at[0], seams.at[1], seams.at[2],
+          seams.bricks[0], seams.bricks[1]);
+    }
+  }
+  return result;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,292 @@
+// What build computes beside |V - F|, made again by its own code and compared with the certificate. This says
+// whether the certificate is the one that build writes; whether V is near F is measured by other means.
+#include "host/verify/verify_terms.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "host/bounds/covered_range.hpp"
+#include "host/certify/classify_bricks.hpp"
+#include "host/certify/result_units.hpp"
+#include "host/fbp/reconstruct_field.hpp"
+#include "host/opencl/host_memory.hpp"
+
+namespace vdvr {
+namespace {
+
+std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+// Sups and tables are sums in fp32 over at most a few thousand terms: devices agree on them better than this.
+constexpr double table_rounding = 0x1p-10;
+// Bricks that are measured by themselves: each takes its rows of all views.
+constexpr std::size_t most_alone = 16;
+
+/// The scan filtered as build does, and what follows from that, in `units`.
+struct Filtered {
+  Filtered(opencl::State& device, const ProjectionSet& projections, const Units& of_scan,
+           const FieldOptions& field, const Progress& progress)
+      : state(device),
+        units(of_scan),
+        scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
+                                Precision::fp64, units)),
+        upsampler(device, scan) {
+    sups = field_sups(device, upsampler, scan);
+  }
+  Filtered(const Filtered&) = delete;
+  Filtered& operator=(const Filtered&) = delete;
+
+  /// As the certificate's reader knows densities.
+  [[nodiscard]] double world(double density) const { return to_world(density, units); }
+
+  opencl::State& state;
+  Units units;
+  FilteredScan scan;
+  Upsampler upsampler;
+  FieldSups sups;
+};
+
+/// Rounding as build bounds it, of blocks of samples with this spacing, so many along their sides; `base` is
+/// the grid that sets how far columns reach.
+double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double side, int upsampling,
+                     const std::string& u_filter) {
+  const auto n = static_cast<std::int64_t>(side);
+  const ColumnBlocks blocks{n, n, spacing[0], spacing[1], {}, {}};
+  return arithmetic_bound(f.upsampler, f.scan, f.sups, columns_for(f.scan.geometry, base, upsampling), blocks,
+                          u_filter);
+}
+
+// R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
+// the extremes of two fields differ by no more than the fields do.
+void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
+                   const Certificate& c, const Progress& progress) {
+  const Volume base = reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, "cubic", progress);
+  const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
+  const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
+               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, "cubic"),
+               found = range.high - range.low;
+  if (!(std::abs(c.reference_range - found) <= 4 * rounding))
+    out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
+                              f.world(found), f.world(4 * rounding)));
+  // F itself at the two extremes, by other means: the range cannot be smaller.
+  const std::array points{to_world(v.grid.position(range.low_at), f.units),
+                          to_world(v.grid.position(range.high_at), f.units)};
+  std::vector<double> F = exact.at(points);
+  for (double& value : F) value = from_world(value, f.units);
+  const double du = f.scan.geometry.pitch_u / 8, wave = std::numbers::pi / f.scan.geometry.pitch_u,
+               projection = 3.0 / 128 * std::pow(du, 4) * wave * wave * f.sups.second_u;
+  const double least = F[1] - F[0] - 2 * (projection + rounding + from_world(exact.rounding(), f.units));
+  if (!(c.reference_range >= least))
+    out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
+                              f.world(c.reference_range), f.world(F[1] - F[0])));
+}
+
+// Blocks are cut to the memory there is: from one brick to 128 gold cells, with a halo.
+void compare_arithmetic(Differences& out, Filtered& f, const Grid& base, const MixedVolume& v,
+                        const Certificate& c, bool same_device) {
+  const auto brick = [&](int rate) { return static_cast<double>(v.granularity * rate); };
+  const auto block = [&](int rate) {
+    return std::max(1.0, std::floor(128 / brick(rate))) * brick(rate) + 3 + 2 * level_fit_steps * rate;
+  };
+  const auto bound = [&](int rate, double side, double ramp_error) {
+    Vec3 gold = v.grid.spacing;
+    for (double& h : gold) h /= rate;
+    const double own = std::exchange(f.scan.ramp_error, ramp_error);
+    const double all = arithmetic_of(f, base, gold, side, c.upsampling_u, c.u_filter);
+    f.scan.ramp_error = own;
+    return all;
+  };
+  // The filter's own error is measured, and another device's may be smaller.
+  const double low = bound(v.rate, brick(v.rate) + 3, same_device ? f.scan.ramp_error : 0);
+  // Gold at half the rate has blocks as wide, of twice the spacing.
+  double high = bound(v.rate, block(v.rate), f.scan.ramp_error);
+  if (v.rate >= 4) high = std::max(high, bound(v.rate / 2, block(v.rate / 2), f.scan.ramp_error));
+  const double value = c.budget.arithmetic.value;
+  if (!(value >= low * (1 - table_rounding)))
+    out.push_back(fmt::format("the arithmetic term is {}, below {}", f.world(value), f.world(low)));
+  if (same_device && !(value <= high * (1 + table_rounding)))
+    out.push_back(fmt::format("the arithmetic term is {}, above {}", f.world(value), f.world(high)));
+}
+
+/// |V - gold| + T + P of the selected bricks, as build measures them.
+class Totals {
+ public:
+  Totals(Filtered& f, const MixedVolume& v, const Certificate& c)
+      : f_(f),
+        volume_(v),
+        stored_(c),
+        field_(f.state, v),
+        gold_(f.state, f.scan, f.upsampler, f.sups, settings(v, c)) {}
+
+  void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,
+               const Progress& progress) {
+    const std::vector<std::uint8_t> near = gold_.fine().bricks_near_coverage();
+    for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = selected[i] && near[i];
+    // A brick has its total from either rate of gold: the coarse one explains most, for an eighth of the
+    // work.
+    if (GoldStream* coarse = gold_.coarse()) {
+      std::vector<std::uint8_t> resolved = selected;
+      for (std::size_t i = 0; i < resolved.size(); ++i) resolved[i] = resolved[i] && resolves(*coarse, i);
+      run(*coarse, resolved, progress, [&](const BrickMeasure& m) {
+        if (!agrees(m)) return;
+        selected[at(m.brick)] = 0;
+        // What build certified by coarse gold has no larger error between that gold's nodes.
+        if (m.total >= 0) most_ = std::max(most_, static_cast<double>(m.total) + tolerance(m));
+      });
+    }
+    std::vector<BrickMeasure> low;
+    run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
+      if (m.total >= 0) {
+        error_ = std::max(error_, static_cast<double>(m.error));
+        most_ = std::max(most_, static_cast<double>(m.error) + 2 * arithmetic());
+      }
+      if (!agrees(m)) low.push_back(m);
+    });
+    compare_alone(out, std::move(low), progress);
+    compare_projection(out, exhaustive);
+    compare_largest(out, exhaustive);
+  }
+
+ private:
+  static GoldSettings settings(const MixedVolume& v, const Certificate& c) {
+    GoldSettings s{v.grid, v.granularity, v.rate, c.upsampling_u, c.u_filter, c.window};
+    s.coarsening = v.coarsening;
+    return s;
+  }
+
+  void run(GoldStream& gold, const std::vector<std::uint8_t>& selected, const Progress& progress,
+           const std::function<void(const BrickMeasure&)>& visit) {
+    if (std::find(selected.begin(), selected.end(), 1) == selected.end()) return;
+    const opencl::DeviceArray<std::uint8_t> on_device(f_.state, std::span<const std::uint8_t>(selected),
+                                                      "bricks to measure");
+    gold.run(
+        selected,
+        [&](GoldStream::Batch& batch) {
+          const auto measures = batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device);
+          const auto p = batch.largest_p();
+          for (std::size_t i = 0; i < measures.size(); ++i) {
+            visit(measures[i]);
+            // Of bricks that build tested: coarse gold has nodes further outside the covered region.
+            const std::size_t brick = at(measures[i].brick);
+            if (measures[i].total >= 0 && brick < stored_.brick_totals.size() &&
+                stored_.brick_totals[brick] >= 0)
+              projection_ = std::max(projection_, static_cast<double>(p[i].first));
+          }
+        },
+        progress, "totals");
+  }
+
+  [[nodiscard]] double arithmetic() const { return gold_.arithmetic(); }
+
+  // A node takes T and P from the cells around it in its block, and blocks are cut to the bricks asked for:
+  // of a brick alone the total is the least that build can have found, by one rate of gold or the other.
+  void compare_alone(Differences& out, std::vector<BrickMeasure> low, const Progress& progress) {
+    const auto deficit = [&](const BrickMeasure& m) {
+      return static_cast<double>(m.total) - static_cast<double>(stored_.brick_totals[at(m.brick)]);
+    };
+    std::sort(low.begin(), low.end(),
+              [&](const BrickMeasure& a, const BrickMeasure& b) { return deficit(a) > deficit(b); });
+    std::int64_t different = 0;
+    std::string first;
+    for (std::size_t i = 0; i < std::min(low.size(), most_alone); ++i) {
+      std::vector<std::uint8_t> one(volume_.level.size(), 0);
+      one[at(low[i].brick)] = 1;
+      bool right = false;
+      for (GoldStream* gold : {&gold_.fine(), gold_.coarse()})
+        if (gold && !right && (gold == &gold_.fine() || resolves(*gold, at(low[i].brick))))
+          run(*gold, one, progress, [&](const BrickMeasure& m) { right = agrees(m); });
+      if (right) continue;
+      if (++different == 1)
+        first = fmt::format("the total of brick {} is {}, not {} within {:.3g}", low[i].brick,
+                            f_.world(static_cast<double>(stored_.brick_totals[at(low[i].brick)])),
+                            f_.world(static_cast<double>(low[i].total)), f_.world(tolerance(low[i])));
+    }
+    if (different > 0)
+      out.push_back(different > 1 ? fmt::format("{} totals of bricks differ; {}", different, first) : first);
+  }
+
+  [[nodiscard]] bool resolves(const GoldStream& gold, std::size_t brick) const {
+    const LevelTriple finest = gold.settings().finest();
+    const LevelTriple& level = volume_.level[brick];
+    return level[0] <= finest[0] && level[1] <= finest[1] && level[2] <= finest[2];
+  }
+
+  // Of two computations each: gold errs by A, a second difference by 4 A and T, an eighth of three of them,
+  // by 1.5 A. P comes from tables.
+  [[nodiscard]] double tolerance(const BrickMeasure& m) const {
+    return 5 * arithmetic() + table_rounding * static_cast<double>(std::max(m.total, 0.0f));
+  }
+
+  [[nodiscard]] bool agrees(const BrickMeasure& m) const {
+    if (stored_.brick_totals.empty()) return true;
+    const auto stored = static_cast<double>(stored_.brick_totals[at(m.brick)]);
+    if (m.total < 0) return true;
+    return stored >= 0 && stored >= static_cast<double>(m.total) - tolerance(m);
+  }
+
+  void compare_projection(Differences& out, bool exhaustive) const {
+    if (stored_.brick_totals.empty()) return;
+    const double value = stored_.budget.projection.value;
+    if (!(value >= projection_ * (1 - table_rounding)) ||
+        (exhaustive && !(value <= projection_ * (1 + table_rounding))))
+      out.push_back(fmt::format("the projection term is {}, not {}{}", f_.world(value),
+                                exhaustive ? "" : "at least ", f_.world(projection_)));
+  }
+
+  void compare_largest(Differences& out, bool exhaustive) const {
+    const double value = stored_.measured_max;
+    if (!(value >= error_ - 2 * arithmetic()) || (exhaustive && !(value <= most_)))
+      out.push_back(fmt::format("measured_max is {}, not {}{}", f_.world(value),
+                                exhaustive ? "" : "at least ", f_.world(error_)));
+  }
+
+  Filtered& f_;
+  const MixedVolume& volume_;
+  const Certificate& stored_;
+  DeviceField field_;
+  GoldRates gold_;
+  double projection_ = 0;  // largest seen
+  double error_ = 0;       // largest seen on the gold that certifies
+  double most_ = 0;        // what measured_max can be
+};
+
+// All but the scan, F and what is reported in `units`.
+void compare_in_units(Differences& out, Device& device, const ProjectionSet& scan, const Units& units,
+                      const ExactField& exact, const MixedVolume& volume, const Certificate& stored,
+                      const std::vector<std::uint8_t>& selected, bool exhaustive, const Progress& progress) {
+  Filtered f(device.state(), scan, units, stored.field, progress);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  compare_range(out, f, exact, volume, stored, progress);
+  compare_arithmetic(out, f, coarsened(volume.grid, volume.coarsening), volume, stored, same_device);
+  if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
+    out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
+  Totals(f, volume, stored).compare(out, selected, exhaustive, progress);
+}
+
+}  // namespace
+
+Differences compare_terms(Device& device, const ProjectionSet& scan, const ExactField& exact,
+                          const MixedVolume& volume, const Certificate& stored,
+                          const std::vector<std::uint8_t>& selected, bool exhaustive,
+                          const Progress& progress) {
+  Differences out;
+  HostMemory host(device.state());
+  host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, filtered,");
+  host.count(4 * static_cast<std::uint64_t>(volume.grid.sample_count()), "the base samples");
+  const Units units = units_of(scan);
+  if (!units.are_world()) host.count(volume.base.bytes(), "the stored field in other units");
+  std::optional<MixedVolume> scaled;
+  if (!units.are_world()) {
+    scaled = volume;
+    scaled->grid = from_world(volume.grid, units);
+    scale(*scaled, -units.density());
+  }
+  compare_in_units(out, device, scan, units, exact, scaled ? *scaled : volume, from_world(stored, units),
+                   selected, exhaustive, progress);
+  return out;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,548 @@
+// The .vdvr file (docs/file-format.md): written whole or not at all, read only after everything in it has
+// been checked. Datasets are [z][y][x] and triples "ZYX", as MixedVolume holds them; grid attributes are
+// turned from x,y,z to z,y,x. Called by build, verify, render, probe, export, info.
+#include "vdvr/vdvr_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <optional>
+#include <span>
+
+#include "host/io/hdf5_file.hpp"
+#include "host/system/atomic_file.hpp"
+#include "host/system/limits.hpp"
+#include "host/system/rehearsal.hpp"
+#include "host/volume/seal.hpp"
+#include "host/volume/volume_problem.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/hash.hpp"
+
+namespace vdvr {
+namespace {
+
+namespace h5 = io::hdf5_file;
+
+static_assert(std::endian::native == std::endian::little,
+              "content_sha256 hashes memory, which must be little-endian");
+
+// Version 2 is version 1 with integer samples, version 3 with triples whose tiles have several types, version
+// 4 with a base coarser than the grid; a file has the lowest that says what it holds.
+constexpr int newest_version = 4;
+constexpr std::uint64_t longest_certificate = 64u << 20;
+// Of zlib's nine: within 1.5 % of the smallest on real volumes, at half the time of 6 (docs/file-format.md).
+constexpr unsigned deflate_level = 4;
+
+template <class T>
+std::array<T, 3> zyx(const std::array<T, 3>& xyz) {
+  return {xyz[2], xyz[1], xyz[0]};
+}
+
+h5::Shape shape_of(std::initializer_list<std::int64_t> extents) {
+  h5::Shape shape;
+  for (const std::int64_t n : extents) shape.push_back(static_cast<std::uint64_t>(n));
+  return shape;
+}
+
+h5::Shape base_shape(const MixedVolume& v) {
+  const Index3 s = v.base_samples();
+  return shape_of({s[2], s[1], s[0]});
+}
+
+std::string text_of(const h5::Shape& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
+
+bool is_coarse(const MixedVolume& v) { return v.coarsening != LevelTriple{0, 0, 0}; }
+
+/// As the file and its hash have it, z, y, x.
+std::array<std::int64_t, 3> wide(const LevelTriple& zyx) { return {zyx[0], zyx[1], zyx[2]}; }
+
+// --- writing ---
+
+void write_grid(h5::Writer& file, const MixedVolume& v) {
+  file.group("/grid");
+  file.attribute("/grid", "cells", zyx(v.grid.cells));
+  file.attribute("/grid", "origin", zyx(v.grid.origin));
+  file.attribute("/grid", "spacing", zyx(v.grid.spacing));
+  file.attribute("/grid", "unit", v.grid.unit);
+  file.attribute("/grid", "granularity", std::int64_t{v.granularity});
+  file.attribute("/grid", "rate", std::int64_t{v.rate});
+  if (is_coarse(v)) file.attribute("/grid", "coarsening", wide(v.coarsening));
+}
+
+void write_index(h5::Writer& file, const MixedVolume& v) {
+  const Index3 b = v.bricks();
+  static_assert(sizeof(LevelTriple) == 3);
+  file.dataset("/level", shape_of({b[2], b[1], b[0], 3}),
+               std::span<const std::uint8_t>(v.level.data()->data(), 3 * v.level.size()));
+  file.dataset("/tile", shape_of({b[2], b[1], b[0]}), std::span<const std::uint32_t>(v.tile));
+}
+
+/// Samples, and offset and shift of each tile where they are integers.
+void write_block(h5::Writer& file, const std::string& path, const h5::Shape& shape, const SampleBlock& b) {
+  if (b.type == SampleType::f32) file.dataset(path, shape, std::span<const float>(b.f32));
+  else if (b.type == SampleType::u16) file.dataset(path, shape, std::span<const std::uint16_t>(b.u16));
+  else file.dataset(path, shape, std::span<const std::uint8_t>(b.u8));
+  if (b.type == SampleType::f32) return;
+  if (path == "/base") {
+    file.attribute(path, "offset", std::int64_t{b.offset.front()});
+    file.attribute(path, "shift", std::int64_t{b.shift.front()});
+    return;
+  }
+  file.dataset(path + "_offset", {b.offset.size()}, std::span<const std::int32_t>(b.offset));
+  file.dataset(path + "_shift", {b.shift.size()}, std::span<const std::uint8_t>(b.shift));
+}
+
+// --- reading ---
+
+int read_version(const h5::Reader& file) {
+  if (!file.has_attribute("/", "format") || file.text_attribute("/", "format") != "vdvr")
+    file.refuse("attribute 'format' of /", "does not say vdvr: this is another kind of HDF5 file");
+  const std::int64_t version = file.integer("/", "format_version");
+  if (version < 1) file.refuse("attribute 'format_version' of /", fmt::format("is {}", version));
+  if (version > newest_version)
+    file.refuse("attribute 'format_version' of /",
+                fmt::format("is {}; this program reads up to {}: use a newer one", version, newest_version));
+  return static_cast<int>(version);
+}
+
+int read_small(const h5::Reader& file, const char* name) {
+  // Anything outside int is outside every range checked later as well.
+  return static_cast<int>(
+      std::clamp<std::int64_t>(file.integer("/grid", name), -1, std::numeric_limits<int>::max()));
+}
+
+void read_grid(const h5::Reader& file, int version, MixedVolume& v) {
+  file.require_group("/grid");
+  const auto cells = file.integers("/grid", "cells", 3);
+  const auto origin = file.reals("/grid", "origin", 3), spacing = file.reals("/grid", "spacing", 3);
+  for (std::size_t a = 0; a < 3; ++a) {
+    v.grid.cells[a] = cells[2 - a];
+    v.grid.origin[a] = origin[2 - a];
+    v.grid.spacing[a] = spacing[2 - a];
+  }
+  v.grid.unit = file.text_attribute("/grid", "unit");
+  v.granularity = read_small(file, "granularity");
+  v.rate = read_small(file, "rate");
+  if (version >= 4) {
+    const auto coarsening = file.integers("/grid", "coarsening", 3);
+    for (std::size_t a = 0; a < 3; ++a)
+      v.coarsening[a] = static_cast<std::uint8_t>(std::clamp<std::int64_t>(coarsening[a], 0, 255));
+    if (wide(v.coarsening) != std::array{coarsening[0], coarsening[1], coarsening[2]})
+      file.refuse("attribute 'coarsening' of /grid",
+                  fmt::format("is {}, expected 0 to 3", fmt::join(coarsening, ", ")));
+  }
+  if (const auto p = grid_problem(v)) file.refuse(p->where, p->what);
+}
+
+/// A dataset of the right type and shape; a zero in `shape` stands for any extent.
+h5::Dataset expect(const h5::Reader& file, const std::string& path, const std::vector<h5::Element>& elements,
+                   const h5::Shape& shape) {
+  h5::Dataset d = file.dataset(path);
+  if (std::find(elements.begin(), elements.end(), d.element) == elements.end())
+    file.refuse(path, fmt::format("elements are of the wrong type, expected {}",
+                                  elements.size() > 1                    ? "float32, uint16 or uint8"
+                                  : elements.front() == h5::Element::u8  ? "uint8"
+                                  : elements.front() == h5::Element::i32 ? "int32"
+                                                                         : "uint32"));
+  bool fits = d.shape.size() == shape.size();
+  for (std::size_t a = 0; fits && a < shape.size(); ++a) fits = shape[a] == 0 || d.shape[a] == shape[a];
+  if (!fits) {
+    std::string wanted = text_of(shape);
+    if (shape.front() == 0) wanted.replace(1, 1, "count");
+    file.refuse(path, fmt::format("has shape {}, the grid needs {}", text_of(d.shape), wanted));
+  }
+  return d;
+}
+
+TileKind kind_of(const h5::Reader& file, const std::string& name) {
+  const std::string triple = name.substr(0, 3);
+  const bool digits = triple.size() == 3 && triple != "000" &&
+                      std::all_of(triple.begin(), triple.end(), [](char c) { return c >= '0' && c <= '6'; });
+  const bool part = name.size() == 5 && name[3] == '_' && name[4] >= '1' && name[4] < '0' + most_parts;
+  if (!digits || (name.size() != 3 && !part))
+    file.refuse("/tiles/" + name,
+                "is not named by a level triple, three digits z, y, x such as 111 or 021, and for tiles of a "
+                "second or third type _1 or _2");
+  TileKind kind;
+  for (std::size_t a = 0; a < 3; ++a) kind.level[a] = static_cast<std::uint8_t>(name[a] - '0');
+  if (part) kind.part = static_cast<std::uint8_t>(name[4] - '0');
+  return kind;
+}
+
+const std::vector<h5::Element> kSampleElements{h5::Element::f32, h5::Element::u16, h5::Element::u8};
+
+/// All datasets of one file, checked but not yet read.
+struct Contents {
+  h5::Dataset base, level, tile;
+  std::map<TileKind, h5::Dataset> tiles, offsets, shifts;
+  std::map<TileKind, std::uint64_t> counts;
+};
+
+SampleType type_of(const h5::Dataset& d) {
+  return d.element == h5::Element::f32   ? SampleType::f32
+         : d.element == h5::Element::u16 ? SampleType::u16
+                                         : SampleType::u8;
+}
+
+/// Offsets and shifts go with integer tiles, and with no others.
+void open_tables(const h5::Reader& file, Contents& c) {
+  for (const auto& [l, d] : c.tiles) {
+    const std::string offset = path_of(l) + "_offset", shift = path_of(l) + "_shift";
+    if (d.element == h5::Element::f32) continue;
+    for (const std::string& path : {offset, shift})
+      if (!file.has(path))
+        file.refuse(path, fmt::format("is missing beside the integer tiles of {}", path_of(l)));
+    c.offsets[l] = expect(file, offset, {h5::Element::i32}, {c.counts[l]});
+    c.shifts[l] = expect(file, shift, {h5::Element::u8}, {c.counts[l]});
+  }
+}
+
+Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
+  const Index3 b = v.bricks();
+  Contents c;
+  c.base = expect(file, "/base", kSampleElements, base_shape(v));
+  c.level = expect(file, "/level", {h5::Element::u8}, shape_of({b[2], b[1], b[0], 3}));
+  c.tile = expect(file, "/tile", {h5::Element::u32}, shape_of({b[2], b[1], b[0]}));
+  if (!file.has("/tiles")) return c;
+  file.require_group("/tiles");
+  std::vector<std::string> tables;
+  for (const std::string& name : file.members("/tiles")) {
+    if (name.ends_with("_offset") || name.ends_with("_shift")) {
+      tables.push_back(name.substr(0, name.rfind('_')));
+      continue;
+    }
+    const TileKind l = kind_of(file, name);
+    if (!is_within_rate(v, l.level))
+      file.refuse(path_of(l), fmt::format("is beyond rate {}, which ends at level {}", v.rate,
+                                          fmt::join(finest_level(v.rate, v.coarsening), ", ")));
+    const auto side = v.tile_shape(l);
+    c.tiles[l] = expect(file, path_of(l), kSampleElements, shape_of({0, side[0], side[1], side[2]}));
+    c.counts[l] = c.tiles[l].shape.front();
+    if (c.counts[l] > c.tile.count)
+      file.refuse(path_of(l), fmt::format("{} tiles for {} bricks", c.counts[l], c.tile.count));
+  }
+  std::map<TileKind, SampleType> types;
+  for (const auto& [kind, d] : c.tiles) types[kind] = type_of(d);
+  if (const auto p = parts_problem(types)) file.refuse(p->where, p->what);
+  open_tables(file, c);
+  for (const std::string& name : tables) {
+    const auto found = c.offsets.find(kind_of(file, name));
+    if (found == c.offsets.end())
+      file.refuse("/tiles/" + name + "_offset or _shift", "belongs to no integer tiles of that name");
+  }
+  return c;
+}
+
+/// Memory by declared sizes, before any of it is taken.
+void check_memory(const h5::Reader& file, const std::string& path, const Contents& c,
+                  std::uint64_t max_memory_bytes) {
+  std::uint64_t stored = c.base.stored_bytes + c.level.stored_bytes + c.tile.stored_bytes;
+  std::uint64_t needed = c.base.bytes + c.level.bytes + c.tile.bytes + c.tile.count / 8;
+  std::uint64_t for_chunks = std::max({c.base.chunk_memory, c.level.chunk_memory, c.tile.chunk_memory});
+  for (const auto* datasets : {&c.tiles, &c.offsets, &c.shifts})
+    for (const auto& [triple, d] : *datasets) {
+      stored += d.stored_bytes;
+      needed += d.bytes;
+      for_chunks = std::max(for_chunks, d.chunk_memory);
+    }
+  needed += for_chunks;
+  if (stored > file.file_bytes())
+    file.refuse(
+        "/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
+  if (max_memory_bytes != 0 && needed > max_memory_bytes)
+    throw ResourceError(
+        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise --max-memory", path, needed,
+                    max_memory_bytes));
+  io::require_memory(needed, 0, path);  // deflated, a small file may hold a large volume
+}
+
+void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) {
+  const auto into = [&](auto& samples) {
+    samples.resize(d.count);
+    file.read(d, samples.data());
+  };
+  b.type = type_of(d);
+  if (b.type == SampleType::f32) into(b.f32);
+  else if (b.type == SampleType::u16) into(b.u16);
+  else into(b.u8);
+}
+
+constexpr const char* kTotals = "/brick_total";
+
+void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
+  const Index3 b = v.bricks();
+  if (totals.size() != v.level.size())
+    throw InputError(
+        fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(), v.level.size()));
+  file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
+}
+
+/// Bounds by brick, where the file has them; none is above what the certificate promises of all.
+void read_totals(const h5::Reader& file, const MixedVolume& v, Certificate& c) {
+  if (!file.has(kTotals)) return;
+  const Index3 b = v.bricks();
+  const h5::Dataset d = expect(file, kTotals, {h5::Element::f32}, shape_of({b[2], b[1], b[0]}));
+  c.brick_totals.resize(d.count);
+  file.read(d, c.brick_totals.data());
+  const double most = c.measured_total * (1 + 0x1p-20);
+  for (const float total : c.brick_totals)
+    if (!(static_cast<double>(total) <= most))
+      file.refuse(kTotals, fmt::format("holds {}, above the certificate's measured_total {}", total,
+                                       c.measured_total));
+}
+
+/// The base's offset and shift, as attributes of any integer type.
+void read_base_table(const h5::Reader& file, SampleBlock& b) {
+  const auto value = [&](const char* name, std::int64_t most) {
+    const std::int64_t n = file.integer("/base", name);
+    if (n < (name[0] == 'o' ? -most : 0) || n > most)
+      file.refuse(fmt::format("attribute '{}' of /base", name),
+                  fmt::format("is {}, expected at most {}", n, most));
+    return n;
+  };
+  b.offset = {static_cast<std::int32_t>(value("offset", code_limit))};
+  b.shift = {static_cast<std::uint8_t>(value("shift", largest_shift))};
+}
+
+void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+  v.level.resize(c.tile.count);
+  file.read(c.level, v.level.data());
+  v.tile.resize(c.tile.count);
+  file.read(c.tile, v.tile.data());
+  if (const auto p = index_problem(v, c.counts)) file.refuse(p->where, p->what);
+  read_samples(file, c.base, v.base);
+  if (v.base.type != SampleType::f32) read_base_table(file, v.base);
+  for (const auto& [triple, d] : c.tiles) {
+    SampleBlock& b = v.tiles[triple];
+    read_samples(file, d, b);
+    if (b.type == SampleType::f32) continue;
+    b.offset.resize(c.counts.at(triple));
+    b.shift.resize(c.counts.at(triple));
+    file.read(c.offsets.at(triple), b.offset.data());
+    file.read(c.shifts.at(triple), b.shift.data());
+  }
+  if (const auto p = block_problem("/base", v.base)) file.refuse(p->where, p->what);
+  for (const auto& [triple, block] : v.tiles)
+    if (const auto p = block_problem(path_of(triple), block)) file.refuse(p->where, p->what);
+}
+
+/// The step, which goes with integer samples and with no others.
+void read_step(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+  bool integers = c.base.element != h5::Element::f32;
+  for (const auto& [triple, d] : c.tiles) integers = integers || d.element != h5::Element::f32;
+  const char* where = "attribute 'step' of /";
+  if (integers != file.has_attribute("/", "step"))
+    file.refuse(where,
+                integers ? "is missing beside integer samples" : "stands in a file without integer samples");
+  if (!integers) return;
+  v.step = file.reals("/", "step", 1).front();
+  if (const auto p = step_problem(v)) file.refuse(p->where, p->what);
+}
+
+Certificate read_certificate(const std::string& path, const std::string& json) {
+  try {
+    return certificate_from_json(json);
+  } catch (Error& e) {
+    e.add_context(path + ": /certificate");
+    throw;
+  }
+}
+
+// --- seal ---
+
+/// Of all objects that a reader looks at. Paths of /tiles come after "/tiles" itself.
+std::vector<h5::Attribute> all_attributes(const h5::Reader& file) {
+  std::vector<std::string> objects{"/"};
+  for (const char* path : {"/base", kTotals, "/certificate", "/grid", "/level", "/tile", "/tiles"})
+    if (file.has(path)) objects.emplace_back(path);
+  if (file.has("/tiles"))
+    for (const std::string& name : file.members("/tiles")) objects.push_back("/tiles/" + name);
+  std::vector<h5::Attribute> all;
+  for (const std::string& object : objects) {
+    const auto some = file.attributes(object);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+/// What is wrong with the seal; empty where nothing is, or where the file is unsealed.
+std::string read_seal(const h5::Reader& file, VdvrFile& result) {
+  const bool present = file.has_attribute("/", kSeal);
+  if (!present && !result.certificate.sealed) return {};
+  result.seal = Seal::broken;
+  if (!present)
+    return "the seal is broken: the certificate says that the file is sealed, and the seal is gone";
+  const std::string stored = file.text_attribute("/", kSeal);
+  const std::string found =
+      seal_of(result.certificate_json, result.certificate.brick_totals, all_attributes(file));
+  if (stored != found)
+    return fmt::format(
+        "the seal is broken: certificate, totals by brick and attributes have sha256 {}, the seal says {}",
+        found, stored.substr(0, 64));
+  if (!result.certificate.sealed)
+    return "the seal is broken: there is one, but the certificate does not say so";
+  result.seal = Seal::whole;
+  return {};
+}
+
+/// What was altered, in one line.
+std::string read_altered(const h5::Reader& file, VdvrFile& result) {
+  std::string altered = read_seal(file, result);
+  const std::string found = content_sha256(result.volume);
+  if (found == result.certificate.content_sha256) return altered;
+  return fmt::format(
+      "{}{}the content does not match its hash: it has sha256 {}, but its certificate was issued for {}",
+      altered, altered.empty() ? "" : "; ", found, result.certificate.content_sha256);
+}
+
+// --- content hash ---
+
+template <class T>
+void add(Sha256& hash, std::span<const T> values) {
+  hash.update(values.data(), values.size_bytes());
+}
+
+void add_grid(Sha256& hash, const MixedVolume& v) {
+  const auto cells = zyx(v.grid.cells);
+  const auto origin = zyx(v.grid.origin), spacing = zyx(v.grid.spacing);
+  add(hash, std::span<const std::int64_t>(cells));
+  add(hash, std::span<const double>(origin));
+  add(hash, std::span<const double>(spacing));
+  // Unit texts hold no zero byte and the granularity ends in seven, so two different grids never give the
+  // same bytes.
+  hash.update(v.grid.unit.data(), v.grid.unit.size());
+  const std::array<std::int64_t, 2> counts{v.granularity, v.rate};
+  add(hash, std::span<const std::int64_t>(counts));
+  if (!is_coarse(v)) return;
+  const auto coarsening = wide(v.coarsening);
+  add(hash, std::span<const std::int64_t>(coarsening));
+}
+
+VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  const h5::Reader file(path);
+  VdvrFile result;
+  result.file_bytes = file.file_bytes();
+  result.format_version = read_version(file);
+  result.generator = file.text_attribute("/", "generator");
+  read_grid(file, result.format_version, result.volume);
+  const Contents contents = open_contents(file, result.volume);
+  read_step(file, contents, result.volume);
+  check_memory(file, path.string(), contents, max_memory_bytes);
+  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
+  result.certificate = read_certificate(path.string(), result.certificate_json);
+  try {
+    read_volume_data(file, contents, result.volume);
+    read_totals(file, result.volume, result.certificate);
+  } catch (const std::bad_alloc&) {
+    throw ResourceError(fmt::format("{}: not enough memory for the samples in its {} bytes", path.string(),
+                                    file.file_bytes()));
+  }
+  result.altered = read_altered(file, result);
+  return result;
+}
+
+}  // namespace
+
+std::string content_sha256(const MixedVolume& v) {
+  Sha256 hash;
+  add_grid(hash, v);
+  const bool integers = has_integers(v);
+  if (integers) hash.update(&v.step, sizeof v.step);
+  hash.update(v.base.data(), v.base.bytes());
+  add(hash, std::span<const LevelTriple>(v.level));
+  add(hash, std::span<const std::uint32_t>(v.tile));
+  for (const auto& [triple, block] : v.tiles) hash.update(block.data(), block.bytes());
+  // The base's offset and shift are attributes: 64 bits.
+  if (v.base.type != SampleType::f32) {
+    const std::array<std::int64_t, 1> offset{v.base.offset.front()};
+    add(hash, std::span<const std::int64_t>(offset));
+  }
+  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::int32_t>(block.offset));
+  if (v.base.type != SampleType::f32) {
+    const std::array<std::int64_t, 1> shift{v.base.shift.front()};
+    add(hash, std::span<const std::int64_t>(shift));
+  }
+  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::uint8_t>(block.shift));
+  return hash.hex();
+}
+
+void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const Certificate& certificate,
+                Compression compression) {
+  if (const auto p = volume_problem(v))
+    throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
+  Certificate stored = certificate;
+  if (stored.content_sha256.empty()) stored.content_sha256 = content_sha256(v);
+  stored.sealed = true;
+  const std::string json = to_json(stored);
+
+  io::AtomicFile target(path);
+  {
+    h5::Writer file(target.temporary(), path, compression == Compression::deflate ? deflate_level : 0);
+    file.attribute("/", "format", std::string("vdvr"));
+    file.attribute("/", "format_version",
+                   std::int64_t{is_coarse(v)      ? 4
+                                : has_parts(v)    ? 3
+                                : has_integers(v) ? 2
+                                                  : 1});
+    file.attribute("/", "generator", std::string("vdvr " VDVR_VERSION));
+    if (has_integers(v)) file.attribute("/", "step", v.step);
+    write_grid(file, v);
+    write_block(file, "/base", base_shape(v), v.base);
+    write_index(file, v);
+    file.group("/tiles");
+    for (const auto& [triple, samples] : v.tiles) {
+      if (samples.size() == 0) continue;
+      const auto side = v.tile_shape(triple);
+      const auto count = static_cast<std::int64_t>(samples.size()) / v.tile_size(triple);
+      write_block(file, path_of(triple), shape_of({count, side[0], side[1], side[2]}), samples);
+    }
+    file.text("/certificate", json);
+    if (!certificate.brick_totals.empty()) write_totals(file, v, certificate.brick_totals);
+    file.attribute("/", kSeal, seal_of(json, certificate.brick_totals, file.attributes()));
+    file.close();
+  }
+  target.commit();
+}
+
+const char* text_of(Seal seal) {
+  switch (seal) {
+    case Seal::none:
+      return "unsealed";
+    case Seal::whole:
+      return "sealed";
+    case Seal::broken:
+      break;
+  }
+  return "BROKEN SEAL";
+}
+
+VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered) {
+  if (io::metadata_unchecked(path))
+    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+  VdvrFile file = read_whole(path, max_memory_bytes);
+  if (altered == Altered::refuse && !file.altered.empty())
+    throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
+  return file;
+}
+
+bool is_vdvr(const std::filesystem::path& path) {
+  const h5::Silence silence;
+  const auto says_so = [&] {
+    const h5::Reader file(path);
+    return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
+  };
+  try {
+    if (io::metadata_unchecked(path)) io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
+    return says_so();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace vdvr

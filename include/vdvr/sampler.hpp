@@ -1,0 +1,43 @@
+// How a device reads a stored field: in fp32 arithmetic from a buffer, or by the texture unit from an image,
+// and what that unit was found to do.
+#pragma once
+
+#include <algorithm>
+#include <string>
+
+#include "vdvr/device.hpp"
+#include "vdvr/mixed_volume.hpp"
+
+namespace vdvr {
+
+enum class SamplerKind { automatic, image3d, buffer };
+
+/// What the device's filter of one image format does to weights and constants (docs/error-bounds.md, section
+/// on samplers).
+struct FilterProbe {
+  bool image3d = false;     ///< the device has a linear CL_R 3D image sampler of this format
+  double weight_error = 0;  ///< largest measured error of an interpolation weight
+  double delta = 0;  ///< charged: 2^-22 fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, else 1.5 measured;
+                     ///< never below weight_error
+  /// rho: largest error on constant, affine and random tiles beyond delta, relative to the largest sample, or
+  /// to the format's whole scale where it is normalised.
+  double constant_error = 0;
+};
+
+/// The device's image3d sampler. What it inherits is that of CL_FLOAT.
+struct SamplerProbe : FilterProbe {
+  FilterProbe u16, u8;  ///< CL_UNORM_INT16, CL_UNORM_INT8
+  [[nodiscard]] const FilterProbe& of(SampleType type) const {
+    return type == SampleType::f32 ? *this : type == SampleType::u16 ? u16 : u8;
+  }
+  [[nodiscard]] double largest_constant_error() const {
+    return std::max({constant_error, u16.constant_error, u8.constant_error});
+  }
+  double buffer_rate = 0, image3d_rate = 0;  ///< samples per second, measured
+  std::string chosen;                        ///< "buffer" or "image3d": what `auto` takes, by those rates
+  std::string note;  ///< the class that delta was charged for, or why there is no image3d sampler
+};
+/// Measured once per device and process (about a second), then remembered.
+SamplerProbe probe_sampler(Device& device);
+
+}  // namespace vdvr

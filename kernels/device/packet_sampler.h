@@ -1,0 +1,511 @@
+// The field of mixed_sampler.h (VDVR_SAMPLER_BUFFER) or mixed_image.h (VDVR_SAMPLER_IMAGE3D) at the points of
+// a packet, and its gradient. Lane by lane the bits of vdvr_sample: the same operations on the same operands;
+// what is shared between lanes is only which brick records are open. Included by raycast.cl.
+//
+// In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
+//
+// VDVR_LIT: the buffer holds lit samples (host/sampler/lit_samples.hpp), each the float32 sample and behind it the
+// gradient there, so that light costs no further samples.
+#ifndef VDVR_PACKET_SAMPLER_H
+#define VDVR_PACKET_SAMPLER_H
+#ifndef VDVR_LIT
+#define VDVR_LIT 0
+#endif
+// As VdvrGrid has them.
+#ifndef VDVR_COARSE_X
+#define VDVR_COARSE_X 0
+#define VDVR_COARSE_Y 0
+#define VDVR_COARSE_Z 0
+#endif
+#if VDVR_LIT && (defined(VDVR_SAMPLER_IMAGE3D) || VDVR_SAMPLE_TYPES != 1)
+#error "lit samples are float32 in a buffer"
+#endif
+
+#include "shared/lit_gradient.h"
+
+// One image per sample type; the launcher binds any to those that do not occur. THE_FIELD hands it on.
+#ifdef VDVR_SAMPLER_IMAGE3D
+#define FIELD __read_only image3d_t field_f32, __read_only image3d_t field_u16, __read_only image3d_t field_u8
+#define THE_FIELD field_f32, field_u16, field_u8
+#if VDVR_LANES != 1
+#error "the texture unit takes one ray at a time: VDVR_LANES must be 1"
+#endif
+#else
+#define FIELD __global const uchar* restrict field
+#define THE_FIELD field
+#endif
+#define BRICKS __global const uint* restrict bricks
+
+#define GRADIENT_REACH 0.5f
+
+// The bricks that the lanes are in; a cell coordinate c belongs to one iff low <= c < high.
+typedef struct {
+  I3 at;
+  V3 low, high;
+#ifdef VDVR_SAMPLER_IMAGE3D
+  VdvrBrick record;
+#elif !VDVR_UNIFORM
+  V3 scale;  // samples per cell
+  I3 reach;  // samples per half a cell, 0 where a cell has no more than one
+  I3 top;    // index of the last cell of samples
+  // What a brick's addresses reach: its own samples, or where the bricks around read the base too, all of the
+  // base. Indices count from the brick's first sample.
+  I3 first, last;
+  I base_around, type;
+  Offset place, stride_y, stride_z;
+  V value_scale, bias;
+  int alike;  // all lanes' strides are those of lane 0
+#endif
+} OpenBrick;
+
+#include "device/packet_bricks.h"
+
+#if !VDVR_UNIFORM && defined(VDVR_SAMPLER_BUFFER)
+// The reach of one axis of a brick that starts at cell `low`.
+RAY_INLINE void open_axis(OpenBrick* b, I level, I low, int cells, int coarse, V* scale, I* reach, I* top,
+                          I* first, I* last) {
+  const I width = LEAST(cells - low, (I)(VDVR_GRANULARITY));
+  *scale = TO_V((I)(1) << level) * (1.0f / (float)(1 << coarse));
+  *reach = ((I)(1) << level) >> (1 + coarse);
+  *top = ((width << level) >> coarse) - 1;
+  *first = PICK(b->base_around, -(low >> coarse), (I)(0));
+  *last = PICK(b->base_around, (cells - low) >> coarse, *top + 1);
+}
+#endif
+
+RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
+  OpenBrick b;
+  b.at = at;
+  const I3 low = {at.x * VDVR_GRANULARITY, at.y * VDVR_GRANULARITY, at.z * VDVR_GRANULARITY};
+  b.low = v3(TO_V(low.x), TO_V(low.y), TO_V(low.z));
+  b.high = v3(high_of(at.x, b.low.x, grid.bricks_x), high_of(at.y, b.low.y, grid.bricks_y),
+              high_of(at.z, b.low.z, grid.bricks_z));
+#ifdef VDVR_SAMPLER_IMAGE3D
+  b.record = vdvr_brick(bricks, grid, brick_index(grid, at));
+#elif !VDVR_UNIFORM
+  // vdvr_record, lane by lane.
+  const Offset word = brick_index(grid, at) * VDVR_BRICK_WORDS;
+  __global const int* words = (__global const int*)bricks;
+  const I bits = GATHER(I, words + 1, word);
+  const I lx = bits & 7, ly = bits >> 3 & 7, lz = bits >> 6 & 7;
+  const I in_base = (bits & 511) == 0;
+#if VDVR_LANES == 1
+  b.place = (ulong)(VDVR_RECORDS == VDVR_RECORDS_COMPACT ? 0u : (uint)bits >> 17) << 32 | bricks[word];
+#else
+  b.place = GATHER(I, words, word);
+#endif
+  b.stride_y =
+      TO_OFFSET((PICK(in_base, (I)(grid.cells_x), (I)(VDVR_GRANULARITY) << lx) >> VDVR_COARSE_X) + 1);
+  b.stride_z =
+      b.stride_y *
+      TO_OFFSET((PICK(in_base, (I)(grid.cells_y), (I)(VDVR_GRANULARITY) << ly) >> VDVR_COARSE_Y) + 1);
+#if VDVR_LANES == 1
+  b.alike = 0;
+#else
+  b.alike = !ANY((b.stride_y != LANE(b.stride_y, 0)) | (b.stride_z != LANE(b.stride_z, 0)));
+#endif
+  b.base_around = (bits & 512) != 0;
+  open_axis(&b, lx, low.x, grid.cells_x, VDVR_COARSE_X, &b.scale.x, &b.reach.x, &b.top.x, &b.first.x,
+            &b.last.x);
+  open_axis(&b, ly, low.y, grid.cells_y, VDVR_COARSE_Y, &b.scale.y, &b.reach.y, &b.top.y, &b.first.y,
+            &b.last.y);
+  open_axis(&b, lz, low.z, grid.cells_z, VDVR_COARSE_Z, &b.scale.z, &b.reach.z, &b.top.z, &b.first.z,
+            &b.last.z);
+  b.type = bits >> 10 & 3;
+  const I shift = bits >> 12 & 31;
+#if VDVR_RECORDS == VDVR_RECORDS_COMPACT
+  const I offset = (bits >> 17) << shift;
+#elif VDVR_RECORDS == VDVR_RECORDS_WIDE
+  const I offset = GATHER(I, words + 2, word);
+#else
+  const I offset = (I)(0);
+#endif
+  b.value_scale = grid.step * TO_V((I)(1) << shift);
+  b.bias = grid.step * TO_V(offset);
+#endif
+  return b;
+}
+
+#if !VDVR_UNIFORM && defined(VDVR_SAMPLER_BUFFER)
+// All of the base as one brick.
+RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias) {
+  const I none = (I)(0);
+  const V zero = (V)(0.0f);
+  const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
+            nz = grid.cells_z >> VDVR_COARSE_Z;
+  OpenBrick b = no_brick();
+  b.low = v3(zero, zero, zero);
+  b.scale = v3((V)(1.0f / (float)(1 << VDVR_COARSE_X)), (V)(1.0f / (float)(1 << VDVR_COARSE_Y)),
+               (V)(1.0f / (float)(1 << VDVR_COARSE_Z)));
+  b.reach.x = b.reach.y = b.reach.z = none;
+  b.top.x = (I)(nx - 1);
+  b.top.y = (I)(ny - 1);
+  b.top.z = (I)(nz - 1);
+  b.place = (Offset)(0);
+  b.stride_y = (Offset)(nx + 1);
+  b.stride_z = b.stride_y * (Offset)(ny + 1);
+  b.type = (I)(type);
+  b.value_scale = (V)(scale);
+  b.bias = (V)(bias);
+  b.alike = VDVR_LANES > 1;
+  return b;
+}
+#endif
+
+// --- buffer: cells and their corners ---
+#ifdef VDVR_SAMPLER_BUFFER
+
+// The number of a sample in each lane: `lane` + `all`. What is the same in all lanes is kept apart because it
+// costs nothing in an address.
+typedef struct {
+  Offset lane;
+  int all;
+} Place;
+RAY_INLINE Place place(Offset lane, int all) {
+  const Place p = {lane, all};
+  return p;
+}
+RAY_INLINE Place after(Place p, Place stride) {
+  p.lane += stride.lane;
+  p.all += stride.all;
+  return p;
+}
+
+// Where points lie in cells of samples: the cell's lowest sample, and the fractions above it.
+typedef struct {
+  I3 index;  // of the lowest sample, from the brick's first
+  V3 fraction;
+  Place lowest, x, y, z;  // the lowest sample; strides
+  I type;
+  V value_scale, bias;
+} Cell;
+
+// As vdvr_local.
+RAY_INLINE I local_of(V c, V first, V scale, I top, V* fraction) {
+  const V r = (c - first) * scale;
+  I i = TO_I(r);
+  i = i > top ? top : i;
+  i = i < 0 ? (I)0 : i;
+  *fraction = r - TO_V(i);
+  return i;
+}
+
+#if VDVR_SAMPLE_TYPES != 1 && VDVR_SAMPLE_TYPES != 2 && VDVR_SAMPLE_TYPES != 4
+RAY_INLINE float stored(FIELD, int type, ulong i) {
+  if (type == VDVR_F32) return ((__global const float*)field)[i];
+  return type == VDVR_U16 ? (float)((__global const ushort*)field)[i] : (float)field[i];
+}
+#endif
+
+#if VDVR_SAMPLE_TYPES == 1
+#define VDVR_ONE_TYPE float
+#define VDVR_ONE_VECTOR V
+#elif VDVR_SAMPLE_TYPES == 2
+#define VDVR_ONE_TYPE ushort
+#define VDVR_ONE_VECTOR U16
+#elif VDVR_SAMPLE_TYPES == 4
+#define VDVR_ONE_TYPE uchar
+#define VDVR_ONE_VECTOR U8
+#endif
+
+// As in mixed_sampler.h.
+RAY_INLINE V decoded(const Cell* c, V v) {
+#if VDVR_SAMPLE_TYPES == 1
+  return v;
+#elif VDVR_SAMPLE_TYPES == 2 || VDVR_SAMPLE_TYPES == 4
+  return v * c->value_scale + c->bias;
+#else
+  return PICK(c->type == VDVR_F32, v, v * c->value_scale + c->bias);
+#endif
+}
+
+RAY_INLINE V load(FIELD, const Cell* c, Place p) {
+#ifdef VDVR_ONE_TYPE
+  __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
+  return decoded(c, TO_V(GATHER(VDVR_ONE_VECTOR, s, p.lane)));
+#else
+  V v;
+  const Offset i = p.lane + (Offset)(p.all);
+#define STORED(n) LANE(v, n) = stored(field, LANE(c->type, n), LANE(i, n));
+  EACH(STORED)
+#undef STORED
+  return decoded(c, v);
+#endif
+}
+
+// A sample and its neighbour along x, which lies behind it: one load.
+typedef struct {
+  V at, next;
+#if VDVR_LIT
+  U at_gradient, next_gradient;
+#endif
+} Pair;
+RAY_INLINE Pair load_pair(FIELD, const Cell* c, Place p) {
+  Pair v;
+#if VDVR_LIT
+  __global const float* s = (__global const float*)field + 2 * (ulong)p.all;
+#define ROW(n) vload4(0, s + 2 * TO_ULONG(LANE(p.lane, n)))
+  const V4 t = TURN(ROW);
+#undef ROW
+  v.at = t.x;
+  v.at_gradient = AS_U(t.y);
+  v.next = t.z;
+  v.next_gradient = AS_U(t.w);
+#elif defined(VDVR_ONE_TYPE)
+  __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
+  VDVR_ONE_VECTOR at, next;
+#define TWO(n)                                             \
+  {                                                        \
+    __global const VDVR_ONE_TYPE* q = s + LANE(p.lane, n); \
+    LANE(at, n) = vload2(0, q).x;                          \
+    LANE(next, n) = vload2(0, q).y;                        \
+  }
+  EACH(TWO)
+#undef TWO
+  v.at = decoded(c, TO_V(at));
+  v.next = decoded(c, TO_V(next));
+#else
+  v.at = load(field, c, p);
+  v.next = load(field, c, after(p, c->x));
+#endif
+  return v;
+}
+
+RAY_INLINE V lerp(V a, V b, V t) { return (1.0f - t) * a + t * b; }
+
+// The cells that points c of these bricks lie in; a point outside its brick is taken to the nearest cell.
+RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
+  Cell cell;
+#if VDVR_UNIFORM
+  // Cells of the base in global coordinates have the bits of the brick's own: c - low is exact in fp32.
+  const V one = (V)(1.0f), zero = (V)(0.0f);
+  cell.index.x = local_of(c.x, zero, one, (I)(grid.cells_x - 1), &cell.fraction.x);
+  cell.index.y = local_of(c.y, zero, one, (I)(grid.cells_y - 1), &cell.fraction.y);
+  cell.index.z = local_of(c.z, zero, one, (I)(grid.cells_z - 1), &cell.fraction.z);
+  cell.x = place(0, 1);
+  cell.y = place(0, grid.cells_x + 1);
+  cell.z = place(0, (grid.cells_x + 1) * (grid.cells_y + 1));
+  cell.lowest =
+      place((cell.index.z * (grid.cells_y + 1) + cell.index.y) * (grid.cells_x + 1) + cell.index.x, 0);
+#else
+  cell.index.x = local_of(c.x, b->low.x, b->scale.x, b->top.x, &cell.fraction.x);
+  cell.index.y = local_of(c.y, b->low.y, b->scale.y, b->top.y, &cell.fraction.y);
+  cell.index.z = local_of(c.z, b->low.z, b->scale.z, b->top.z, &cell.fraction.z);
+  cell.x = place((Offset)(0), 1);
+  cell.y = place(b->stride_y, 0);
+  cell.z = place(b->stride_z, 0);
+  cell.type = b->type;
+  cell.value_scale = b->value_scale;
+  cell.bias = b->bias;
+  cell.lowest = place(b->place + TO_OFFSET(cell.index.z) * b->stride_z +
+                          TO_OFFSET(cell.index.y) * b->stride_y + TO_OFFSET(cell.index.x),
+                      0);
+#endif
+  return cell;
+}
+
+// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>, gradients
+// g<z><y><x>.
+typedef struct {
+  Cell cell;
+  V s000, s001, s010, s011, s100, s101, s110, s111;
+#if VDVR_LIT
+  U g000, g001, g010, g011, g100, g101, g110, g111;
+#endif
+  V value;
+} Sampled;
+
+RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
+  const Cell* q = &k->cell;
+  const Place i = q->lowest, iy = after(i, y), iz = after(i, z), iyz = after(iy, z);
+  const Pair p00 = load_pair(field, q, i), p01 = load_pair(field, q, iy);
+  const Pair p10 = load_pair(field, q, iz), p11 = load_pair(field, q, iyz);
+  k->s000 = p00.at;
+  k->s001 = p00.next;
+  k->s010 = p01.at;
+  k->s011 = p01.next;
+  k->s100 = p10.at;
+  k->s101 = p10.next;
+  k->s110 = p11.at;
+  k->s111 = p11.next;
+#if VDVR_LIT
+  k->g000 = p00.at_gradient;
+  k->g001 = p00.next_gradient;
+  k->g010 = p01.at_gradient;
+  k->g011 = p01.next_gradient;
+  k->g100 = p10.at_gradient;
+  k->g101 = p10.next_gradient;
+  k->g110 = p11.at_gradient;
+  k->g111 = p11.next_gradient;
+#endif
+}
+
+// As vdvr_trilinear: x first, then y, then z.
+RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
+  Sampled k;
+  k.cell = cell_at(grid, b, c);
+#if VDVR_UNIFORM || VDVR_LANES == 1 || !VDVR_LIT
+  load_corners(field, k.cell.y, k.cell.z, &k);
+#else
+  // Strides that all lanes share cost nothing in an address.
+  if (b->alike)
+    load_corners(field, place((Offset)(0), LANE(b->stride_y, 0)), place((Offset)(0), LANE(b->stride_z, 0)),
+                 &k);
+  else load_corners(field, k.cell.y, k.cell.z, &k);
+#endif
+  const V3 f = k.cell.fraction;
+  k.value = lerp(lerp(lerp(k.s000, k.s001, f.x), lerp(k.s010, k.s011, f.x), f.y),
+                 lerp(lerp(k.s100, k.s101, f.x), lerp(k.s110, k.s111, f.x), f.y), f.z);
+  return k;
+}
+
+// The field in a face of cells with lowest sample i, by fractions along the two axes that it runs along.
+RAY_INLINE V in_face(FIELD, const Cell* c, Place i, Place u, V fu, Place v, V fv) {
+  const Place iv = after(i, v);
+  return lerp(lerp(load(field, c, i), load(field, c, after(i, u)), fu),
+              lerp(load(field, c, iv), load(field, c, after(iv, u)), fu), fv);
+}
+// The same where the first of them is x.
+RAY_INLINE V in_face_along_x(FIELD, const Cell* c, Place i, V fx, Place v, V fv) {
+  const Pair p = load_pair(field, c, i), q = load_pair(field, c, after(i, v));
+  return lerp(lerp(p.at, p.next, fx), lerp(q.at, q.next, fx), fv);
+}
+
+RAY_INLINE V face_at(FIELD, const Cell* c, Place i, int along_x, Place u, V fu, Place v, V fv) {
+  return along_x ? in_face_along_x(field, c, i, fu, v, fv) : in_face(field, c, i, u, fu, v, fv);
+}
+
+// How one axis' two points lie: cells of samples away from the sampled one's, and the fractions there. Half a
+// base cell is a whole number of samples where a cell has several, else half a spacing or less: `half_cell`.
+typedef struct {
+  I back, ahead;
+  V behind, before;
+} Spread;
+RAY_INLINE Spread spread_of(I reach, V t, V half_cell) {
+  Spread s;
+  const I whole = reach != 0;
+  const V lo = t - half_cell, hi = t + half_cell;
+  s.back = PICK(whole, -reach, PICK(lo < 0.0f, (I)(-1), (I)(0)));
+  s.ahead = PICK(whole, reach, PICK(hi < 1.0f, (I)(0), (I)(1)));
+  s.behind = PICK(whole, t, lo - TO_V(s.back));
+  s.before = PICK(whole, t, hi - TO_V(s.ahead));
+  return s;
+}
+
+// The field at two points.
+typedef struct {
+  V lo, hi;
+} Ends;
+
+// The field half a cell of the grid before and behind the sampled point along one axis, w its stride; a, b
+// are the field in the faces across it of the sampled cell. Beyond first and last, where the grid ends, the
+// outermost face counts.
+RAY_INLINE Ends ends_along(FIELD, const Cell* c, V a, V b, I reach, I index, V t, V half_cell, I first,
+                           I last, Offset w, int along_x, Place u, V fu, Place v, V fv) {
+  const Spread s = spread_of(reach, t, half_cell);
+#define FACE(n)                                                                                              \
+  face_at(field, c,                                                                                          \
+          after(c->lowest, place(TO_OFFSET(LEAST(MOST(index + (n), first), last) - index) * w, 0)), along_x, \
+          u, fu, v, fv)
+  const V outer = FACE(s.back), outermost = FACE(s.ahead + 1);
+  V inner, nearer;
+  if (ANY(reach > 1)) {
+    inner = FACE(s.back + 1);
+    nearer = FACE(s.ahead);
+  } else {
+    inner = PICK(s.back < 0, a, b);
+    nearer = PICK(s.ahead > 0, b, a);
+  }
+#undef FACE
+  const Ends e = {lerp(outer, inner, s.behind), lerp(nearer, outermost, s.before)};
+  return e;
+}
+
+typedef struct {
+  Ends x, y, z;
+} Neighbours;
+
+// The same along every axis. Right where the points lie in what the bricks reach.
+RAY_INLINE Neighbours neighbours_within(FIELD, VdvrGrid grid, const OpenBrick* b, const Sampled* k) {
+  const Cell* c = &k->cell;
+  const V3 t = c->fraction;
+#if VDVR_UNIFORM
+  const I3 reach = {(I)(0), (I)(0), (I)(0)}, first = reach;
+  const I3 last = {(I)(grid.cells_x), (I)(grid.cells_y), (I)(grid.cells_z)};
+  const V3 half_cell = v3((V)(0.5f), (V)(0.5f), (V)(0.5f));
+  const Offset wy = (Offset)(c->y.all), wz = (Offset)(c->z.all);
+#else
+  const I3 reach = b->reach, first = b->first, last = b->last;
+  const V3 half_cell = v3(0.5f * b->scale.x, 0.5f * b->scale.y, 0.5f * b->scale.z);
+  const Offset wy = b->stride_y, wz = b->stride_z;
+#endif
+  Neighbours n;
+  n.x = ends_along(field, c, lerp(lerp(k->s000, k->s010, t.y), lerp(k->s100, k->s110, t.y), t.z),
+                   lerp(lerp(k->s001, k->s011, t.y), lerp(k->s101, k->s111, t.y), t.z), reach.x, c->index.x,
+                   t.x, half_cell.x, first.x, last.x, (Offset)(1), 0, c->y, t.y, c->z, t.z);
+  // Along y and z the edges along x are shared.
+  const V e00 = lerp(k->s000, k->s001, t.x), e01 = lerp(k->s010, k->s011, t.x);
+  const V e10 = lerp(k->s100, k->s101, t.x), e11 = lerp(k->s110, k->s111, t.x);
+  n.y = ends_along(field, c, lerp(e00, e10, t.z), lerp(e01, e11, t.z), reach.y, c->index.y, t.y, half_cell.y,
+                   first.y, last.y, wy, 1, c->x, t.x, c->z, t.z);
+  n.z = ends_along(field, c, lerp(e00, e01, t.y), lerp(e10, e11, t.y), reach.z, c->index.z, t.z, half_cell.z,
+                   first.z, last.z, wz, 1, c->x, t.x, c->y, t.y);
+  return n;
+}
+
+#else
+
+typedef struct {
+  V value;
+} Sampled;
+
+RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
+  Sampled k;
+  k.value = vdvr_image_sample_in_brick(THE_FIELD, &b->record, grid, b->at.x, b->at.y, b->at.z, c.x, c.y, c.z);
+  return k;
+}
+
+#endif
+
+// The field anywhere: vdvr_sample, or its image form.
+RAY_INLINE Sampled sample_anywhere(FIELD, BRICKS, VdvrGrid grid, V3 c) {
+  const OpenBrick b = open_brick(bricks, grid, brick_at(grid, c));
+  return sample_open(THE_FIELD, &b, grid, c);
+}
+
+#ifdef VDVR_SAMPLER_IMAGE3D
+RAY_INLINE V at_point(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, V x, V y, V z) {
+  const V3 c = v3(x, y, z);
+  return is_inside(b, c) ? sample_open(THE_FIELD, b, grid, c).value
+                         : sample_anywhere(THE_FIELD, bricks, grid, c).value;
+}
+#elif !VDVR_UNIFORM
+// Samples the points that lie beyond what the bricks reach, one a lane and round: most lanes have none or
+// one.
+RAY_INLINE void sample_beyond(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, V3 c, V3 lo, V3 hi, I needed,
+                              Neighbours* n) {
+  const I none = (I)(0);
+  I left = PICK(lo.x < b->low.x, (I)(1), none) | PICK(hi.x > b->high.x, (I)(2), none) |
+           PICK(lo.y < b->low.y, (I)(4), none) | PICK(hi.y > b->high.y, (I)(8), none) |
+           PICK(lo.z < b->low.z, (I)(16), none) | PICK(hi.z > b->high.z, (I)(32), none);
+  left = PICK(needed & NOT(b->base_around), left, none);
+  while (ANY(left != 0)) {
+    const I now = left & -left;
+    const V3 point =
+        v3(PICK(now == 1, lo.x, PICK(now == 2, hi.x, c.x)), PICK(now == 4, lo.y, PICK(now == 8, hi.y, c.y)),
+           PICK(now == 16, lo.z, PICK(now == 32, hi.z, c.z)));
+    const V value = sample_anywhere(field, bricks, grid, point).value;
+    n->x.lo = PICK(now == 1, value, n->x.lo);
+    n->x.hi = PICK(now == 2, value, n->x.hi);
+    n->y.lo = PICK(now == 4, value, n->y.lo);
+    n->y.hi = PICK(now == 8, value, n->y.hi);
+    n->z.lo = PICK(now == 16, value, n->z.lo);
+    n->z.hi = PICK(now == 32, value, n->z.hi);
+    left &= left - 1;
+  }
+}
+#endif
+
+#include "device/packet_gradient.h"
+
+#endif

@@ -1,0 +1,80 @@
+// The ramp filter of detector rows as a product with its Toeplitz matrix, of which only the taps are stored:
+// q[k][u] = weight[k] * sum_j g[|u - j|] p[k][j], 16 rows in a vector (method: linear convolution,
+// docs/geometry.md). Layouts: float in[view][v / 16][u][16]; float taps[offset + e] = g at the difference
+// VDVR_STEP * (e + 1) - 1; out: column c of chunk z / 16 and view k lies at k * out_view + z / 16 *
+// out_chunk + 16 c, where c counts from detector column out_first, and columns beyond the detector's edges
+// are its mirror images. VDVR_STEP 2: every second tap is zero but the centre (Ram-Lak), so that a column
+// sees only those of the other parity and itself. Sums run in runs of 16 terms that are then added.
+// VDVR_DOUBLE 1: taps, weights and sums in double precision, rounded once, to the float that is stored.
+// Called by host/fbp/filter_rows.cpp.
+#pragma OPENCL FP_CONTRACT ON
+
+#include "device/lanes.h"
+
+#ifndef VDVR_STEP
+#error "VDVR_STEP must be 1 (any kernel) or 2 (even taps are zero but the centre)"
+#endif
+
+// A scalar's truth is 1, a vector's -1, and any() reads sign bits.
+#if VDVR_LANES == 1
+#define ANY_BROKEN(v) (!isfinite(v))
+#else
+#define ANY_BROKEN(v) (!all(isfinite(v)))
+#endif
+
+// Eight columns share each vector of `in`. Named sums, not arrays: compilers keep these in registers.
+#define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+#define ZERO(r) SUM total##r = (SUM)(0.0f);
+#define CLEAR(r) SUM sum##r = (SUM)(0.0f);
+#define ADD(r) sum##r = fma((SUM)(tap[r - n]), x, sum##r);
+#define TOTAL(r) total##r += sum##r;
+#if VDVR_STEP == 2
+#define CENTRE(r) \
+  total##r = fma((SUM)(centre), WIDE(LOAD(source + (size_t)min(i + 2 * r, columns - 1) * 16)), total##r);
+#else
+#define CENTRE(r)
+#endif
+// A column, and its images beyond the detector's edges.
+#define PUT_AT(value, position)                                           \
+  {                                                                       \
+    const int c = (position)-out_first;                                   \
+    if (c >= 0 && c < out_columns) STORE(value, target + (size_t)c * 16); \
+  }
+#define PUT(r)                                                                \
+  if (i + VDVR_STEP * r < columns) {                                          \
+    const int u = i + VDVR_STEP * r;                                          \
+    const VEC value = NARROW(weight * total##r);                              \
+    if (ANY_BROKEN(value)) broken[k] = 1;                                     \
+    PUT_AT(value, u)                                                          \
+    if (out_first < 0) PUT_AT(value, -1 - u)                                  \
+    if (out_first + out_columns > columns) PUT_AT(value, 2 * columns - 1 - u) \
+  }
+
+__kernel void filter_rows(__global float* out, __global int* broken, __global const float* in,
+                          __global const REAL* taps, __global const REAL* weights, REAL centre, int offset,
+                          int columns, int z_padded, int views, int out_first, int out_columns,
+                          ulong out_begin, ulong out_view, ulong out_chunk) {
+  const int z = (int)get_global_id(0) * VDVR_LANES;
+  const int group = (int)get_global_id(1), k = (int)get_global_id(2);
+  const int i = group / VDVR_STEP * (8 * VDVR_STEP) + group % VDVR_STEP;
+  if (z >= z_padded || i >= columns || k >= views) return;
+  __global const float* source = in + ((size_t)k * (z_padded / 16) + z / 16) * columns * 16 + z % 16;
+  // The first column seen; tap[r - n] is that between column i + STEP r and the n-th one seen.
+  const int first_seen = VDVR_STEP == 2 ? 1 - i % 2 : 0;
+  const int seen = (columns - first_seen + VDVR_STEP - 1) / VDVR_STEP;
+  __global const REAL* tap = taps + offset + (i - first_seen - (VDVR_STEP - 1)) / VDVR_STEP;
+  FOR_COLUMNS(ZERO)
+  for (int first = 0; first < seen; first += 16) {
+    const int last = min(first + 16, seen);
+    FOR_COLUMNS(CLEAR)
+    for (int n = first; n < last; ++n) {
+      const SUM x = WIDE(LOAD(source + (size_t)(first_seen + VDVR_STEP * n) * 16));
+      FOR_COLUMNS(ADD)
+    }
+    FOR_COLUMNS(TOTAL)
+  }
+  FOR_COLUMNS(CENTRE)
+  const SUM weight = (SUM)(weights[k]);
+  __global float* target = out + out_begin + (size_t)k * out_view + (size_t)(z / 16) * out_chunk + z % 16;
+  FOR_COLUMNS(PUT)
+}

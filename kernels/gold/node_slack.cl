@@ -1,0 +1,118 @@
+// T from second differences of gold, and the node slack T + P that the node test adds to |V - gold|
+// (docs/error-bounds.md). Layouts: gold float[block][y + halo][x + halo][gold stride], node z at z + halo,
+// with a halo of at least one node; margin float[block][y + halo][x + halo]; cells
+// float[block][y][x][stride] with cell z at z + 1; slack float[block][y][x][stride], node z at z. Called by
+// host/gold/node_slack.cpp.
+#include "shared/untested.h"
+
+// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the
+// block.
+__kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
+                           int cells_z, int rate, int stride, int blocks) {
+  const int z = (int)get_global_id(0), x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / cells_y, y = (int)get_global_id(2) - block * cells_y;
+  if (z >= stride || x >= cells_x || block >= blocks) return;
+  const int cell = z / rate;
+  rows[(((size_t)block * cells_y + y) * cells_x + x) * stride + z] =
+      cell < cells_z ? p[(((size_t)block * cells_z + cell) * cells_y + y) * cells_x + x] : 0.0f;
+}
+
+// Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.
+#define DIFFERENCES(node)                                                                           \
+  {                                                                                                 \
+    __global const float* centre = node;                                                            \
+    const float16 twice = 2.0f * vload16(0, centre);                                                \
+    const float16 dx = vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) - twice; \
+    const float16 dy = vload16(0, centre - row) + vload16(0, centre + row) - twice;                 \
+    const float16 dz = vload16(0, centre - 1) + vload16(0, centre + 1) - twice;                     \
+    px = fmax(px, dx);                                                                              \
+    mx = fmin(mx, dx);                                                                              \
+    py = fmax(py, dy);                                                                              \
+    my = fmin(my, dy);                                                                              \
+    pz = fmax(pz, dz);                                                                              \
+    mz = fmin(mz, dz);                                                                              \
+  }
+#define RANGE(node)                     \
+  {                                     \
+    const float16 v = vload16(0, node); \
+    low = fmin(low, v);                 \
+    high = fmax(high, v);               \
+  }
+#define CORNERS(M)    \
+  M(at)               \
+  M(at + 1)           \
+  M(at + gold_stride) \
+  M(at + gold_stride + 1) M(at + row) M(at + row + 1) M(at + row + gold_stride) M(at + row + gold_stride + 1)
+
+// Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it
+// lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
+// axis, / 8, `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by
+// base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
+// window, are VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
+// room.
+__kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
+                         __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
+                         int stride, int rate, int cells_x, int cells_y, int blocks, int counted,
+                         float t_constant, int windowed, float window_low, float window_high) {
+  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
+  if (z >= nz || x >= nx - 1 || block >= blocks)
+    return;  // one cell more than there is: it must be marked VDVR_UNTESTED
+  const int row = (nx + 2 * halo) * gold_stride;
+  __global const float* at =
+      gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row + (size_t)(x + halo) * gold_stride + z + halo;
+  float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
+  CORNERS(DIFFERENCES)
+  const float16 bound =
+      vload16(0, addend + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
+  float16 below = (px + py + pz) * 0.125f + t_constant + bound,
+          above = -(mx + my + mz) * 0.125f + t_constant + bound;
+  const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  int16 out = k > nz - 2;
+  if (windowed) {
+    float16 low = vload16(0, at), high = low;
+    CORNERS(RANGE)
+    // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
+    out |= (low - below > window_high) | (high + above < window_low);
+  }
+  // Whatever is no number here is no bound.
+  above = select((float16)(INFINITY), counted ? above : (float16)(0.0f), above <= FLT_MAX);
+  below = select((float16)(INFINITY), counted ? below : (float16)(0.0f), below <= FLT_MAX);
+  above = select(above, (float16)(VDVR_UNTESTED), out);
+  below = select(below, (float16)(VDVR_UNTESTED), out);
+  const size_t column = (((size_t)block * ny + y) * nx + x) * stride;
+  vstore16(above, 0, cells_above + column + z + 1);
+  vstore16(below, 0, cells_below + column + z + 1);
+  if (z == 0) cells_above[column] = cells_below[column] = VDVR_UNTESTED;
+}
+
+// Slack of each node: the largest of either of the cells around it, VDVR_UNTESTED where no such cell meets
+// the covered region. margin: per block and column the coverage margin across z; nodes with less than
+// `lowest` are untested, as are those outside [z_first, z_last] and [0, x_last[block]] x [0, y_last[block]].
+__kernel void node_slack(__global float* above, __global float* below, __global const float* cells_above,
+                         __global const float* cells_below, __global const float* margin,
+                         __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,
+                         float lowest, int z_first, int z_last) {
+  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
+  if (z >= nz || x >= nx || block >= blocks) return;
+  const size_t column = ((size_t)block * ny + y) * nx + x;
+  float16 a = (float16)(VDVR_UNTESTED), b = a;
+  const int2 end = last[block];
+  const size_t here = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
+  if (margin[here] >= lowest && x <= end.x && y <= end.y) {
+    for (int dy = -1; dy <= 0; ++dy)
+      for (int dx = -1; dx <= 0; ++dx) {
+        if (x + dx < 0 || y + dy < 0 || x + dx >= end.x || y + dy >= end.y) continue;
+        const size_t at = (column + dy * nx + dx) * stride + z;
+        a = fmax(a, fmax(vload16(0, cells_above + at), vload16(0, cells_above + at + 1)));
+        b = fmax(b, fmax(vload16(0, cells_below + at), vload16(0, cells_below + at + 1)));
+      }
+    const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const int16 out = (k < z_first) | (k > z_last) | (k > nz - 1);
+    a = select(a, (float16)(VDVR_UNTESTED), out);
+    b = select(b, (float16)(VDVR_UNTESTED), out);
+  }
+  vstore16(a, 0, above + column * stride + z);
+  vstore16(b, 0, below + column * stride + z);
+}

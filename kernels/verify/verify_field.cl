@@ -1,0 +1,279 @@
+// What `verify` computes on the device, apart from everything build uses but the sampler header: F at gold
+// nodes by six-point interpolation in u, |V - F| at the nodes of every tested brick, fourth differences of F,
+// and per gold cell the bound on |V - F| (docs/error-bounds.md, "What verify does").
+// A piece is a cube of `cells` gold cells: a brick, or a part of one. Places of pieces count pieces from the
+// grid's first; `rate` gold cells to a cell of the grid.
+// Layouts: float table[view][z / 16][fine column][16]; float field[block][y + 2][x + 2][z_padded] with node z
+// at z + 2, two nodes of halo on every side; float error[item][y][x][error_padded], one item per tested
+// piece; int4 items[item] = piece x, y, z and its block; int4 first[block] = the block's first piece; uchar
+// tested[block][cell y][cell x]: columns of gold cells that can hold a covered point.
+// Called by host/verify/verify_field.cpp.
+#include "device/largest.h"
+#include "shared/mixed_sampler.h"
+
+#define RADIUS 2
+
+// --- F at nodes ---
+
+// Lane i of a float8 belongs to the node x + i.
+#define FOR_TILE(M) M(0, s0) M(1, s1) M(2, s2) M(3, s3) M(4, s4) M(5, s5) M(6, s6) M(7, s7)
+#define CLEAR(i, lane) float16 sum##i = (float16)(0.0f);
+#define ADD(i, lane)                                    \
+  {                                                     \
+    __global const float* q = plane + at.lane * 16;     \
+    float16 v = w0.lane * vload16(0, q);                \
+    v = fma((float16)(w1.lane), vload16(0, q + 16), v); \
+    v = fma((float16)(w2.lane), vload16(0, q + 32), v); \
+    v = fma((float16)(w3.lane), vload16(0, q + 48), v); \
+    v = fma((float16)(w4.lane), vload16(0, q + 64), v); \
+    v = fma((float16)(w5.lane), vload16(0, q + 80), v); \
+    sum##i += v;                                        \
+  }
+#define PUT(i, lane)                                                \
+  if (x + i < nx) {                                                 \
+    __global float* to = target + (size_t)i * z_padded;             \
+    vstore16(accumulate ? vload16(0, to) + sum##i : sum##i, 0, to); \
+  }
+
+// Adds a run of views: first_view of all, in_table the first of them in the table. steps: per block and view
+// {columns per node along x, along y, the block's first node less a whole number of columns, that whole
+// number}. nx, ny count the halo.
+__kernel void verify_field(__global float* field, __global const float* table, __global const float4* steps,
+                           int accumulate, int first_view, int in_table, int views, int all_views,
+                           int columns, int z_padded, int nx, int ny, int blocks) {
+  // All columns of a block at 16 heights, then the next 16: what they read of the table stays in the cache.
+  const int x = (int)get_global_id(0) * 8, y = (int)get_global_id(1), chunks = z_padded / 16;
+  const int block = (int)get_global_id(2) / chunks, z = ((int)get_global_id(2) - block * chunks) * 16;
+  if (x >= nx || y >= ny || block >= blocks) return;
+  __global float* target = field + (((size_t)block * ny + y) * nx + x) * z_padded + z;
+  FOR_TILE(CLEAR)
+  const float8 tile_x = (float)x + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
+  __global const float* plane = table + ((size_t)in_table * z_padded + z) * columns;
+  __global const float4* view = steps + (size_t)block * all_views + first_view;
+  for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
+    const float4 step = view[k];
+    // s > 0 in the block by the host's choice of the whole number: truncation is floor.
+    const float8 s = fma((float8)(step.x), tile_x, (float8)(fma(step.y, (float)y, step.z)));
+    const int8 below = convert_int8(s);
+    const float8 f = s - convert_float8(below);
+    // Lagrange weights on the nodes -2 .. 3.
+    const float8 a = f + 2.0f, b = f + 1.0f, c = f - 1.0f, d = f - 2.0f, e = f - 3.0f;
+    const float8 bf = b * f, de = d * e, abf = a * bf, cde = c * de;
+    const float8 w0 = bf * cde * (-1.0f / 120.0f), w1 = a * f * cde * (1.0f / 24.0f),
+                 w2 = a * b * cde * (-1.0f / 12.0f), w3 = abf * de * (1.0f / 12.0f),
+                 w4 = abf * c * e * (-1.0f / 24.0f), w5 = abf * c * d * (1.0f / 120.0f);
+    const int8 at = clamp((int)step.w + below, (int8)2, (int8)(columns - 4)) - 2;
+    FOR_TILE(ADD)
+  }
+  FOR_TILE(PUT)
+}
+
+// --- |V - F| at nodes ---
+
+inline __global const float* field_column(__global const float* field, int4 item, int4 first, int x, int y,
+                                          int cells, int nx, int ny, int z_padded) {
+  const int bx = (item.x - first.x) * cells + x + RADIUS, by = (item.y - first.y) * cells + y + RADIUS;
+  return field + (((size_t)item.w * ny + by) * nx + bx) * z_padded + (item.z - first.z) * cells + RADIUS;
+}
+
+// The last node of a piece along an axis where the grid has `all` gold cells.
+inline int last_node(int piece, int cells, int all) { return min(cells, all - piece * cells); }
+
+__kernel void verify_errors(__global float* error, __global const float* field, __global const uchar* samples,
+                            __global const uint* bricks, VdvrGrid grid, __global const int4* items,
+                            __global const int4* first, int rate, int cells, int nx, int ny, int z_padded,
+                            int error_padded, int count) {
+  const int g = grid.granularity, per_brick = g * rate, side = cells + 1;
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
+  if (x >= side || y >= side || i >= count) return;
+  const int4 item = items[i];
+  if (x > last_node(item.x, cells, grid.cells_x * rate) || y > last_node(item.y, cells, grid.cells_y * rate))
+    return;
+  const int last_z = last_node(item.z, cells, grid.cells_z * rate);
+  const int bx = item.x * cells / per_brick, by = item.y * cells / per_brick, bz = item.z * cells / per_brick;
+  const int from_x = item.x * cells - bx * per_brick, from_y = item.y * cells - by * per_brick,
+            from_z = item.z * cells - bz * per_brick;
+  const VdvrBrick b = vdvr_brick(bricks, grid, ((ulong)bz * grid.bricks_y + by) * grid.bricks_x + bx);
+  // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
+  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) / (float)rate, bx, b.level_x, g,
+                                  grid.cells_x, grid.coarse_x),
+                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) / (float)rate, by, b.level_y, g,
+                                  grid.cells_y, grid.coarse_y);
+  __global const float* f = field_column(field, item, first[item.w], x, y, cells, nx, ny, z_padded);
+  __global float* out = error + (((size_t)i * side + y) * side + x) * error_padded;
+  // vdvr_trilinear, its two faces kept for all nodes between them.
+  const int per_interval = (rate << grid.coarse_z) >> b.level_z;
+  const int intervals = min(g, grid.cells_z - bz * g) * rate / per_interval;
+  const float step = 1.0f / (float)per_interval;
+  int index = from_z / per_interval;
+  float low = vdvr_sample_in_plane(samples, b, lx, ly, index);
+  for (int k = 0; k <= last_z; ++index) {
+    const float high = vdvr_sample_in_plane(samples, b, lx, ly, index + 1);
+    // A node between two intervals belongs to the second; the brick's last node to its last interval.
+    const int begin = index * per_interval - from_z,
+              end = min(last_z + 1, begin + per_interval + (index + 1 == intervals ? 1 : 0));
+    for (; k < end; ++k) {
+      const float e = vdvr_lerp(low, high, (float)(k - begin) * step) - f[k];
+      out[k] = fabs(e) <= FLT_MAX ? e : INFINITY;  // NaN must not pass a maximum unseen
+    }
+    low = high;
+  }
+}
+
+// --- fourth differences ---
+
+inline float16 second(__global const float* p, int stride) {
+  const float16 c = vload16(0, p);
+  return (vload16(0, p - stride) - c) + (vload16(0, p + stride) - c);
+}
+inline float16 fourth(__global const float* p, int stride) {
+  const float16 c = vload16(0, p), low = vload16(0, p - stride), high = vload16(0, p + stride);
+  return ((vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high)) -
+         3.0f * ((low - c) + (high - c));
+}
+inline float16 mixed(__global const float* p, int a, int b) {
+  const float16 c = second(p, a);
+  return (second(p - b, a) - c) + (second(p + b, a) - c);
+}
+
+// Per tested piece and row of nodes: the largest |fourth difference| xx, yy, zz, xy, xz, yz over the corners
+// of its tested cells. float8 out[item][y].
+__kernel void verify_fourth(__global float8* out, __global const float* field, __global const uchar* tested,
+                            VdvrGrid grid, __global const int4* items, __global const int4* first, int rate,
+                            int cells, int nx, int ny, int z_padded, int count) {
+  const int side = cells + 1;
+  const int y = (int)get_global_id(0), i = (int)get_global_id(1);
+  if (y >= side || i >= count) return;
+  const int4 item = items[i];
+  const int4 begin = first[item.w];
+  const int last_x = last_node(item.x, cells, grid.cells_x * rate),
+            last_y = last_node(item.y, cells, grid.cells_y * rate),
+            last_z = last_node(item.z, cells, grid.cells_z * rate);
+  const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
+  __global const uchar* mask =
+      tested + ((size_t)item.w * mask_y + (item.y - begin.y) * cells) * mask_x + (item.x - begin.x) * cells;
+  float16 xx = (float16)(0.0f), yy = xx, zz = xx, xy = xx, xz = xx, yz = xx;
+  const int row = nx * z_padded;
+  if (y <= last_y)
+    for (int x = 0; x <= last_x; ++x) {
+      bool is_corner = false;
+      for (int dy = -1; dy <= 0; ++dy)
+        for (int dx = -1; dx <= 0; ++dx)
+          if (x + dx >= 0 && x + dx < last_x && y + dy >= 0 && y + dy < last_y)
+            is_corner = is_corner || mask[(y + dy) * mask_x + x + dx];
+      if (!is_corner) continue;
+      __global const float* column = field_column(field, item, begin, x, y, cells, nx, ny, z_padded);
+      for (int z = 0; z <= last_z; z += 16) {
+        __global const float* p = column + z;
+        const int16 outside = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) > last_z;
+        const float16 none = (float16)(0.0f);
+        xx = fmax(xx, select(fabs(fourth(p, z_padded)), none, outside));
+        yy = fmax(yy, select(fabs(fourth(p, row)), none, outside));
+        zz = fmax(zz, select(fabs(fourth(p, 1)), none, outside));
+        xy = fmax(xy, select(fabs(mixed(p, z_padded, row)), none, outside));
+        xz = fmax(xz, select(fabs(mixed(p, z_padded, 1)), none, outside));
+        yz = fmax(yz, select(fabs(mixed(p, row, 1)), none, outside));
+      }
+    }
+  out[(size_t)i * side + y] = (float8)(largest_of_16(xx), largest_of_16(yy), largest_of_16(zz),
+                                       largest_of_16(xy), largest_of_16(xz), largest_of_16(yz), 0.0f, 0.0f);
+}
+
+// --- cells ---
+
+// h^2 times the second derivative: the second difference less `correction` twelfths of the fourth.
+inline float16 curvature(__global const float* p, int stride, float correction) {
+  const float16 c = vload16(0, p), low = vload16(0, p - stride), high = vload16(0, p + stride);
+  const float16 outer = (vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high),
+                inner = (low - c) + (high - c);
+  return inner + (3.0f * inner - outer) * (correction * (1.0f / 12.0f));
+}
+#define CORNER(dx, dy, dz)                                                                     \
+  {                                                                                            \
+    __global const float* p = at + (dy)*row + (dx)*z_padded + (dz);                            \
+    const float16 cx = curvature(p, z_padded, correction), cy = curvature(p, row, correction), \
+                  cz = curvature(p, 1, correction);                                            \
+    px = fmax(px, cx);                                                                         \
+    mx = fmin(mx, cx);                                                                         \
+    py = fmax(py, cy);                                                                         \
+    my = fmin(my, cy);                                                                         \
+    pz = fmax(pz, cz);                                                                         \
+    mz = fmin(mz, cz);                                                                         \
+    const float16 v = vload16(0, p);                                                           \
+    low = fmin(low, v);                                                                        \
+    high = fmax(high, v);                                                                      \
+    const float16 ec = vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz));             \
+    highest = fmax(highest, ec);                                                               \
+    lowest = fmin(lowest, ec);                                                                 \
+  }
+
+// Per column of gold cells of a tested piece: int4 {largest bound of |V - F| less the piece's constant, the
+// largest |V - F| at a corner, both as float bits; the cell that has the former, or -1; 0} and which cells
+// were tested, 16 bits to a word: int4 out[item][y][x], uint cells_tested[item][y][x][words]. `widening`:
+// per item what the range of a cell is widened by beside its own T (for the window only).
+__kernel void verify_cells(__global int4* out, __global uint* cells_tested, __global const float* error,
+                           __global const float* field, __global const uchar* tested, VdvrGrid grid,
+                           __global const int4* items, __global const int4* first,
+                           __global const float* widening, int rate, int cells, int nx, int ny, int z_padded,
+                           int error_padded, int words, int z_first, int z_last, int windowed,
+                           float window_low, float window_high, float correction, int count) {
+  const int side = cells + 1;
+  const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
+  if (x >= cells || y >= cells || i >= count) return;
+  const int4 item = items[i];
+  const int4 begin = first[item.w];
+  const size_t column = ((size_t)i * cells + y) * cells + x;
+  const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
+  const bool inside = x < last_node(item.x, cells, grid.cells_x * rate) &&
+                      y < last_node(item.y, cells, grid.cells_y * rate) &&
+                      tested[((size_t)item.w * mask_y + (item.y - begin.y) * cells + y) * mask_x +
+                             (item.x - begin.x) * cells + x];
+  // Cells of the block's z range [z_first, z_last] meet the covered heights.
+  const int z_begin = (item.z - begin.z) * cells,
+            end = min(last_node(item.z, cells, grid.cells_z * rate), z_last + 1 - z_begin);
+  float best = -1.0f, worst_error = 0.0f;
+  int best_z = -1;
+  const int row = nx * z_padded;
+  for (int z = 0, word = 0; word < words; z += 16, ++word) {
+    uint bits = 0;
+    if (inside && z < end) {
+      __global const float* at = field_column(field, item, begin, x, y, cells, nx, ny, z_padded) + z;
+      __global const float* err = error + (((size_t)i * side + y) * side + x) * error_padded + z;
+      float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
+      float16 low = (float16)(INFINITY), high = -low, lowest = low, highest = high;
+      CORNER(0, 0, 0)
+      CORNER(1, 0, 0)
+      CORNER(0, 1, 0)
+      CORNER(1, 1, 0)
+      CORNER(0, 0, 1)
+      CORNER(1, 0, 1)
+      CORNER(0, 1, 1)
+      CORNER(1, 1, 1)
+      // Where F is convex its interpolant lies above it, where it is concave below.
+      const float16 over = 0.125f * (px + py + pz), under = -0.125f * (mx + my + mz);
+      const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+      int16 counts = (k < end) & (k + z_begin >= z_first);
+      if (windowed) {
+        counts &= ~((low - over - widening[i] > window_high) | (high + under + widening[i] < window_low));
+      }
+      float16 total = fmax(highest + over, under - lowest), e = fmax(highest, -lowest);
+      total = select((float16)(INFINITY), total, total <= FLT_MAX);
+      total = select((float16)(-1.0f), total, counts);
+      e = select((float16)(0.0f), e, counts);
+      worst_error = fmax(worst_error, largest_of_16(e));
+      const float largest = largest_of_16(total);
+      float values[16];
+      int flags[16];
+      vstore16(counts, 0, flags);
+      for (int lane = 0; lane < 16; ++lane) bits |= flags[lane] ? 1u << lane : 0u;
+      if (largest > best) {
+        best = largest;
+        vstore16(total, 0, values);
+        for (int lane = 15; lane >= 0; --lane)
+          if (values[lane] == largest) best_z = z + lane;
+      }
+    }
+    cells_tested[column * words + word] = bits;
+  }
+  out[column] = (int4)(as_int(best), as_int(worst_error), best_z, 0);
+}

@@ -1,0 +1,312 @@
+// The node test at two rates of gold against the fine rate alone: what coarse gold accepts is within the
+// tolerance.
+#define BOOST_TEST_MODULE classify_bricks
+#include "host/certify/classify_bricks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+
+#include "host/certify/close_boundaries.hpp"
+#include "host/fbp/reconstruct_field.hpp"
+#include "tests/support/attack_chain.hpp"
+#include "tests/support/scans.hpp"
+#include "vdvr/simulate.hpp"
+
+namespace vdvr {
+namespace {
+
+using testing::noise_scan;
+using testing::simulated;
+
+Grid grid_around_axis(const Index3& cells, double spacing) {
+  Grid grid;
+  grid.cells = cells;
+  grid.spacing = {spacing, spacing, spacing};
+  for (std::size_t a = 0; a < 3; ++a) grid.origin[a] = -0.5 * spacing * static_cast<double>(cells[a]);
+  return grid;
+}
+
+// A build up to its levels, measured once more on the fine gold.
+struct Case {
+  Case(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range,
+       bool anisotropic = false)
+      : chain(scan),
+        state(attacks::device().state()),
+        base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, "cubic", {})),
+        host(state),
+        gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate, anisotropic)),
+        classify(state, gold, bricks, host, nullptr, {},
+                 [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
+    const auto [low, high] = std::minmax_element(base.samples.begin(), base.samples.end());
+    tolerance = tolerance_of_range * static_cast<double>(*high - *low);
+    const GoldSettings& s = gold.fine().settings();
+    const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
+    bricks = {grid, s.granularity, s.rate, {}, base.samples, {}, {}, {}, {}, false};
+    bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
+    bricks.involved.assign(near.size(), 0);
+    bricks.samples.resize(near.size());
+    const DeviceField field(state, as_mixed(base, s.granularity));
+    classify.classify(field, tolerance, near);
+    decided = classify.measures();
+    classify.sharpen(field, tolerance);
+    const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
+    fine.resize(near.size());
+    gold.fine().run(
+        near,
+        [&](GoldStream::Batch& batch) {
+          for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), selected))
+            fine[static_cast<std::size_t>(m.brick)] = m;
+        },
+        {}, "fine");
+  }
+  static GoldSettings settings_of(const Grid& grid, int rate, bool anisotropic = false) {
+    GoldSettings s{grid, 2, rate, 8, "cubic"};
+    s.midrange = true;
+    s.anisotropic = anisotropic;
+    return s;
+  }
+  [[nodiscard]] bool stays(std::size_t i) const {
+    return bricks.involved[i] && bricks.level[i] == LevelTriple{0, 0, 0};
+  }
+
+  attacks::Chain chain;
+  opencl::State& state;
+  Volume base;
+  HostMemory host;
+  GoldRates gold;
+  OpenBricks bricks;
+  ClassifyBricks classify;
+  double tolerance = 0;
+  std::vector<BrickMeasure> decided, fine;
+};
+
+// Rounding of gold and of the sampler differs between blocks of different sizes.
+double rounding(Case& c) { return 2 * c.gold.fine().arithmetic(); }
+
+// Returns how many bricks coarse gold decided.
+std::size_t check(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range) {
+  Case c(scan, grid, rate, tolerance_of_range);
+  BOOST_REQUIRE(c.gold.coarse() != nullptr);
+  std::size_t by_coarse = 0, refined = 0;
+  double largest = 0, reported = 0;
+  for (std::size_t i = 0; i < c.decided.size(); ++i) {
+    if (!c.bricks.involved[i]) continue;
+    const BrickMeasure& m = c.decided[i];
+    if (!c.stays(i)) {
+      ++refined;
+      // Refined because the fine test fails, too. (Slack at a brick's border grows with the block around it.)
+      BOOST_TEST(static_cast<double>(c.fine[i].total) > c.tolerance - rounding(c));
+      continue;
+    }
+    BOOST_TEST(static_cast<double>(m.total) <= c.tolerance);
+    if (m.rate < rate) {
+      ++by_coarse;
+      // The theorem of the coarse rate speaks of the fine nodes too.
+      BOOST_TEST(static_cast<double>(c.fine[i].error) <= static_cast<double>(m.total) + rounding(c));
+      // And `verify` agrees.
+      BOOST_TEST(static_cast<double>(c.fine[i].total) <= c.tolerance + rounding(c));
+    }
+    largest = std::max(largest, static_cast<double>(c.fine[i].error));
+    const BrickMeasure& last = c.classify.measures()[i];
+    if (last.rate == rate) reported = std::max(reported, static_cast<double>(last.error));
+  }
+  BOOST_TEST_MESSAGE(by_coarse << " bricks by coarse gold, " << refined << " refined of "
+                               << c.decided.size());
+  BOOST_TEST(std::abs(largest - reported) <= rounding(c));
+  return by_coarse;
+}
+
+BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_noise_is_within_the_tolerance) {
+  const ProjectionSet scan = noise_scan(20, 14, 17, 5);
+  for (const int rate : {4, 8, 16})
+    for (const double share : {0.1, 0.15, 0.25})
+      check(scan, grid_around_axis({10, 10, 11}, 0.7), rate, share);
+}
+
+BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_phantoms_is_within_the_tolerance) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  for (const double share : {0.03, 0.1, 0.2})
+    BOOST_TEST(check(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, share) > 0u);
+  const ProjectionSet head = simulated(shepp_logan(10), 21, 17, 30);
+  for (const double share : {0.08, 0.2})
+    BOOST_TEST(check(head, grid_around_axis({16, 16, 12}, 0.9), 8, share) > 0u);
+}
+
+BOOST_AUTO_TEST_CASE(a_field_that_does_not_vary_along_z_is_not_refined_along_z) {
+  ProjectionSet scan = noise_scan(20, 12, 17, 5);
+  const std::int64_t columns = scan.geometry.columns, rows = scan.geometry.rows;
+  for (std::int64_t i = 0; i < scan.size(); ++i)
+    scan.data[static_cast<std::size_t>(i)] =
+        scan.data[static_cast<std::size_t>(i / (rows * columns) * rows * columns + i % columns)];
+  for (const int rate : {4, 8}) {
+    Case c(scan, grid_around_axis({10, 10, 10}, 0.7), rate, 0.1, true);
+    std::size_t refined = 0, across = 0;
+    for (std::size_t i = 0; i < c.decided.size(); ++i) {
+      const LevelTriple& l = c.bricks.level[i];
+      BOOST_TEST(l[0] == 0);
+      refined += l != LevelTriple{0, 0, 0};
+      across += l[1] != l[2];
+    }
+    BOOST_TEST(refined > 20u);
+    BOOST_TEST(across > 0u);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(tiles_of_every_triple_pass_before_closing_and_take_less_than_isotropic_ones) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  const Grid grid = grid_around_axis({16, 16, 16}, 0.8);
+  std::array<double, 2> samples{};
+  for (const bool anisotropic : {false, true}) {
+    Case c(lobes, grid, 8, 0.03, anisotropic);
+    std::vector<std::uint8_t> refined(c.bricks.level.size(), 0);
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      refined[i] = c.bricks.level[i] != LevelTriple{0, 0, 0};
+      samples[anisotropic] += static_cast<double>(c.bricks.samples[i].size());
+    }
+    const MixedVolume open = close_boundaries(c.bricks, Closing::none);
+    c.classify.measure(DeviceField(c.state, open), open.level, c.tolerance, refined, "verify");
+    for (std::size_t i = 0; i < refined.size(); ++i)
+      if (refined[i] && *std::max_element(open.level[i].begin(), open.level[i].end()) < 3)
+        BOOST_TEST(static_cast<double>(c.classify.measures()[i].total) <= c.tolerance + rounding(c));
+  }
+  BOOST_TEST(samples[true] > 0);
+  BOOST_TEST(samples[true] < 0.8 * samples[false]);
+}
+
+// Samples are fitted on the bricks that want them; what lies beside those must not show.
+BOOST_AUTO_TEST_CASE(a_tile_does_not_depend_on_what_else_is_asked_for) {
+  const ProjectionSet scan = noise_scan(20, 14, 17, 5);
+  Case c(scan, grid_around_axis({10, 10, 11}, 0.7), 4, 0.2, true);
+  const auto near = c.gold.fine().bricks_near_coverage();
+  c.gold.fine().run(
+      near,
+      [&](GoldStream::Batch& batch) {
+        for (const LevelTriple& level :
+             {LevelTriple{0, 0, 1}, LevelTriple{1, 0, 2}, LevelTriple{0, 2, 2}, LevelTriple{1, 1, 1}}) {
+          std::vector<std::pair<std::int64_t, LevelTriple>> all;
+          for (const std::int64_t brick : batch.bricks()) all.emplace_back(brick, level);
+          const auto together = batch.extract(all);
+          const std::size_t size = together.size() / all.size();
+          for (std::size_t i = 0; i < all.size(); i += 7) {
+            const auto alone = batch.extract({all[i]});
+            BOOST_TEST((std::equal(alone.begin(), alone.end(),
+                                   together.begin() + static_cast<std::ptrdiff_t>(i * size))));
+          }
+        }
+      },
+      {}, "tiles", GoldStream::For::samples);
+}
+
+BOOST_AUTO_TEST_CASE(bounds_of_cells_for_two_rates_are_no_smaller_than_for_one) {
+  const ProjectionSet scan = noise_scan(12, 9, 11, 7);
+  attacks::Chain chain(scan);
+  opencl::State& state = attacks::device().state();
+  const Grid grid = grid_around_axis({6, 6, 6}, 0.7);
+  for (const int rate : {4, 8}) {
+    const GoldSettings one = Case::settings_of(grid, rate);
+    GoldSettings two = one;
+    two.coarse_rate = rate / 2;
+    CellBounds own(state, chain.filtered, chain.upsampler, chain.sups, one),
+        shared(state, chain.filtered, chain.upsampler, chain.sups, two);
+    const SlabShape slab{2, 4, 4, 2, grid.origin[2] + 2 * grid.spacing[2], 0, {0, 4}};
+    std::vector<float> p, r, shared_p, shared_r, coarse_p, coarse_r;
+    own.look_up(slab, {{0, 0, 1}}, rate, p, r);
+    shared.look_up(slab, {{0, 0, 1}}, rate, shared_p, shared_r);
+    shared.look_up(slab, {{0, 0, 1}}, rate / 2, coarse_p, coarse_r);
+    GoldSettings coarse = one;
+    coarse.rate = rate / 2;
+    CellBounds own_coarse(state, chain.filtered, chain.upsampler, chain.sups, coarse);
+    std::vector<float> q, s;
+    own_coarse.look_up(slab, {{0, 0, 1}}, rate / 2, q, s);
+    BOOST_REQUIRE(p.size() == 32u);
+    // fp32 rounds the weights and sums of the tables: the views and a few more roundings either way.
+    const float same = 1 - static_cast<float>(2 * (chain.filtered.geometry.views() + 8)) * 0x1p-23f;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      BOOST_TEST(p[i] > 0);
+      BOOST_TEST(r[i] > 0);
+      BOOST_TEST(shared_p[i] >= same * p[i]);
+      BOOST_TEST(shared_r[i] >= same * r[i]);
+      BOOST_TEST(coarse_p[i] >= same * q[i]);
+      BOOST_TEST(coarse_r[i] >= same * s[i]);
+    }
+  }
+}
+
+// A brick that coarse gold decided, given a tile at the fine rate.
+struct Refined {
+  explicit Refined(Case& c) {
+    while (brick < c.decided.size() && !(c.decided[brick].total >= 0 && c.decided[brick].rate < 8)) ++brick;
+    BOOST_REQUIRE(brick < c.decided.size());
+    c.bricks.level[brick] = {3, 3, 3};
+    alone.assign(c.bricks.level.size(), 0);
+    alone[brick] = 1;
+    c.classify.extract(alone);
+  }
+  std::size_t brick = 0;
+  std::vector<std::uint8_t> alone;  // the selection of it
+};
+
+BOOST_AUTO_TEST_CASE(tile_finer_than_coarse_gold_is_measured_on_fine_gold) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
+  const auto [brick, raised] = Refined(c);
+  // Altered at a node that coarse gold does not have.
+  BOOST_REQUIRE(c.bricks.samples[brick].size() == 17u * 17u * 17u);
+  c.bricks.samples[brick][(5 * 17 + 5) * 17 + 5] += static_cast<float>(3 * c.tolerance);
+  const MixedVolume volume = close_boundaries(c.bricks, Closing::none);
+  c.classify.measure(DeviceField(c.state, volume), volume.level, c.tolerance, raised, "verify");
+  BOOST_TEST(static_cast<double>(c.classify.measures()[brick].error) > 2 * c.tolerance);
+}
+
+// Closing `paper` raises a brick beside a finer one: coarse gold no longer resolves it.
+BOOST_AUTO_TEST_CASE(brick_that_closing_raised_is_measured_at_its_stored_level) {
+  const ProjectionSet lobes = simulated(marschner_lobb(10), 21, 21, 30);
+  Case c(lobes, grid_around_axis({16, 16, 16}, 0.8), 8, 0.2);
+  const auto [brick, raised] = Refined(c);
+  const std::vector<LevelTriple> stored = c.bricks.level;
+  MixedVolume volume = close_boundaries(c.bricks, Closing::none);
+  // As if its own level were 1 and closing had raised it: the volume holds the tile of level 3.
+  c.bricks.level[brick] = {1, 1, 1};
+  c.classify.measure(DeviceField(c.state, volume), stored, c.tolerance, raised, "verify");
+  BOOST_TEST(c.classify.measures()[brick].rate == 8);
+  BOOST_TEST(static_cast<double>(c.classify.measures()[brick].total) <= c.tolerance);
+}
+
+BOOST_AUTO_TEST_CASE(arithmetic_is_that_of_the_gold_that_rounds_most) {
+  // Wide enough for the blocks of coarse gold to reach farther than those of the fine one.
+  const ProjectionSet scan = noise_scan(12, 9, 70, 7);
+  attacks::Chain chain(scan);
+  opencl::State& state = attacks::device().state();
+  const GoldSettings settings = Case::settings_of(grid_around_axis({40, 40, 6}, 1.0), 8);
+  GoldRates gold(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  const GoldStream* coarse = gold.coarse();
+  if (coarse == nullptr) throw std::runtime_error("no coarse gold");
+  BOOST_TEST(coarse->arithmetic() > gold.fine().arithmetic());
+  BOOST_TEST(gold.arithmetic() == coarse->arithmetic());
+  const GoldStream fine(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  BOOST_TEST(GoldRates::arithmetic(state, chain.filtered, chain.upsampler, chain.sups, fine) ==
+             gold.arithmetic());
+}
+
+BOOST_AUTO_TEST_CASE(comparison_without_slack_and_windows_take_the_fine_gold_alone) {
+  const ProjectionSet scan = noise_scan(12, 9, 11, 7);
+  attacks::Chain chain(scan);
+  GoldSettings settings = Case::settings_of(grid_around_axis({6, 6, 6}, 0.7), 8);
+  opencl::State& state = attacks::device().state();
+  const auto has_coarse = [&](const GoldSettings& s) {
+    return GoldRates(state, chain.filtered, chain.upsampler, chain.sups, s).coarse() != nullptr;
+  };
+  BOOST_TEST(has_coarse(settings));
+  GoldSettings grid_only = settings, window = settings, low = settings;
+  grid_only.grid_only = true;
+  window.window = {0.0, 1.0};
+  low.rate = 2;
+  BOOST_TEST(!has_coarse(grid_only));
+  BOOST_TEST(!has_coarse(window));
+  BOOST_TEST(!has_coarse(low));
+}
+
+}  // namespace
+}  // namespace vdvr

@@ -1,0 +1,106 @@
+#define BOOST_TEST_MODULE parallel
+#include "host/system/parallel.hpp"
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <boost/test/unit_test.hpp>
+#include <fstream>
+#include <stdexcept>
+
+#include "vdvr/error.hpp"
+
+using namespace vdvr;
+
+namespace {
+
+constexpr std::int64_t n = 1000;
+
+// How often each index was taken.
+std::vector<int> taken(const Progress& progress = {}) {
+  std::vector<int> count(n);
+  parallel_for(n, progress, "stage", [&](std::int64_t i) { ++count[static_cast<std::size_t>(i)]; });
+  return count;
+}
+
+}  // namespace
+
+// The first case: later the C library keeps the stacks of ended threads for new ones.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadows need the address space
+BOOST_AUTO_TEST_CASE(without_a_thread_to_be_had_the_caller_does_it_all) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlim_t now = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+    const rlimit space{now + (1 << 20), RLIM_INFINITY};  // a thread's stack takes more
+    ::setrlimit(RLIMIT_AS, &space);
+    bool refused = false;
+    try {
+      std::thread([] {}).join();
+    } catch (const std::system_error&) {
+      refused = true;
+    }
+    ::_exit(refused && taken() == std::vector<int>(n, 1) ? 0 : refused ? 1 : 2);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  BOOST_TEST(WIFEXITED(status));
+  BOOST_TEST(WEXITSTATUS(status) == 0);  // 1: work was lost; 2: there was a thread after all
+}
+#endif
+
+BOOST_AUTO_TEST_CASE(every_index_is_taken_once) {
+  BOOST_TEST(taken() == std::vector<int>(n, 1), boost::test_tools::per_element());
+  parallel_for(0, {}, "", [](std::int64_t) { BOOST_ERROR("there is no index"); });
+}
+
+BOOST_AUTO_TEST_CASE(progress_is_called_from_the_calling_thread_and_never_goes_back) {
+  const auto caller = std::this_thread::get_id();
+  double last = 0;
+  taken([&](const std::string& stage, double share) {
+    BOOST_TEST(stage == "stage");
+    BOOST_REQUIRE((std::this_thread::get_id() == caller));
+    BOOST_TEST(share >= last);
+    BOOST_TEST(share <= 1);
+    last = share;
+  });
+}
+
+BOOST_AUTO_TEST_CASE(an_exception_of_any_thread_ends_the_loop_and_comes_out) {
+  std::atomic<std::int64_t> done{0};
+  BOOST_CHECK_THROW(parallel_for(n, {}, "",
+                                 [&](std::int64_t i) {
+                                   if (i == n / 2) throw std::domain_error("here");
+                                   ++done;
+                                 }),
+                    std::domain_error);
+  BOOST_TEST(done < n);
+}
+
+BOOST_AUTO_TEST_CASE(an_exception_of_progress_ends_the_loop_and_comes_out) {
+  const auto caller = std::this_thread::get_id();
+  std::atomic<bool> begun{false};
+  const auto body = [&](std::int64_t) {  // the others leave the caller an index, or it has nothing to report
+    if (std::this_thread::get_id() == caller) begun = true;
+    while (!begun) std::this_thread::yield();
+  };
+  BOOST_CHECK_THROW(parallel_for(
+                        n, [](auto&&...) { throw std::range_error("stop"); }, "", body),
+                    std::range_error);
+}
+
+BOOST_AUTO_TEST_CASE(a_requested_stop_ends_loops_that_report_nothing) {
+  std::atomic<std::int64_t> done{0};
+  BOOST_CHECK_EXCEPTION(parallel_for(n, {}, "",
+                                     [&](std::int64_t i) {
+                                       if (i == n / 2) request_stop(143);
+                                       ++done;
+                                     }),
+                        Interrupted, [](const Interrupted& e) { return e.exit_code() == 143; });
+  BOOST_TEST(done < n);
+  BOOST_CHECK_THROW(parallel_for(1, {}, "", [](std::int64_t) {}), Interrupted);
+  request_stop(0);
+  parallel_for(1, {}, "", [](std::int64_t) {});
+}
