@@ -39,7 +39,7 @@ struct Problem {
   [[nodiscard]] double updates() const { return static_cast<double>(n * n * n * k); }
 
   // Enqueues rows y .. y + band - 1.
-  void back_project_band(std::int64_t y, const std::string& filter) {
+  void back_project_band(std::int64_t y, Interpolation filter) {
     back_project(device.state(), scan.geometry, slab,
                  {n,
                   std::min(band, n - y),
@@ -48,7 +48,7 @@ struct Problem {
                   {{first(), first() + static_cast<double>(y) / rate}}},
                  filter, out);
   }
-  void back_project_all(const std::string& filter) {
+  void back_project_all(Interpolation filter) {
     for (std::int64_t y = 0; y < n; y += band) back_project_band(y, filter);
     opencl::finish(device.state(), "bench");
   }
@@ -77,7 +77,7 @@ double median(std::vector<double> values) {
 
 void back_projection(benchmark::State& bench) {
   Problem problem(bench.range(0), bench.range(1), static_cast<int>(bench.range(2)));
-  const std::string filter = bench.range(3) ? "cubic" : "linear";
+  const Interpolation filter = bench.range(3) ? Interpolation::cubic : Interpolation::linear;
   for (auto _ : bench) problem.back_project_all(filter);
   bench.counters["updates"] = benchmark::Counter(problem.updates() * static_cast<double>(bench.iterations()),
                                                  benchmark::Counter::kIsRate);
@@ -88,7 +88,7 @@ double difference(Problem& problem, std::span<const float> loop) {
   const std::int64_t n = problem.n, stride = column_stride(n), rows = (n + 15) / 16 * 16;
   double worst = 0, largest = 0;
   for (std::int64_t y0 = 0; y0 < n; y0 += Problem::band) {
-    problem.back_project_band(y0, "linear");
+    problem.back_project_band(y0, Interpolation::linear);
     const auto ours = problem.out.to_host();
     for (std::int64_t c = 0; c < std::min(Problem::band, n - y0) * n; ++c)
       for (std::int64_t z = 0; z < n; ++z) {
@@ -137,7 +137,7 @@ void beside_hand_loop(benchmark::State& bench) {
       return;
     }
     for (auto _ : bench) {
-      ours.push_back(seconds_of([&] { problem.back_project_all("linear"); }));
+      ours.push_back(seconds_of([&] { problem.back_project_all(Interpolation::linear); }));
       theirs.push_back(seconds_of([&] { run_hand_loop(loop, out); }));
       bench.SetIterationTime(ours.back());
     }

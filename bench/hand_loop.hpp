@@ -1,6 +1,6 @@
-// The same back-projection as kernels/fbp/back_project.cl with linear u, written by hand for AVX-512: per update
-// two loads and two fused multiply-adds. What the engine is measured against; never part of the library.
-// Called by back_project_bench.cpp.
+// The same back-projection as kernels/fbp/back_project.cl with linear u, written by hand for AVX-512: per
+// update two loads and two fused multiply-adds. What the engine is measured against; never part of the
+// library. Called by back_project_bench.cpp.
 #pragma once
 
 #include <cstdint>

@@ -57,13 +57,13 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
   }
   if (!ours) {
     // What --paper stands for (apps/vdvr/options.cpp).
-    rates = {8, "linear", 8};
+    rates = {8, Interpolation::linear, 8};
     plan_settings.coefficients = "sampled";
     plan_settings.terms = "grid";
-    plan_settings.levels = "isotropic";
+    plan_settings.levels = Levels::isotropic;
     build_options.closing = options.settings == Settings::paper ? Closing::paper : Closing::none;
     build_options.storage = StorageChoice::f32;
-    if (options.settings == Settings::paper_cells) build_options.granularity = plan_settings.granularity = 1;
+    if (options.settings == Settings::paper_cells) plan_settings.granularity = 1;
   }
   const auto start = Clock::now();
   const Plan plan = make_plan(device, scan, grid, {}, rates, c.tolerance, plan_settings, progress);

@@ -80,10 +80,10 @@ std::vector<float> function_on(const Phantom& object, const Grid& grid) {
 namespace {
 
 std::vector<float> reconstructed(Device& device, const ProjectionSet& scan, const Grid& grid, int upsampling,
-                                 const char* u_filter, const Progress& progress) {
+                                 Interpolation interpolation, const Progress& progress) {
   ReconstructOptions o;
   o.upsampling = upsampling;
-  o.u_filter = u_filter;
+  o.interpolation = interpolation;
   return reconstruct(device, scan, grid, o, progress).samples;
 }
 
@@ -91,12 +91,12 @@ std::vector<float> reconstructed(Device& device, const ProjectionSet& scan, cons
 
 std::vector<float> field_on(Device& device, const ProjectionSet& scan, const Grid& grid,
                             const Progress& progress) {
-  return reconstructed(device, scan, grid, 16, "cubic", progress);
+  return reconstructed(device, scan, grid, 16, Interpolation::cubic, progress);
 }
 
 std::vector<float> paper_field_on(Device& device, const ProjectionSet& scan, const Grid& grid,
                                   const Progress& progress) {
-  return reconstructed(device, scan, grid, 8, "linear", progress);
+  return reconstructed(device, scan, grid, 8, Interpolation::linear, progress);
 }
 
 Volume uniform_volume(Device& device, const ProjectionSet& scan, const Grid& grid, const Progress& progress) {

@@ -264,22 +264,23 @@ int bench_bounds(Arguments& args) {
   const CommonOptions common = common_options(args);
   FieldOptions field = field_options(args);
   const RateOptions rates = rate_options(args);
-  const int upsampling = rates.upsampling.value_or(8), gold = rates.gold.value_or(8);
-  const std::string u_filter = rates.u_filter == "auto" ? "linear" : rates.u_filter;
+  const Rates measured{rates.upsampling.value_or(8), rates.interpolation.value_or(Interpolation::linear),
+                       rates.gold.value_or(8)};
   Device device = open_device(common);
   ProgressLine progress("bench", common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
   field.center = center_of(field, scan.geometry);
   const Grid grid = make_grid(scan.geometry, grid_options(args));
   const auto start = Clock::now();
-  const Tightness t =
-      measure_tightness(device, scan, grid, field, upsampling, u_filter, gold, progress.callback());
+  const Tightness t = measure_tightness(device, scan, grid, field, measured, progress.callback());
   const double seconds = since(start);
   progress.clear();
   const auto ratio = [](double bound, double error) { return error > 0 ? Json(bound / error) : Json(); };
   Json line = bench_line("bounds", device, 1);
   line["cells"] = grid.cells;
-  line["rates"] = {{"upsampling_u", upsampling}, {"u_filter", u_filter}, {"gold", gold}};
+  line["rates"] = {{"upsampling_u", measured.upsampling},
+                   {"u_filter", text_of(measured.interpolation)},
+                   {"gold", measured.gold}};
   line["seconds"] = spread({seconds});
   line["bricks"] = t.bricks;
   line["gold"] = {

@@ -99,9 +99,7 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
     throw ToleranceError(fmt::format(
         "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
         c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
-  BuildOptions taken = options.build;
-  taken.granularity = result.volume.granularity;  // less than asked for on a grid thinner than a brick
-  c.options_json = options_json(planned.plan, taken, options.tolerance.of_max, planned.scan.geometry,
+  c.options_json = options_json(planned.plan, options.build, options.tolerance.of_max, planned.scan.geometry,
                                 center_of(planned.plan.field, planned.scan.geometry));
   c.content_sha256 = content_sha256(result.volume);
   return result;

@@ -13,7 +13,11 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kFilters{"ram-lak", "shepp-logan", "cosine", "hamming", "hann"};
+std::vector<std::string> filter_names() {
+  std::vector<std::string> names;
+  for (const auto& [window, name] : ramp_windows) names.emplace_back(name);
+  return names;
+}
 
 /// Options whose other values belong to later versions: name, all values, supported ones, help.
 struct Limited {
@@ -100,7 +104,7 @@ void add_field(Arguments& args) {
 
 FieldOptions field_options(const Arguments& args) {
   FieldOptions field;
-  field.filter = args.choice("filter", kFilters, field.filter);
+  field.filter = ramp_window_of(args.choice("filter", filter_names(), text_of(field.filter))).value();
   field.cutoff = args.positive_or("filter-cutoff", field.cutoff);
   if (field.cutoff > 1) throw InputError(fmt::format("--filter-cutoff: {} is above 1", field.cutoff));
   field.center = args.number("center");
@@ -150,11 +154,11 @@ int upsampling_option(const Arguments& args) {
 RateOptions rate_options(const Arguments& args) {
   RateOptions rates;
   rates.upsampling = rate(args, "upsampling", 64);
-  rates.u_filter = args.choice("u-filter", {"auto", "linear", "cubic"}, "auto");
+  rates.interpolation = interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic"}, "auto"));
   rates.gold = rate(args, "gold", 64);
   if (args.has("paper")) {
     if (!args.has("upsampling")) rates.upsampling = 8;
-    if (!args.has("u-filter")) rates.u_filter = "linear";
+    if (!args.has("u-filter")) rates.interpolation = Interpolation::linear;
     if (!args.has("gold")) rates.gold = 8;
   }
   return rates;
@@ -239,9 +243,6 @@ BuildOptions build_options(const Arguments& args) {
   build.closing =
       kClosings.at(args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse"));
   build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
-  build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
-  if (!is_power_of_two(build.granularity))
-    throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", build.granularity));
   if (const auto w = args.numbers("window", 2)) {
     if (!((*w)[0] <= (*w)[1])) throw InputError(fmt::format("--window: {} lies above {}", (*w)[0], (*w)[1]));
     build.window = std::pair{(*w)[0], (*w)[1]};
@@ -279,19 +280,22 @@ PlanSettings plan_settings(const Arguments& args) {
   settings.coefficients =
       args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
   settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
-  settings.levels =
+  const std::string levels =
       args.choice("levels", {"isotropic", "anisotropic"},
                   paper || build_options(args).closing == Closing::paper ? "isotropic" : "anisotropic");
-  settings.granularity = build_options(args).granularity;
+  settings.levels = levels == "isotropic" ? Levels::isotropic : Levels::anisotropic;
+  settings.granularity = static_cast<int>(args.integer_or("granularity", settings.granularity, 1, 8));
+  if (!is_power_of_two(settings.granularity))
+    throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", settings.granularity));
   settings.coarsening = coarsening(args);
-  if (settings.coarsening.value_or(LevelTriple{}) != LevelTriple{} && settings.levels == "isotropic")
+  if (settings.coarsening.value_or(LevelTriple{}) != LevelTriple{} && settings.levels == Levels::isotropic)
     throw InputError(
         "--base: isotropic levels have the grid itself as their base; take --levels anisotropic");
   if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
         "coarse");
-  if (settings.levels == "anisotropic" && build_options(args).closing == Closing::paper)
+  if (settings.levels == Levels::anisotropic && build_options(args).closing == Closing::paper)
     throw InputError("--closing paper is defined for --levels isotropic only; or take --closing coarse");
   return settings;
 }
@@ -299,17 +303,17 @@ PlanSettings plan_settings(const Arguments& args) {
 std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
                          const ParallelGeometry& geometry, double center) {
   nlohmann::ordered_json j;
-  j["granularity"] = build.granularity;
-  j["base"] = cells_per_base_sample(plan.coarsening);
+  j["granularity"] = plan.layout.granularity;
+  j["base"] = cells_per_base_sample(plan.layout.coarsening);
   j["closing"] = name_in(kClosings, build.closing);
   j["coefficients"] = plan.settings.coefficients;
-  j["levels"] = plan.settings.levels;
+  j["levels"] = text_of(plan.layout.levels);
   j["storage"] = name_in(kStorage, build.storage);
   j["terms"] = plan.settings.terms;
   j["epsilon_of"] = epsilon_of_max ? "max" : "range";
-  j["upsampling"] = plan.upsampling_u;
-  j["u_filter"] = plan.u_filter;
-  j["gold"] = plan.gold_rate;
+  j["upsampling"] = plan.rates.upsampling;
+  j["u_filter"] = text_of(plan.rates.interpolation);
+  j["gold"] = plan.rates.gold;
   j["geometry"] = {{"columns", geometry.columns},    {"rows", geometry.rows}, {"pitch_u", geometry.pitch_u},
                    {"pitch_v", geometry.pitch_v},    {"center", center},      {"unit", geometry.unit},
                    {"theta_rad", geometry.theta_rad}};

@@ -242,8 +242,9 @@ void print_certificate(const Certificate& c) {
   print_budget(c.budget, c.epsilon_abs);
   fmt::print("  measured     |V - gold| {:.4g}, with gold's and the projections' own errors {:.4g}, at {}\n",
              c.measured_max, c.measured_total, vec_text(c.worst_at));
-  fmt::print("  rates        u {}x {}, gold {}x\n", c.upsampling_u, c.u_filter, c.gold_rate);
-  fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", c.field.filter, c.field.cutoff,
+  fmt::print("  rates        u {}x {}, gold {}x\n", c.rates.upsampling, text_of(c.rates.interpolation),
+             c.rates.gold);
+  fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", text_of(c.field.filter), c.field.cutoff,
              c.field.center ? fmt::format(", centre {:.4f}", *c.field.center) : "");
   fmt::print("  not covered  {} samples ({:.2f} %)\n", c.not_covered_count, 100 * c.not_covered_fraction);
   if (c.window)

@@ -169,7 +169,8 @@ void add_spectra(PaperRun& run, const ProjectionSet& scan, const Grid& grid, con
     settings.terms = "grid";
     Tolerance tolerance;
     tolerance.relative = 0.03;
-    return make_plan(run.device, scan, grid, {}, {8, "linear", 8}, tolerance, settings, run.progress);
+    return make_plan(run.device, scan, grid, {}, {8, Interpolation::linear, 8}, tolerance, settings,
+                     run.progress);
   }();
   PlanPictures made = plan_pictures(run.device, scan, plan, run.progress);
   for (auto& p : made.pictures)

@@ -18,24 +18,26 @@ namespace {
 
 Json plan_json(const Planned& p) {
   const Plan& plan = p.plan;
-  return {
-      {"epsilon", plan.epsilon},
-      {"epsilon_abs", plan.epsilon_abs},
-      {"reference_range", plan.reference_range},
-      {"rates", {{"upsampling_u", plan.upsampling_u}, {"u_filter", plan.u_filter}, {"gold", plan.gold_rate}}},
-      {"base", cells_per_base_sample(plan.coarsening)},
-      {"bounds", bounds_json(plan.bounds)},
-      {"budget", budget_json(plan.budget)},
-      {"foreseen",
-       {{"gold_samples", plan.gold_samples},
-        {"memory_bytes", plan.memory_bytes},
-        {"seconds", plan.seconds},
-        {"samples_ratio", plan.samples_ratio}}},
-      {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
-      {"grid", grid_json(plan.grid)},
-      {"geometry", geometry_json(p.scan.geometry)},
-      {"report", report_json(p.scan.report)},
-      {"notes", plan.notes}};
+  return {{"epsilon", plan.epsilon},
+          {"epsilon_abs", plan.epsilon_abs},
+          {"reference_range", plan.reference_range},
+          {"rates",
+           {{"upsampling_u", plan.rates.upsampling},
+            {"u_filter", text_of(plan.rates.interpolation)},
+            {"gold", plan.rates.gold}}},
+          {"base", cells_per_base_sample(plan.layout.coarsening)},
+          {"bounds", bounds_json(plan.bounds)},
+          {"budget", budget_json(plan.budget)},
+          {"foreseen",
+           {{"gold_samples", plan.gold_samples},
+            {"memory_bytes", plan.memory_bytes},
+            {"seconds", plan.seconds},
+            {"samples_ratio", plan.samples_ratio}}},
+          {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
+          {"grid", grid_json(plan.grid)},
+          {"geometry", geometry_json(p.scan.geometry)},
+          {"report", report_json(p.scan.report)},
+          {"notes", plan.notes}};
 }
 
 void print_plan(const Planned& p) {
@@ -45,9 +47,10 @@ void print_plan(const Planned& p) {
   print_bounds(plan.bounds, plan.epsilon_abs);
   fmt::print("plan           epsilon {:.4g} ({:.4g} % of the range {:.4g})\n", plan.epsilon_abs,
              100 * plan.epsilon, plan.reference_range);
-  fmt::print("  rates        u {}x {}, gold {}x\n", plan.upsampling_u, plan.u_filter, plan.gold_rate);
+  fmt::print("  rates        u {}x {}, gold {}x\n", plan.rates.upsampling, text_of(plan.rates.interpolation),
+             plan.rates.gold);
   print_budget(plan.budget, plan.epsilon_abs);
-  const auto base = cells_per_base_sample(plan.coarsening);
+  const auto base = cells_per_base_sample(plan.layout.coarsening);
   fmt::print("  base         a sample every {} x {} x {} cells\n", base[0], base[1], base[2]);
   fmt::print("  not covered  {} samples ({:.2f} %)\n", plan.not_covered_count,
              100 * plan.not_covered_fraction);

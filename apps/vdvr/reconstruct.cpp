@@ -30,7 +30,7 @@ int reconstruct_command(Arguments& args) {
   ReconstructOptions options;
   options.field = field_options(args);
   options.upsampling = rates.upsampling.value_or(options.upsampling);
-  if (rates.u_filter != "auto") options.u_filter = rates.u_filter;
+  options.interpolation = rates.interpolation.value_or(options.interpolation);
   const auto output = args.path("output");
   if (!is_volume_path(output))
     throw InputError(fmt::format("{}: write a volume as .mha or .nrrd", output.string()));
@@ -46,16 +46,21 @@ int reconstruct_command(Arguments& args) {
   progress.clear();
 
   const auto [lo, hi] = std::minmax_element(volume.samples.begin(), volume.samples.end());
-  const Json json = {{"output", output.string()},          {"geometry", geometry_json(scan.geometry)},
-                     {"report", report_json(scan.report)}, {"grid", grid_json(grid)},
-                     {"upsampling", options.upsampling},   {"u_filter", options.u_filter},
-                     {"filter", options.field.filter},     {"range", {*lo, *hi}},
-                     {"device", device.info().name},       {"seconds", seconds_json(progress.seconds())}};
+  const Json json = {{"output", output.string()},
+                     {"geometry", geometry_json(scan.geometry)},
+                     {"report", report_json(scan.report)},
+                     {"grid", grid_json(grid)},
+                     {"upsampling", options.upsampling},
+                     {"u_filter", text_of(options.interpolation)},
+                     {"filter", text_of(options.field.filter)},
+                     {"range", {*lo, *hi}},
+                     {"device", device.info().name},
+                     {"seconds", seconds_json(progress.seconds())}};
   print_result(common, json, [&] {
     print_scan(scan);
     print_grid(grid);
-    fmt::print("reconstructed  u {}x {}, filter {}: {:.6g} to {:.6g}\n", options.upsampling, options.u_filter,
-               options.field.filter, *lo, *hi);
+    fmt::print("reconstructed  u {}x {}, filter {}: {:.6g} to {:.6g}\n", options.upsampling,
+               text_of(options.interpolation), text_of(options.field.filter), *lo, *hi);
     print_seconds(progress.seconds());
     fmt::print("written        {}\n", output.string());
   });

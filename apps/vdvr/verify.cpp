@@ -110,7 +110,7 @@ void check_field_options(const Arguments& args, const FieldOptions& stored) {
   if (!same)
     throw InputError(
         fmt::format("the file was certified for filter {}, cutoff {}, centre {}; verify takes them from it",
-                    stored.filter, stored.cutoff, stored.center.value_or(0)));
+                    text_of(stored.filter), stored.cutoff, stored.center.value_or(0)));
 }
 
 }  // namespace

@@ -40,7 +40,8 @@ BoundTable make_table(opencl::State& state, Upsampler& upsampler, const Filtered
   table.cells_z = cells.cells_z;
   const std::int64_t entries = cells.cells_z * g.views() * columns.count;
   opencl::DeviceArray<cl_float2> maxima(state, count(entries), "projection maxima");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> row_sup(state, "bounds/bound_table", "row_sup");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> row_sup(state, "bounds/bound_table",
+                                                                         "row_sup");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float, cl_int>
       fill(state, "bounds/bound_table", "bound_table");
@@ -74,8 +75,8 @@ BoundTable make_table(opencl::State& state, Upsampler& upsampler, const Filtered
   }
   const opencl::DeviceArray<cl_int> device_reach(state, std::span<const cl_int>(reach), "cell shadows");
   table.values = opencl::DeviceArray<cl_float2>(state, count(entries), "projection bounds");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(state, "bounds/bound_table",
-                                                                                    "dilate_table");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> dilate(
+      state, "bounds/bound_table", "dilate_table");
   dilate({{count(columns.count), count(cells.cells_z * g.views()), 1}, {64, 1, 1}}, table.values.buffer(),
          maxima.buffer(), device_reach.buffer(), to_int(g.views()), to_int(columns.count),
          to_int(cells.cells_z * g.views()));
@@ -109,9 +110,9 @@ BoundCells gold_nodes(const ParallelGeometry& geometry, const Grid& grid, int ra
 }
 
 BoundTable projection_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                            const UpsampledColumns& columns, int upsampling, const std::string& u_filter,
+                            const UpsampledColumns& columns, int upsampling, Interpolation interpolation,
                             const BoundCells& cells) {
-  const bool cubic = u_filter == "cubic";
+  const bool cubic = interpolation == Interpolation::cubic;
   const double step = scan.geometry.pitch_u / upsampling;
   // A row's sup is at most its largest sample times 1 / cos(pi / (2 rate)) (Ehlich, Zeller).
   Term term{cubic ? 4 : 2,
@@ -206,14 +207,14 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
 
 std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,
                                              const FilteredScan& scan, const Grid& grid, int upsampling,
-                                             const std::string& u_filter, int rate, const Index3& first_cell,
+                                             Interpolation interpolation, int rate, const Index3& first_cell,
                                              const Index3& nodes) {
   Vec3 first{};
   for (std::size_t a = 0; a < 3; ++a)
     first[a] = grid.origin[a] + static_cast<double>(first_cell[a]) * grid.spacing[a];
   const BoundTable table =
       projection_table(state, upsampler, scan, columns_for(scan.geometry, grid, std::min(8, upsampling)),
-                       upsampling, u_filter, gold_nodes(scan.geometry, grid, rate, first[2], nodes[2]));
+                       upsampling, interpolation, gold_nodes(scan.geometry, grid, rate, first[2], nodes[2]));
   const ColumnBlocks blocks{
       nodes[0], nodes[1], grid.spacing[0] / rate, grid.spacing[1] / rate, {{first[0], first[1]}}, {}};
   opencl::DeviceArray<float> bound(state, count(nodes[0] * nodes[1] * nodes[2]), "node bounds");

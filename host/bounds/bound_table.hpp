@@ -42,7 +42,7 @@ struct BoundTable {
 /// P of interpolation in u at rate `upsampling`. `columns` is where the derivative is evaluated, not denser
 /// than that. Cost: one derivative of the slab.
 BoundTable projection_table(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                            const UpsampledColumns& columns, int upsampling, const std::string& u_filter,
+                            const UpsampledColumns& columns, int upsampling, Interpolation interpolation,
                             const BoundCells& cells);
 
 /// The part of T that second differences of gold do not show. Cost: three derivatives at a quarter of the
@@ -65,7 +65,7 @@ void project_bound(opencl::State& state, const FilteredScan& scan, const BoundTa
 /// counted x, y, z. The sharpest form, at the cost of gold itself: the certificate takes base cells.
 std::vector<float> projection_bound_at_nodes(opencl::State& state, Upsampler& upsampler,
                                              const FilteredScan& scan, const Grid& grid, int upsampling,
-                                             const std::string& u_filter, int rate, const Index3& first_cell,
+                                             Interpolation interpolation, int rate, const Index3& first_cell,
                                              const Index3& nodes);
 
 }  // namespace vdvr

@@ -100,6 +100,14 @@ class Member {
       throw FileError(fmt::format("certificate: member '{}' is {}, expected a rate of at least 1", path_, n));
     return static_cast<int>(n);
   }
+  /// What `parse` makes of the text, which must be one of those that `names` lists.
+  template <class Parse>
+  [[nodiscard]] auto choice(Parse parse, const char* names) const {
+    const auto value = parse(text());
+    if (!value)
+      throw FileError(fmt::format("certificate: member '{}' is '{}', expected {}", path_, text(), names));
+    return *value;
+  }
   template <std::size_t N>
   [[nodiscard]] std::array<double, N> numbers() const {
     if (list().size() != N)
@@ -179,11 +187,11 @@ void read_promise(const Member& m, Certificate& c) {
 
 void read_method(const Member& m, Certificate& c) {
   const Member rates = m.at("rates"), field = m.at("field");
-  c.upsampling_u = rates.at("upsampling_u").rate();
-  c.u_filter = rates.at("u_filter").text();
-  c.gold_rate = rates.at("gold").rate();
+  c.rates.upsampling = rates.at("upsampling_u").rate();
+  c.rates.interpolation = rates.at("u_filter").choice(interpolation_of, "linear or cubic");
+  c.rates.gold = rates.at("gold").rate();
   c.bounds = read_bounds(m.at("bounds"));
-  c.field.filter = field.at("filter").text();
+  c.field.filter = field.at("filter").choice(ramp_window_of, "ram-lak, shepp-logan, cosine, hamming or hann");
   c.field.cutoff = field.at("cutoff").number();
   if (const Member center = field.at("center"); !center.is_null()) c.field.center = center.number();
   c.padding = field.at("padding").integer();
@@ -261,9 +269,11 @@ std::string to_json(const Certificate& c) {
   j["measured_max"] = finite("measured_max", c.measured_max);
   j["measured_total"] = finite("measured_total", c.measured_total);
   j["worst_at"] = numbers("worst_at", c.worst_at);
-  j["rates"] = {{"upsampling_u", c.upsampling_u}, {"u_filter", c.u_filter}, {"gold", c.gold_rate}};
+  j["rates"] = {{"upsampling_u", c.rates.upsampling},
+                {"u_filter", text_of(c.rates.interpolation)},
+                {"gold", c.rates.gold}};
   j["bounds"] = bounds(c.bounds);
-  j["field"] = {{"filter", c.field.filter}, {"cutoff", finite("field.cutoff", c.field.cutoff)}};
+  j["field"] = {{"filter", text_of(c.field.filter)}, {"cutoff", finite("field.cutoff", c.field.cutoff)}};
   j["field"]["center"] = c.field.center ? Json(finite("field.center", *c.field.center)) : Json(nullptr);
   j["field"]["padding"] = c.padding;
   j["window"] = c.window ? numbers("window", std::array{c.window->first, c.window->second}) : Json(nullptr);

@@ -159,13 +159,15 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const 
 
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                        const std::string& u_filter) {
+                        Interpolation interpolation) {
   const ParallelGeometry& g = scan.geometry;
   const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const double weight_gain = u_filter == "cubic" ? 1.25 : 1.0;    // largest sum of |Lagrange weights|
-  const double slope_gain = u_filter == "cubic" ? 4.0 / 3 : 1.0;  // and of their derivative's, of differences
+  const double weight_gain =
+      interpolation == Interpolation::cubic ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
+  const double slope_gain =
+      interpolation == Interpolation::cubic ? 4.0 / 3 : 1.0;  // and of their derivative's, of differences
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
   const double upsampling =
@@ -173,9 +175,11 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                        (product_error(g.columns, column_run) + 2) * gain_u * sups.value);
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
-  const double per_view = u_filter == "cubic" ? 4 : 2,
-               runs = std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(u_filter)));
-  const double summation = unit_roundoff * (per_view * static_cast<double>(view_run(u_filter)) + runs + 8) *
+  const double per_view = interpolation == Interpolation::cubic ? 4 : 2,
+               runs =
+                   std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(interpolation)));
+  const double summation = unit_roundoff *
+                           (per_view * static_cast<double>(view_run(interpolation)) + runs + 8) *
                            weight_gain * sups.value;
   // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is
   // bounded by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.

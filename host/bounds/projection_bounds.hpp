@@ -54,7 +54,7 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const 
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                        const std::string& u_filter);
+                        Interpolation interpolation);
 
 /// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, e the proved worst error of a
 /// wave (error_map.hpp), for interpolation in u at each rate and for gold at each rate. Cost: views * rows *

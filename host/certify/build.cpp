@@ -60,12 +60,9 @@ class Builder {
     host_.count(4 * (2 * plan.base.samples.size() + plan.fitted.size()), "the base samples");
     host_.count(8 * cells, "the slack of base cells");
     bricks_.grid = plan.grid;
-    bricks_.granularity = fitting_granularity(options.granularity, plan.grid);
-    bricks_.rate = plan.gold_rate;
-    bricks_.coarsening = plan.coarsening;
-    if (!is_possible(plan.coarsening, plan.grid, bricks_.granularity, plan.gold_rate))
-      throw InputError(
-          fmt::format("a plan for granularity {}, not {}", plan.settings.granularity, options.granularity));
+    bricks_.granularity = plan.layout.granularity;
+    bricks_.rate = plan.rates.gold;
+    bricks_.coarsening = plan.layout.coarsening;
     bricks_.sampled = plan.settings.coefficients == "sampled";
     choose_storage(options.storage);
     closing_ = options.closing;
@@ -81,12 +78,16 @@ class Builder {
     upsampler_.emplace(state_, filtered_);
     watch_.lap("filter");
     sups_ = field_sups(state_, *upsampler_, filtered_);
-    GoldSettings settings{plan.grid,         bricks_.granularity, plan.gold_rate,
-                          plan.upsampling_u, plan.u_filter,       options.window};
+    GoldSettings settings{plan.grid,
+                          plan.layout.granularity,
+                          plan.rates.gold,
+                          plan.rates.upsampling,
+                          plan.rates.interpolation,
+                          options.window};
     settings.midrange = plan.settings.coefficients == "midrange";
-    settings.anisotropic = plan.settings.levels == "anisotropic" && closing_ != Closing::paper;
+    settings.anisotropic = plan.layout.levels == Levels::anisotropic && closing_ != Closing::paper;
     settings.grid_only = plan.settings.terms == "grid";
-    settings.coarsening = plan.coarsening;
+    settings.coarsening = plan.layout.coarsening;
     settings.lattice = bricks_.lattice;
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
     node_test_.emplace(state_, *gold_, bricks_, host_, journal_, progress_,
@@ -98,10 +99,10 @@ class Builder {
 
   /// Puts the base on the lattice of integer samples; before it is measured.
   void choose_storage(StorageChoice storage) {
-    bricks_.base = plan_.fitted.empty() ? take_base(plan_.base, plan_.coarsening) : plan_.fitted;
-    bricks_.lattice = choose_lattice(bricks_.base, storage,
-                                     most_rounding(plan_.epsilon_abs, plan_.settings.levels == "anisotropic"),
-                                     units_.density());
+    bricks_.base = plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted;
+    bricks_.lattice = choose_lattice(
+        bricks_.base, storage, most_rounding(plan_.epsilon_abs, plan_.layout.levels == Levels::anisotropic),
+        units_.density());
     round_base(bricks_.base, bricks_.lattice);
   }
   bool rounds() const { return bricks_.lattice.step > 0; }
@@ -283,7 +284,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   }
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {builder.slack().gold, "curvature: signed second differences of gold, with remainder"};
-  c.budget.projection = {builder.slack().projection, plan.u_filter == "cubic"
+  c.budget.projection = {builder.slack().projection, plan.rates.interpolation == Interpolation::cubic
                                                          ? "curvature: signed sums of |q_uuuu| maxima"
                                                          : "curvature: signed sums of |q_uu| maxima"};
   c.budget.arithmetic = {builder.arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
@@ -297,9 +298,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
     c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
     c.holds_image3d = certified && *c.total_image3d <= c.epsilon_abs;
   }
-  c.upsampling_u = plan.upsampling_u;
-  c.u_filter = plan.u_filter;
-  c.gold_rate = plan.gold_rate;
+  c.rates = plan.rates;
   c.bounds = plan.bounds;
   c.field = plan.field;
   c.field.center = builder.filtered().geometry.center;
@@ -341,7 +340,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const FieldSlopes base_slopes = field_slopes(as_mixed(plan.base));
   const double underflow = from_world(sampler_underflow(device.info()), units);
   SamplerTerms reserve = sampler_terms(base_slopes, plan.grid, builder.probe(), longest_atlas(device.info()),
-                                       plan.epsilon_abs, plan.gold_rate, underflow);
+                                       plan.epsilon_abs, plan.rates.gold, underflow);
   const auto scale = [](SamplerTerms& t, double f) {
     t.buffer.value *= f;
     if (t.image3d) t.image3d->value *= f;
@@ -368,7 +367,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     }
     const SamplerTerms sampler = sampler_terms(field_slopes(result.volume), plan.grid, builder.probe(),
                                                atlas_length(device.info(), result.volume), plan.epsilon_abs,
-                                               plan.gold_rate, underflow);
+                                               plan.rates.gold, underflow);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt >= 2 || is_comparison(plan.settings, options)) {
@@ -384,9 +383,6 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 
 BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
                   const Progress& progress) {
-  if (options.granularity != 1 && options.granularity != 2 && options.granularity != 4 &&
-      options.granularity != 8)
-    throw InputError(fmt::format("--granularity {} must be 1, 2, 4 or 8", options.granularity));
   check_line_integrals(scan);
   const Units units = units_of(scan);
   if (units.are_world()) return build_in_units(device, scan, units, plan, options, progress);

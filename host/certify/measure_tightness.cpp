@@ -113,19 +113,19 @@ double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
 
 // All but the scan in `units`.
 Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
-                           const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
-                           const Progress& progress) {
+                           const FieldOptions& field, const Rates& rates, const Progress& progress) {
   opencl::State& state = device.state();
   const FilteredScan filtered =
       filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
-  const auto stream_at = [&](int up, const std::string& filter, int gold) {
-    return GoldStream(state, filtered, upsampler, sups, {grid, granularity, gold, up, filter, {}});
+  const auto stream_at = [&](const Rates& r) {
+    return GoldStream(state, filtered, upsampler, sups,
+                      {grid, granularity, r.gold, r.upsampling, r.interpolation, {}});
   };
-  const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
-  GoldStream sharp = stream_at(16, "cubic", rate), given = stream_at(upsampling, u_filter, rate),
-             truth = stream_at(16, "cubic", rate * finer);
+  const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, Interpolation::cubic, {});
+  GoldStream sharp = stream_at({16, Interpolation::cubic, rates.gold}), given = stream_at(rates),
+             truth = stream_at({16, Interpolation::cubic, rates.gold * finer});
   const BrickBounds t = brick_bounds(state, sharp, base, progress),
                     p = brick_bounds(state, given, base, progress);
 
@@ -158,8 +158,8 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
     out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
     const Index3 first{id % n[0] * granularity, id / n[0] % n[1] * granularity,
                        id / n[0] / n[1] * granularity};
-    const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, upsampling, u_filter, rate,
-                                                 first, computed.side);
+    const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, rates.upsampling,
+                                                 rates.interpolation, rates.gold, first, computed.side);
     for (std::int64_t z = 0; z < computed.side[2]; ++z)
       for (std::int64_t y = 0; y < computed.side[1]; ++y)
         for (std::int64_t x = 0; x < computed.side[0]; ++x) {
@@ -179,11 +179,9 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
 }  // namespace
 
 Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
-                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
-                            const Progress& progress) {
+                            const FieldOptions& field, const Rates& rates, const Progress& progress) {
   const Units units = units_of(scan);
-  Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, upsampling, u_filter,
-                                 rate, progress);
+  Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, rates, progress);
   for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_nodes, &t.projection_cells,
                         &t.projection_error, &t.arithmetic})
     *value = to_world(*value, units);

@@ -8,7 +8,9 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include "host/bounds/covered_range.hpp"
 #include "host/bounds/paper_bounds.hpp"
@@ -28,12 +30,6 @@ namespace {
 constexpr double pi = std::numbers::pi;
 const std::vector<int> bound_rates{1, 2, 4, 8, 16, 32};
 
-struct Rates {
-  int upsampling;
-  std::string u_filter;
-  int gold;
-};
-
 // Of the tolerance, what T, P and rounding may take: a smaller share costs time, a larger one storage.
 constexpr double share = 0.5, patient_share = 0.65;
 // The same for P alone: a finer cubic interpolation costs memory only.
@@ -45,22 +41,20 @@ std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 std::vector<Rates> candidates(const RateOptions& wanted) {
   std::vector<Rates> all;
   for (const int gold : {8, 16, 32})
-    for (const auto& [upsampling, filter] : {std::pair<int, const char*>{8, "linear"},
-                                             {16, "linear"},
-                                             {8, "cubic"},
-                                             {16, "cubic"},
-                                             {32, "cubic"}})
-      all.push_back({upsampling, filter, gold});
+    for (const auto& [upsampling, interpolation] : {std::pair{8, Interpolation::linear},
+                                                    {16, Interpolation::linear},
+                                                    {8, Interpolation::cubic},
+                                                    {16, Interpolation::cubic},
+                                                    {32, Interpolation::cubic}})
+      all.push_back({upsampling, interpolation, gold});
   for (Rates& r : all) {
     if (wanted.upsampling) r.upsampling = *wanted.upsampling;
     if (wanted.gold) r.gold = *wanted.gold;
   }
   std::vector<Rates> out;
   for (const Rates& r : all) {
-    const bool same = std::any_of(out.begin(), out.end(), [&](const Rates& o) {
-      return o.upsampling == r.upsampling && o.u_filter == r.u_filter && o.gold == r.gold;
-    });
-    if (!same && (wanted.u_filter == "auto" || wanted.u_filter == r.u_filter)) out.push_back(r);
+    const bool same = std::find(out.begin(), out.end(), r) != out.end();
+    if (!same && wanted.interpolation.value_or(r.interpolation) == r.interpolation) out.push_back(r);
   }
   return out;
 }
@@ -74,8 +68,11 @@ void check_rates(const RateOptions& rates) {
                                  *rates.upsampling));
   if (rates.gold && !power(*rates.gold, 2))
     throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
-  if (rates.u_filter != "auto" && rates.u_filter != "linear" && rates.u_filter != "cubic")
-    throw InputError(fmt::format("--u-filter '{}' must be auto, linear or cubic", rates.u_filter));
+}
+
+void check_granularity(int granularity) {
+  if (granularity < 1 || granularity > 8 || !std::has_single_bit(static_cast<unsigned>(granularity)))
+    throw InputError(fmt::format("granularity {} must be 1, 2, 4 or 8", granularity));
 }
 
 // Global bounds at every rate, the paper's beside ours.
@@ -151,7 +148,8 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
 // Whether the grid keeps enough of the tolerance. Cubic interpolation in u costs twice the time and hardly
 // any of the tolerance: linear must not cost much more, or the volume pays for it.
 bool fits(const Rates& r, const Trial& t, double epsilon) {
-  if (2.5 * t.projection > (r.u_filter == "linear" ? linear_share : cubic_share) * epsilon) return false;
+  if (2.5 * t.projection > (r.interpolation == Interpolation::linear ? linear_share : cubic_share) * epsilon)
+    return false;
   return 1.1 * t.slack + 4 * t.arithmetic <= share * epsilon;
 }
 
@@ -204,19 +202,24 @@ double worst_node_bound(opencl::State& state, Upsampler& upsampler, const Filter
     first[a] = at_brick[a] * s.granularity;
     nodes[a] = std::min<std::int64_t>(s.granularity, s.grid.cells[a] - first[a]) * s.rate + 1;
   }
-  const auto p = projection_bound_at_nodes(state, upsampler, scan, s.grid, s.upsampling, s.u_filter, s.rate,
-                                           first, nodes);
+  const auto p = projection_bound_at_nodes(state, upsampler, scan, s.grid, s.upsampling, s.interpolation,
+                                           s.rate, first, nodes);
   return static_cast<double>(*std::max_element(p.begin(), p.end()));
 }
 
 void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t, double node_by_node) {
-  bounds.push_back({"projection", "signed curvature, node by node, " + r.u_filter + " in u (trial)",
-                    r.upsampling, node_by_node, true});
-  bounds.push_back({"projection", "signed curvature, by base cell, " + r.u_filter + " in u (trial)",
-                    r.upsampling, t.projection, true});
   bounds.push_back(
-      {"gold", fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling, r.u_filter),
-       r.gold, t.gold, true});
+      {"projection",
+       std::string("signed curvature, node by node, ") + text_of(r.interpolation) + " in u (trial)",
+       r.upsampling, node_by_node, true});
+  bounds.push_back(
+      {"projection",
+       std::string("signed curvature, by base cell, ") + text_of(r.interpolation) + " in u (trial)",
+       r.upsampling, t.projection, true});
+  bounds.push_back({"gold",
+                    fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling,
+                                text_of(r.interpolation)),
+                    r.gold, t.gold, true});
 }
 
 void check_tolerance(const Tolerance& tolerance) {
@@ -261,7 +264,7 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
 // pass of gold.
 double largest_of_gold(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
                        const FieldSups& sups, const Grid& grid, const Rates& r) {
-  GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.u_filter};
+  GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.interpolation};
   settings.base_only = true;
   GoldStream stream(state, filtered, upsampler, sups, settings);
   float largest = 0;
@@ -271,142 +274,186 @@ double largest_of_gold(opencl::State& state, const FilteredScan& filtered, Upsam
   return static_cast<double>(largest);
 }
 
-// All but the scan, and what is thrown, in `units`.
-Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
-                   const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
-                   const PlanSettings& settings, const Progress& progress) {
-  ParallelGeometry used = scan.geometry;
-  if (field.center) used.center = *field.center;
-  opencl::State& state = device.state();
-  HostMemory host(state);
-  host.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
-  host.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
-  Plan plan;
-  plan.notes = check_scan(used);
-  plan.grid = grid;
-  plan.field = field;
-  plan.settings = settings;
-  report(progress, "plan", 0.0);
-  const auto now = [] { return std::chrono::steady_clock::now(); };
-  const auto since = [&](auto start) { return std::chrono::duration<double>(now() - start).count(); };
-  auto start = now();
-  const FilteredScan filtered =
-      filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
-  double preparation = since(start);  // that build will repeat
-  Upsampler upsampler(state, filtered);
-  const Coverage coverage(filtered.geometry);
+// The rates whose T, P and rounding a tolerance leaves room for, and what the trial of them showed.
+struct Chosen {
+  Rates rates;
+  Trial trial;
+};
 
-  // The reference range at rates whose own error cannot matter.
-  plan.base = reconstruct_field(state, filtered, upsampler, grid, 8, "cubic", {});
-  check_densities(to_world(largest_magnitude(plan.base.samples), units));
-  const CoveredRange range = covered_range(plan.base, coverage);
-  plan.not_covered_count = range.not_covered;
-  plan.not_covered_fraction =
-      static_cast<double>(range.not_covered) / static_cast<double>(grid.sample_count());
-  // One plane of covered samples suffices; none does not.
-  if (range.not_covered == grid.sample_count() && grid.cells[2] > 1)
-    throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
-  plan.reference_range = range.high - range.low;
-  const FieldSups sups = field_sups(state, upsampler, filtered);
-  const auto all = candidates(rates);
-  set_epsilon(plan, tolerance,
-              tolerance.of_max ? largest_of_gold(state, filtered, upsampler, sups, grid, all.front()) : 0);
-  report(progress, "plan", 0.3);
+double seconds_of(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
-  plan.bounds = global_bounds(state, filtered, sups, plan.base, settings.foresee);
-  report(progress, "plan", 0.6);
+// One plan, step by step. All but the scan, and what is thrown, in `units`.
+class Planner {
+ public:
+  Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+          const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
+      : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
+    host_.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
+    host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
+    ParallelGeometry used = scan.geometry;
+    if (field.center) used.center = *field.center;
+    plan_.notes = check_scan(used);
+    plan_.grid = grid;
+    plan_.field = field;
+    plan_.settings = settings;
+    plan_.layout = {fitting_granularity(settings.granularity, grid), {}, settings.levels};
+    report(progress_, "plan", 0.0);
+    preparation_ = seconds_of([&] {
+      filtered_ =
+          filter_projections(state_, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
+    });
+    upsampler_.emplace(state_, filtered_);
+    coverage_.emplace(filtered_.geometry);
+  }
+
+  Plan make(const RateOptions& wanted, const Tolerance& tolerance) {
+    const std::vector<Rates> all = candidates(wanted);
+    reconstruct_reference();
+    sups_ = field_sups(state_, *upsampler_, filtered_);
+    set_epsilon(plan_, tolerance,
+                tolerance.of_max
+                    ? largest_of_gold(state_, filtered_, *upsampler_, sups_, plan_.grid, all.front())
+                    : 0);
+    report(progress_, "plan", 0.3);
+    plan_.bounds = global_bounds(state_, filtered_, sups_, plan_.base, plan_.settings.foresee);
+    report(progress_, "plan", 0.6);
+    const Chosen chosen = choose_rates(all);
+    take(chosen);
+    report(progress_, "plan", 0.8);
+    lay_out_base(chosen.trial);
+    if (plan_.settings.foresee) foresee(chosen.trial);
+    report(progress_, "plan", 1.0);
+    return std::move(plan_);
+  }
+
+ private:
+  // The reference range and the coverage, at rates whose own error cannot matter.
+  void reconstruct_reference() {
+    plan_.base = reconstruct_field(state_, filtered_, *upsampler_, plan_.grid, 8, Interpolation::cubic, {});
+    check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
+    const CoveredRange range = covered_range(plan_.base, *coverage_);
+    plan_.not_covered_count = range.not_covered;
+    plan_.not_covered_fraction =
+        static_cast<double>(range.not_covered) / static_cast<double>(plan_.grid.sample_count());
+    // One plane of covered samples suffices; none does not.
+    if (range.not_covered == plan_.grid.sample_count() && plan_.grid.cells[2] > 1)
+      throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+    plan_.reference_range = range.high - range.low;
+  }
+
+  [[nodiscard]] bool grid_only() const { return plan_.settings.terms == "grid"; }
+  [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
+    GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
+    s.midrange = plan_.settings.coefficients == "midrange";
+    s.grid_only = grid_only();
+    s.anisotropic = plan_.layout.levels == Levels::anisotropic;
+    s.coarsening = plan_.layout.coarsening;
+    return s;
+  }
+
+  Trial try_out(const Rates& r) {
+    GoldStream stream(state_, filtered_, *upsampler_, sups_, settings_at(r));
+    const double arithmetic = GoldRates::arithmetic(state_, filtered_, *upsampler_, sups_, stream);
+    const Trial t = try_rates(state_, stream, arithmetic, plan_.base, plan_.epsilon_abs);
+    add_trial_bounds(plan_.bounds, r, t,
+                     worst_node_bound(state_, *upsampler_, filtered_, stream.settings(), t.brick));
+    return t;
+  }
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
-  // all.
-  const bool grid_only = settings.terms == "grid";
-  const auto settings_at = [&](const Rates& r) {
-    GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
-    s.midrange = settings.coefficients == "midrange";
-    s.grid_only = grid_only;
-    s.anisotropic = settings.levels == "anisotropic";
-    s.coarsening = plan.coarsening;
-    return s;
-  };
-  const auto stream_at = [&](const Rates& r) {
-    return GoldStream(state, filtered, upsampler, sups, settings_at(r));
-  };
-  std::optional<std::pair<Rates, Trial>> chosen, finest;
-  for (const Rates& r : all) {
-    // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
-    const double step = filtered.geometry.pitch_u / r.upsampling;
-    if (!grid_only && r.u_filter == "linear" && &r != &all.back() &&
-        2.5 * 0.25 * step * step / 8 * sups.second_u > linear_share * plan.epsilon_abs)
-      continue;
-    GoldStream stream = stream_at(r);
-    const double arithmetic = GoldRates::arithmetic(state, filtered, upsampler, sups, stream);
-    const Trial t = try_rates(state, stream, arithmetic, plan.base, plan.epsilon_abs);
-    add_trial_bounds(plan.bounds, r, t,
-                     worst_node_bound(state, upsampler, filtered, stream.settings(), t.brick));
-    if (!finest || t.slack < finest->second.slack) finest = {r, t};
-    if (grid_only || fits(r, t, plan.epsilon_abs)) {
-      chosen = {r, t};
-      break;
+  // all. Throws ToleranceError where nothing does.
+  Chosen choose_rates(const std::vector<Rates>& all) {
+    std::optional<Chosen> finest;
+    for (const Rates& r : all) {
+      // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
+      const double step = filtered_.geometry.pitch_u / r.upsampling;
+      if (!grid_only() && r.interpolation == Interpolation::linear && &r != &all.back() &&
+          2.5 * 0.25 * step * step / 8 * sups_.second_u > linear_share * plan_.epsilon_abs)
+        continue;
+      const Trial t = try_out(r);
+      if (!finest || t.slack < finest->trial.slack) finest = {r, t};
+      if (grid_only() || fits(r, t, plan_.epsilon_abs)) return {r, t};
+      // A finer gold costs eight times as much: put up with a larger share before that.
+      const bool last_of_gold = &r == &all.back() || (&r + 1)->gold > r.gold;
+      if (last_of_gold &&
+          1.1 * finest->trial.slack + 4 * finest->trial.arithmetic <= patient_share * plan_.epsilon_abs)
+        return *finest;
+      report(progress_, "plan", 0.7);
     }
-    // A finer gold costs eight times as much: put up with a larger share before that.
-    const bool last_of_gold = &r == &all.back() || (&r + 1)->gold > r.gold;
-    if (last_of_gold &&
-        1.1 * finest->second.slack + 4 * finest->second.arithmetic <= patient_share * plan.epsilon_abs) {
-      chosen = finest;
-      break;
-    }
-    report(progress, "plan", 0.7);
+    const double needed = least_needed(finest->trial, plan_.base);
+    if (needed < plan_.epsilon_abs) return *finest;
+    throw out_of_reach(*finest, needed);
   }
-  const double needed = least_needed(finest->second, plan.base);
-  if (!chosen && needed < plan.epsilon_abs) chosen = finest;
-  if (!chosen) {
-    const Trial& t = finest->second;
-    throw ToleranceError(fmt::format(
+
+  [[nodiscard]] ToleranceError out_of_reach(const Chosen& finest, double needed) const {
+    const auto& [r, t] = finest;
+    return ToleranceError(fmt::format(
         "epsilon {:.4g} is out of reach: at upsampling {} {}, gold {}, {} may err by {:.4g} and rounding by "
         "{:.4g}; the smallest that would do is about {:.4g} ({:.3g} % of the range)",
-        to_world(plan.epsilon_abs, units), finest->first.upsampling, finest->first.u_filter,
-        finest->first.gold, t.projection > t.gold ? "interpolating the projections" : "interpolating gold",
-        to_world(t.slack, units), to_world(t.arithmetic, units), to_world(1.1 * needed, units),
-        100 * 1.1 * needed / plan.reference_range));
+        to_world(plan_.epsilon_abs, units_), r.upsampling, text_of(r.interpolation), r.gold,
+        t.projection > t.gold ? "interpolating the projections" : "interpolating gold",
+        to_world(t.slack, units_), to_world(t.arithmetic, units_), to_world(1.1 * needed, units_),
+        100 * 1.1 * needed / plan_.reference_range));
   }
-  const auto& [r, t] = *chosen;
-  plan.upsampling_u = r.upsampling;
-  plan.u_filter = r.u_filter;
-  plan.gold_rate = r.gold;
-  plan.budget.projection = {t.projection, "curvature, node-wise, on trial blocks"};
-  plan.budget.gold = {t.gold, "second differences of gold on trial blocks"};
-  plan.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
-  plan.budget.grid = {grid_only ? plan.epsilon_abs : plan.epsilon_abs - t.slack - t.arithmetic,
-                      grid_only ? "all: no other term counts" : "what is left"};
-  plan.gold_samples = 1;
-  for (const std::int64_t cells : grid.cells)
-    plan.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
-  if (r.upsampling != 8 || r.u_filter != "cubic")
-    plan.base = reconstruct_field(state, filtered, upsampler, grid, r.upsampling, r.u_filter, {});
-  report(progress, "plan", 0.8);
 
-  plan.coarsening = coarsening_of(plan, coverage, settings_at(r), t);
-  if (settings.coefficients == "midrange") {
-    start = now();
-    plan.fitted = take_base(plan.base, plan.coarsening);
-    fit_base_samples(state, filtered, upsampler, sups, settings_at(r), plan.fitted, {});
-    preparation += since(start);
+  // Notes the rates with their shares of the tolerance; the base samples are those that gold of them has.
+  void take(const Chosen& chosen) {
+    const auto& [r, t] = chosen;
+    plan_.rates = r;
+    plan_.budget.projection = {t.projection, "curvature, node-wise, on trial blocks"};
+    plan_.budget.gold = {t.gold, "second differences of gold on trial blocks"};
+    plan_.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
+    plan_.budget.grid = {grid_only() ? plan_.epsilon_abs : plan_.epsilon_abs - t.slack - t.arithmetic,
+                         grid_only() ? "all: no other term counts" : "what is left"};
+    plan_.gold_samples = 1;
+    for (const std::int64_t cells : plan_.grid.cells)
+      plan_.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
+    if (r.upsampling != 8 || r.interpolation != Interpolation::cubic)
+      plan_.base =
+          reconstruct_field(state_, filtered_, *upsampler_, plan_.grid, r.upsampling, r.interpolation, {});
   }
-  if (settings.foresee) {
-    GoldRates gold(state, filtered, upsampler, sups, settings_at(r));
-    const Foreseen foreseen = foresee_build(
-        state, gold, plan.base, plan.fitted.empty() ? take_base(plan.base, plan.coarsening) : plan.fitted,
-        plan.epsilon_abs - t.arithmetic);
-    plan.samples_ratio = foreseen.samples_ratio;
-    start = now();
-    probe_sampler(device);  // as build will
-    plan.seconds = preparation + foreseen.seconds + since(start);
+
+  // How coarse the base is, and its samples.
+  void lay_out_base(const Trial& t) {
+    plan_.layout.coarsening = coarsening_of(plan_, *coverage_, settings_at(plan_.rates), t);
+    if (plan_.settings.coefficients != "midrange") return;
+    preparation_ += seconds_of([&] {
+      plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
+      fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {});
+    });
+  }
+
+  // Storage, memory and time.
+  void foresee(const Trial& t) {
+    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates));
+    const Foreseen foreseen =
+        foresee_build(state_, gold, plan_.base,
+                      plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,
+                      plan_.epsilon_abs - t.arithmetic);
+    plan_.samples_ratio = foreseen.samples_ratio;
+    const double probing = seconds_of([&] { probe_sampler(device_); });  // as build will
+    plan_.seconds = preparation_ + foreseen.seconds + probing;
     // What the trial took, the scan and the base samples twice included; the base samples once more, the
     // stored field on the device, and the tiles before and after closing.
-    plan.memory_bytes = state.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan.base.samples.size();
+    plan_.memory_bytes = state_.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan_.base.samples.size();
   }
-  report(progress, "plan", 1.0);
-  return plan;
-}
+
+  Device& device_;
+  opencl::State& state_;
+  Units units_;
+  const Progress& progress_;
+  HostMemory host_;
+  Plan plan_;
+  FilteredScan filtered_;
+  std::optional<Upsampler> upsampler_;
+  std::optional<Coverage> coverage_;
+  FieldSups sups_;
+  double preparation_ = 0;  // seconds that build will take again
+};
 
 }  // namespace
 
@@ -414,6 +461,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
                const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
                const Progress& progress) {
   check_rates(rates);
+  check_granularity(settings.granularity);
   check_tolerance(tolerance);
   check_line_integrals(scan);
   if (tolerance.relative && largest_magnitude(scan.data) == 0)
@@ -424,7 +472,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   Tolerance wanted = tolerance;
   if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
   Plan plan = to_world(
-      plan_in_units(device, scan, units, from_world(grid, units), field, rates, wanted, settings, progress),
+      Planner(device, scan, units, from_world(grid, units), field, settings, progress).make(rates, wanted),
       units);
   plan.grid = plan.base.grid = grid;
   return plan;

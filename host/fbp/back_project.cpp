@@ -41,12 +41,12 @@ double position_error(const ParallelGeometry& geometry, const UpsampledColumns& 
 }
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
-                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out) {
-  back_project(state, geometry, slab, blocks, filter, out, column_tuning(state.info));
+                  const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out) {
+  back_project(state, geometry, slab, blocks, interpolation, out, column_tuning(state.info));
 }
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
-                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out,
                   const ColumnTuning& tuning) {
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
@@ -89,8 +89,8 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int>
       kernel(state, "fbp/back_project", "back_project",
-             {{"VDVR_CUBIC", filter == "cubic" ? "1" : "0"},
-              {"VDVR_RUN", std::to_string(view_run(filter))},
+             {{"VDVR_CUBIC", interpolation == Interpolation::cubic ? "1" : "0"},
+              {"VDVR_RUN", std::to_string(view_run(interpolation))},
               {"VDVR_LANES", std::to_string(tuning.lanes)},
               {"VDVR_TILE", std::to_string(tuning.tile)},
               {"VDVR_VECTORS", std::to_string(tuning.vectors)}});

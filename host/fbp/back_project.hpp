@@ -22,18 +22,20 @@ struct ColumnBlocks {
   std::int64_t first_row = 0, rows = -1;
 };
 
-/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `filter`: linear
-/// | cubic. Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
+/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). `interpolation`:
+/// linear | cubic. Enqueues; does not wait. Cost: blocks * ny * nx * z * views updates.
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
-                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out);
+                  const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out);
 
 /// The same with launch parameters of the caller's, for tests and for tuning.
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
-                  const ColumnBlocks& blocks, const std::string& filter, opencl::DeviceArray<float>& out,
+                  const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out,
                   const ColumnTuning& tuning);
 
 /// Views that are summed before their sum is added to the others': 64 multiply-adds.
-inline std::int64_t view_run(const std::string& filter) { return filter == "cubic" ? 16 : 32; }
+inline std::int64_t view_run(Interpolation interpolation) {
+  return interpolation == Interpolation::cubic ? 16 : 32;
+}
 
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
 /// share cache sets.

@@ -1,5 +1,5 @@
-// The ways to ramp-filter rows. Calls kernels/fbp/filter_rows_fft.cl with clFFT, kernels/fbp/filter_rows.cl, or
-// host_fft.cpp.
+// The ways to ramp-filter rows. Calls kernels/fbp/filter_rows_fft.cl with clFFT, kernels/fbp/filter_rows.cl,
+// or host_fft.cpp.
 #include "host/fbp/filter_rows.hpp"
 
 #include <fmt/format.h>

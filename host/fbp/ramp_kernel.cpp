@@ -17,15 +17,19 @@ namespace {
 constexpr double pi = std::numbers::pi;
 
 // The window at a fraction r of the cutoff frequency, 0 <= r <= 1.
-std::function<double(double)> window(const std::string& filter) {
-  if (filter == "ram-lak") return [](double) { return 1.0; };
-  if (filter == "shepp-logan")
-    return [](double r) { return r == 0 ? 1.0 : std::sin(pi * r / 2) / (pi * r / 2); };
-  if (filter == "cosine") return [](double r) { return std::cos(pi * r / 2); };
-  if (filter == "hamming") return [](double r) { return 0.54 + 0.46 * std::cos(pi * r); };
-  if (filter == "hann") return [](double r) { return 0.5 + 0.5 * std::cos(pi * r); };
-  throw InputError(
-      fmt::format("--filter '{}' is unknown; choose ram-lak, shepp-logan, cosine, hamming or hann", filter));
+std::function<double(double)> window(RampWindow of) {
+  switch (of) {
+    case RampWindow::shepp_logan:
+      return [](double r) { return r == 0 ? 1.0 : std::sin(pi * r / 2) / (pi * r / 2); };
+    case RampWindow::cosine:
+      return [](double r) { return std::cos(pi * r / 2); };
+    case RampWindow::hamming:
+      return [](double r) { return 0.54 + 0.46 * std::cos(pi * r); };
+    case RampWindow::hann:
+      return [](double r) { return 0.5 + 0.5 * std::cos(pi * r); };
+    default:
+      return [](double) { return 1.0; };
+  }
 }
 
 // Nodes and weights of the 8-point Gauss-Legendre rule on [-1, 1] (Abramowitz and Stegun, table 25.4).
@@ -57,8 +61,8 @@ double windowed(std::int64_t n, double cutoff, const std::function<double(double
 std::vector<double> ramp_kernel(const FieldOptions& field, double pitch, std::int64_t n) {
   const auto w = window(field.filter);
   if (!(field.cutoff > 0 && field.cutoff <= 1))
-    throw InputError(fmt::format("--filter-cutoff {} must be above 0 and at most 1 (Nyquist)", field.cutoff));
-  const bool closed_form = field.filter == "ram-lak" && field.cutoff == 1.0;
+    throw InputError(fmt::format("filter cutoff {} must be above 0 and at most 1 (Nyquist)", field.cutoff));
+  const bool closed_form = field.filter == RampWindow::ram_lak && field.cutoff == 1.0;
   std::vector<double> g(static_cast<std::size_t>(n));
   for (std::int64_t i = 0; i < n; ++i) {
     double value = 0;

@@ -120,7 +120,7 @@ void transpose_row(std::span<const float> columns, std::int64_t stride, std::int
 }
 
 Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
-                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Grid& grid, int upsampling, Interpolation interpolation,
                          const Progress& progress, StageWatch& watch) {
   const Index3 n = grid.samples();
   const UpsampledColumns columns = columns_for(g, grid, upsampling);
@@ -158,7 +158,7 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
           grid.spacing[1],
           {{grid.origin[0], grid.origin[1] + static_cast<double>(y0) * grid.spacing[1]}},
           {kept.begin() + y0, kept.begin() + y0 + ny}};
-      back_project(state, g, slab, blocks, u_filter, out);
+      back_project(state, g, slab, blocks, interpolation, out);
       watch.lap(state, "back-project");
       if (samples.valid()) volume.samples = samples.get();
       out.read_mapped([&](std::span<const float> columns_host) {
@@ -177,7 +177,7 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
 }  // namespace
 
 Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
-                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Grid& grid, int upsampling, Interpolation interpolation,
                          const Progress& progress, StageSeconds* seconds) {
   StageWatch watch(seconds);
   const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
@@ -185,7 +185,8 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
     watch.lap(state, "upsample");
     return slab;
   };
-  return reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, u_filter, progress, watch);
+  return reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, interpolation, progress,
+                           watch);
 }
 
 Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
@@ -194,8 +195,6 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   if (options.upsampling < 1 || options.upsampling > 64 ||
       (options.upsampling & (options.upsampling - 1)) != 0)
     throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
-  if (options.u_filter != "linear" && options.u_filter != "cubic")
-    throw InputError(fmt::format("--u-filter '{}' must be linear or cubic", options.u_filter));
   opencl::State& state = device.state();
   check_line_integrals(scan);
   const Units units = units_of(scan);
@@ -225,7 +224,7 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   ParallelGeometry geometry = from_world(scan.geometry, units);
   if (options.field.center) geometry.center = *options.field.center;
   Volume volume = reconstruct_slabs(state, geometry, make_slab, from_world(grid, units), options.upsampling,
-                                    options.u_filter, progress, watch);
+                                    options.interpolation, progress, watch);
   if (units.are_world()) return volume;
   volume.grid = grid;
   check_densities(to_world(largest_magnitude(volume.samples), units));

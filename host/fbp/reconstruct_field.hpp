@@ -24,7 +24,7 @@ double kept_margin(const Grid& grid, int rate);
 UpsampledColumns columns_for(const ParallelGeometry& geometry, const Grid& grid, int upsampling);
 
 Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
-                         const Grid& grid, int upsampling, const std::string& u_filter,
+                         const Grid& grid, int upsampling, Interpolation interpolation,
                          const Progress& progress, StageSeconds* seconds = nullptr);
 
 }  // namespace vdvr

@@ -63,7 +63,7 @@ class Trial {
   }
   double seconds(const ColumnTuning& tuning) {
     const auto start = std::chrono::steady_clock::now();
-    back_project(state_, filtered_.geometry, slab_, blocks_, "linear", out_, tuning);
+    back_project(state_, filtered_.geometry, slab_, blocks_, Interpolation::linear, out_, tuning);
     opencl::finish(state_, "tune");
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }

@@ -57,7 +57,7 @@ void CellBounds::make_tables(const CellLayers& slab) {
   projection_ = projection_table(
       state_, upsampler_, scan_,
       columns_for(scan_.geometry, settings_.grid, std::min(8, settings_.upsampling)), settings_.upsampling,
-      settings_.u_filter,
+      settings_.interpolation,
       base_cells(scan_.geometry, settings_.grid, settings_.rate, settings_.coarsest(), z_first, slab.count));
   remainders_ = remainder_table(state_, upsampler_, scan_, sups_, settings_.grid, settings_.coarsest(),
                                 z_first, slab.count);

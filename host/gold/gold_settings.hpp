@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "host/fbp/reconstruct_field.hpp"
@@ -27,7 +26,7 @@ struct GoldSettings {
   int granularity = 4;
   int rate = 8;
   int upsampling = 8;
-  std::string u_filter = "linear";
+  Interpolation interpolation = Interpolation::linear;
   std::optional<std::pair<double, double>> window{};
   bool midrange = false;     ///< samples fitted to the trilinear filter; else gold at the nodes
   bool anisotropic = false;  ///< levels per axis; else one for all three

@@ -83,7 +83,7 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   const std::int64_t side = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
   const ColumnBlocks largest{
       side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}, {}};
-  arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.u_filter);
+  arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.interpolation);
   if (settings.base_only) return;
   if (!cells_) cells_ = std::make_shared<CellBounds>(state, scan, upsampler, sups, settings);
   node_slack_.emplace(state, *cells_, scan, sups, settings_, arithmetic_,
@@ -428,7 +428,7 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     columns.wanted = wanted(margins, columns.nx, columns.ny);
     batch.margin_.write(margins);
     batch.margins_ = margins;
-    back_project(state_, scan_.geometry, projections_, columns, settings_.u_filter, batch.gold_);
+    back_project(state_, scan_.geometry, projections_, columns, settings_.interpolation, batch.gold_);
     if (node_slack_)
       (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_,
                      batch.p_);

@@ -160,7 +160,7 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress) {
   const PixelGrid pixels = pixel_grid(volume.grid, options);
-  const ReconstructOptions exact{certificate.field, 16, "cubic"};
+  const ReconstructOptions exact{certificate.field, 16, Interpolation::cubic};
   const Volume f = reconstruct(device, scan, pixels.grid, exact, progress);
   ErrorSlice result = empty_slice(options);
   compare(result, pixels, axes_of(options.axis), f, scan.geometry, volume, certificate);

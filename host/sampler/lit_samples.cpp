@@ -1,4 +1,5 @@
-// Lays lit samples out and makes them. Launches: light_samples, close_gradients of kernels/sampler/lit_samples.cl.
+// Lays lit samples out and makes them. Launches: light_samples, close_gradients of
+// kernels/sampler/lit_samples.cl.
 #include "host/sampler/lit_samples.hpp"
 
 #include <algorithm>

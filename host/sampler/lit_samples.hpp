@@ -1,6 +1,6 @@
 // Lit samples: the stored field on the device as float32 with its gradient beside each sample, 8 bytes
-// together, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it is
-// stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
+// together, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it
+// is stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
 #pragma once
 
 #include <vector>

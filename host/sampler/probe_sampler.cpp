@@ -88,8 +88,8 @@ std::vector<float> read_points(opencl::State& state, const cl::Image3D& image,
   }
   const DeviceArray<cl_float4> in(state, std::span<const cl_float4>(where), "probe points");
   const DeviceArray<float> out(state, points.size(), "probe values");
-  opencl::Kernel<cl::Image3D, cl::Buffer, cl_uint, cl::Buffer> kernel(state, "sampler/probe_sampler", "read_points",
-                                                                      kDefines);
+  opencl::Kernel<cl::Image3D, cl::Buffer, cl_uint, cl::Buffer> kernel(state, "sampler/probe_sampler",
+                                                                      "read_points", kDefines);
   kernel({{points.size(), 1, 1}, {64, 1, 1}}, image, in.buffer(), static_cast<cl_uint>(points.size()),
          out.buffer());
   return out.to_host();
@@ -251,8 +251,8 @@ SamplerProbe measure(opencl::State& state) {
       cube([](double x, double y, double z) { return std::sin(0.3 * x) * std::cos(0.2 * y) + 0.01 * z; });
   const DeviceArray<float> samples(state, std::span<const float>(tile), "probe samples");
   const DeviceArray<float> sums(state, 1u << 14, "probe sums");
-  opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(state, "sampler/probe_sampler",
-                                                                                  "rate_buffer", kDefines);
+  opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(
+      state, "sampler/probe_sampler", "rate_buffer", kDefines);
   p.buffer_rate = measure_rate(state, buffer_kernel, samples.buffer(), sums);
   p.chosen = "buffer";
   p.image3d = state.info.linear_float_image;
@@ -265,8 +265,8 @@ SamplerProbe measure(opencl::State& state) {
   p.u8.image3d = state.info.linear_u8_image;
   if (p.u16.image3d) measure_filter(state, p.u16, SampleType::u16);
   if (p.u8.image3d) measure_filter(state, p.u8, SampleType::u8);
-  opencl::Kernel<cl::Image3D, cl_uint, cl_uint, cl_uint, cl::Buffer> image_kernel(state, "sampler/probe_sampler",
-                                                                                  "rate_image", kDefines);
+  opencl::Kernel<cl::Image3D, cl_uint, cl_uint, cl_uint, cl::Buffer> image_kernel(
+      state, "sampler/probe_sampler", "rate_image", kDefines);
   p.image3d_rate = measure_rate(state, image_kernel, make_tile(state, tile, SampleType::f32).image, sums);
   if (p.image3d_rate > p.buffer_rate && std::isfinite(p.weight_error)) p.chosen = "image3d";
   return p;

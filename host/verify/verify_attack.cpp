@@ -8,7 +8,6 @@
 #include <limits>
 #include <set>
 
-
 namespace vdvr {
 namespace {
 

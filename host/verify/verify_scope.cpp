@@ -71,9 +71,9 @@ void compare_options(Compare& out, const Certificate& c, const MixedVolume& v, c
   };
   try {
     integer("granularity", "options.granularity", v.granularity);
-    integer("upsampling", "options.upsampling", c.upsampling_u);
-    integer("gold", "options.gold", c.gold_rate);
-    text("u_filter", "options.u_filter", c.u_filter);
+    integer("upsampling", "options.upsampling", c.rates.upsampling);
+    integer("gold", "options.gold", c.rates.gold);
+    text("u_filter", "options.u_filter", text_of(c.rates.interpolation));
     text("terms", "options.terms", "all");
     if (options.contains("closing") && options.at("closing") == "none")
       out.differs("options.closing is none, of which nothing is certified");
@@ -96,12 +96,10 @@ void compare_input(Compare& out, const ProjectionSet& scan, const Certificate& c
 }
 
 void compare_rates(Compare& out, const MixedVolume& v, const Certificate& c) {
-  out.integer("rates.gold", c.gold_rate, v.rate);
-  if (c.upsampling_u < 2 || c.upsampling_u > 64 ||
-      !std::has_single_bit(static_cast<unsigned>(c.upsampling_u)))
-    out.differs(fmt::format("rates.upsampling_u is {}, not a power of two from 2 to 64", c.upsampling_u));
-  if (c.u_filter != "linear" && c.u_filter != "cubic")
-    out.differs(fmt::format("rates.u_filter is '{}', not linear or cubic", c.u_filter));
+  out.integer("rates.gold", c.rates.gold, v.rate);
+  if (c.rates.upsampling < 2 || c.rates.upsampling > 64 ||
+      !std::has_single_bit(static_cast<unsigned>(c.rates.upsampling)))
+    out.differs(fmt::format("rates.upsampling_u is {}, not a power of two from 2 to 64", c.rates.upsampling));
 }
 
 void compare_coverage(Compare& out, const ParallelGeometry& used, const MixedVolume& v,

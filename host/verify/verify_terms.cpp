@@ -52,21 +52,22 @@ struct Filtered {
 /// Rounding as build bounds it, of blocks of samples with this spacing, so many along their sides; `base` is
 /// the grid that sets how far columns reach.
 double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double side, int upsampling,
-                     const std::string& u_filter) {
+                     Interpolation interpolation) {
   const auto n = static_cast<std::int64_t>(side);
   const ColumnBlocks blocks{n, n, spacing[0], spacing[1], {}, {}};
   return arithmetic_bound(f.upsampler, f.scan, f.sups, columns_for(f.scan.geometry, base, upsampling), blocks,
-                          u_filter);
+                          interpolation);
 }
 
 // R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
 // the extremes of two fields differ by no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
                    const Certificate& c, const Progress& progress) {
-  const Volume base = reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, "cubic", progress);
+  const Volume base =
+      reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::cubic, progress);
   const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
-               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, "cubic"),
+               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::cubic),
                found = range.high - range.low;
   if (!(std::abs(c.reference_range - found) <= 4 * rounding))
     out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
@@ -95,7 +96,7 @@ void compare_arithmetic(Differences& out, Filtered& f, const Grid& base, const M
     Vec3 gold = v.grid.spacing;
     for (double& h : gold) h /= rate;
     const double own = std::exchange(f.scan.ramp_error, ramp_error);
-    const double all = arithmetic_of(f, base, gold, side, c.upsampling_u, c.u_filter);
+    const double all = arithmetic_of(f, base, gold, side, c.rates.upsampling, c.rates.interpolation);
     f.scan.ramp_error = own;
     return all;
   };
@@ -152,7 +153,7 @@ class Totals {
 
  private:
   static GoldSettings settings(const MixedVolume& v, const Certificate& c) {
-    GoldSettings s{v.grid, v.granularity, v.rate, c.upsampling_u, c.u_filter, c.window};
+    GoldSettings s{v.grid, v.granularity, v.rate, c.rates.upsampling, c.rates.interpolation, c.window};
     s.coarsening = v.coarsening;
     return s;
   }

@@ -18,7 +18,6 @@ namespace vdvr {
 enum class Closing { coarse, paper, none };
 
 struct BuildOptions {
-  int granularity = 4;
   std::optional<std::array<double, 6>>
       roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box only
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]

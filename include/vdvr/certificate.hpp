@@ -10,6 +10,7 @@
 
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
+#include "vdvr/rates.hpp"
 
 namespace vdvr {
 
@@ -59,9 +60,7 @@ struct Certificate {
   /// tested. Empty for files of earlier versions. Not in the JSON: a dataset of the file.
   std::vector<float> brick_totals;
   Vec3 worst_at{0, 0, 0};
-  int upsampling_u = 8;
-  std::string u_filter = "linear";
-  int gold_rate = 8;
+  Rates rates;
   std::vector<Bound> bounds;
   FieldOptions field;
   std::int64_t padding = 0;  ///< length of the ramp filter's FFT

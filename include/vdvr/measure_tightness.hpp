@@ -20,11 +20,10 @@ struct Tightness {
   std::int64_t bricks = 0;  ///< looked at in full: those of the largest bounds, and random ones
 };
 
-/// At gold rate `rate` and u rate `upsampling` with `u_filter`. The truth is gold at 4 times the rate from
+/// The truth is gold at 4 times the rate from
 /// cubic u at 16x, whose own error is below 1 % of what is measured. Cost: two passes over the grid, then
 /// bricks at the finer rate.
 Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
-                            const FieldOptions& field, int upsampling, const std::string& u_filter, int rate,
-                            const Progress& progress = {});
+                            const FieldOptions& field, const Rates& rates, const Progress& progress = {});
 
 }  // namespace vdvr

@@ -71,6 +71,20 @@ struct TileKind {
   // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the comparison with 0 for a pointer's
   auto operator<=>(const TileKind&) const = default;
 };
+/// Whether a brick has a level for each axis, or one for all three.
+enum class Levels { isotropic, anisotropic };
+/// "isotropic", "anisotropic".
+constexpr const char* text_of(Levels levels) {
+  return levels == Levels::isotropic ? "isotropic" : "anisotropic";
+}
+
+/// How samples are arranged; MixedVolume holds what of it readers of samples need.
+struct VolumeLayout {
+  int granularity = 4;       ///< cells per brick and axis
+  LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x
+  Levels levels = Levels::anisotropic;
+};
+
 /// As many as there are sample types.
 inline constexpr std::uint8_t most_parts = 3;
 

@@ -18,10 +18,11 @@ struct Tolerance {
   bool of_max = false;             ///< relative to max |F| over covered samples, as in the paper
 };
 
+/// What is not given is chosen by trial.
 struct RateOptions {
-  std::optional<int> upsampling;  ///< none: auto
-  std::string u_filter = "auto";  ///< auto | linear | cubic
-  std::optional<int> gold;        ///< none: auto
+  std::optional<int> upsampling;
+  std::optional<Interpolation> interpolation;
+  std::optional<int> gold;
 };
 
 /// What is stored, and which error terms the tolerance must cover.
@@ -29,8 +30,8 @@ struct PlanSettings {
   std::string coefficients = "midrange";  ///< midrange: samples fitted to the trilinear filter | sampled
   std::string terms =
       "all";  ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
-  std::string levels = "anisotropic";  ///< anisotropic: a level per axis | isotropic: one per brick
-  int granularity = 4;                 ///< for what is foreseen
+  Levels levels = Levels::anisotropic;
+  int granularity = 4;  ///< 1, 2, 4 or 8; less on grids thinner than a brick
   /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to
   /// store least, and 0 with isotropic levels.
   std::optional<LevelTriple> coarsening{};
@@ -43,9 +44,8 @@ struct Plan {
   PlanSettings settings;
   FieldOptions field;
   double epsilon = 0, epsilon_abs = 0, reference_range = 0;
-  int upsampling_u = 8;
-  std::string u_filter = "linear";
-  int gold_rate = 8;
+  Rates rates;
+  VolumeLayout layout;
   std::vector<Bound> bounds;       ///< all that were computed
   ErrorBudget budget;              ///< foreseen shares at the chosen rates; grid: what is left for it
   std::uint64_t gold_samples = 0;  ///< to be back-projected, per pass
@@ -55,7 +55,6 @@ struct Plan {
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;                ///< the 1x reconstruction it rests on
-  LevelTriple coarsening{};   ///< of the base that is stored
   std::vector<float> fitted;  ///< the base samples to store, where those are not F: midrange coefficients
   std::vector<std::string> notes;
 };

@@ -10,6 +10,7 @@
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/rates.hpp"
 
 namespace vdvr {
 
@@ -35,8 +36,8 @@ using StageSeconds = std::map<std::string, double>;
 
 struct ReconstructOptions {
   FieldOptions field;
-  int upsampling = 8;               ///< in u; a power of two
-  std::string u_filter = "linear";  ///< linear | cubic
+  int upsampling = 8;  ///< in u; a power of two
+  Interpolation interpolation = Interpolation::linear;
 };
 
 /// F on the samples of `grid` by FBP on the device; samples farther than a cell's diagonal outside the

@@ -78,7 +78,7 @@ BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
         // On the rim of the covered disk, and at the first and last row.
         const double angle = 0.26 * i, r = 12;
         const double z = rows == 1 ? 0.0 : i % 3 == 0 ? 1.5 : i % 3 == 1 ? -1.5 : 0.1;
-        const Rates rates{8, "cubic", gold};
+        const Rates rates{8, Interpolation::cubic, gold};
         const GoldLattice l =
             stream_lattice(chain,
                            grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9,
@@ -122,12 +122,14 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
     if (scans.size() < 22) scans.push_back(s);
   for (const Scan& scan : scans) {
     Chain chain(scan.data);
-    for (const Rates& rates :
-         {Rates{4, "linear", 4}, {8, "cubic", 8}, {16, "linear", 2}, {2, "linear", 16}}) {
+    for (const Rates& rates : {Rates{4, Interpolation::linear, 4},
+                               {8, Interpolation::cubic, 8},
+                               {16, Interpolation::linear, 2},
+                               {2, Interpolation::linear, 16}}) {
       Grid grid = grid_at(scan.data.geometry, scan.target, 0.8, rates.gold, Place::cell);
       grid.cells = {4, 4, 2};
       GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
-                        {grid, 2, rates.gold, rates.upsampling, rates.u_filter, {}});
+                        {grid, 2, rates.gold, rates.upsampling, rates.interpolation, {}});
       const int top = rates.gold == 2 ? 1 : 2;
       const auto t = static_cast<std::uint8_t>(top);
       for (int kind = 0; kind < 6; ++kind, ++fields) {
@@ -201,8 +203,8 @@ BOOST_AUTO_TEST_CASE(stored_nan_never_passes_verification) {
   v.tiles.begin()->second.f32[7] = std::numeric_limits<float>::quiet_NaN();
   Certificate stored;
   stored.epsilon_abs = 1e6;  // anything finite passes
-  stored.upsampling_u = 4;
-  stored.gold_rate = 4;
+  stored.rates.upsampling = 4;
+  stored.rates.gold = 4;
   VerifyOptions options;
   options.exhaustive = true;
   const VerifyResult result = verify(device(), scan, v, stored, options);

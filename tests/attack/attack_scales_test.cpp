@@ -59,7 +59,7 @@ Case wave_of_one_row(double epsilon) {
                          return std::cos(reference::frequency(11, 12) * (static_cast<double>(u) + 0.5));
                        }),
       epsilon);
-  c.rates = {64, "linear", 2};
+  c.rates = {64, Interpolation::linear, 2};
   c.settings.coefficients = "sampled";
   return c;
 }
@@ -73,7 +73,7 @@ Case wave_along_v() {
                                 return std::cos(reference::frequency(5, 9) * (static_cast<double>(v) + 0.5));
                               }),
               0.15);
-  c.rates = {8, "cubic", 2};
+  c.rates = {8, Interpolation::cubic, 2};
   c.settings.coefficients = "sampled";
   return c;
 }

@@ -79,7 +79,7 @@ struct Arithmetic {
 // The largest |computed - exact| over a block of columns at one detector row, both with the same
 // interpolation; `truth` are the samples that exact arithmetic starts from.
 Arithmetic measure(const FilteredScan& filtered, const std::vector<float>& truth, int upsampling,
-                   const std::string& u_filter, const ColumnBlocks& blocks, double row) {
+                   Interpolation interpolation, const ColumnBlocks& blocks, double row) {
   opencl::State& state = device().state();
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
@@ -87,17 +87,17 @@ Arithmetic measure(const FilteredScan& filtered, const std::vector<float>& truth
   const UpsampledSlab slab = upsampler(columns, std::array{row});
   const opencl::DeviceArray<float> out(
       state, static_cast<std::uint64_t>(blocks.nx * blocks.ny * column_stride(1)), "columns");
-  back_project(state, filtered.geometry, slab, blocks, u_filter,
+  back_project(state, filtered.geometry, slab, blocks, interpolation,
                const_cast<opencl::DeviceArray<float>&>(out));
   const auto host = out.to_host();
   const ExactColumns exact(filtered.geometry, columns, truth, row);
   Arithmetic a;
-  a.bound = arithmetic_bound(upsampler, filtered, sups, columns, blocks, u_filter);
+  a.bound = arithmetic_bound(upsampler, filtered, sups, columns, blocks, interpolation);
   for (std::int64_t y = 0; y < blocks.ny; ++y)
     for (std::int64_t x = 0; x < blocks.nx; ++x) {
       const double e = exact.back_projected(blocks.first[0][0] + static_cast<double>(x) * blocks.step_x,
                                             blocks.first[0][1] + static_cast<double>(y) * blocks.step_y,
-                                            u_filter == "cubic");
+                                            interpolation == Interpolation::cubic);
       a.error = std::max(a.error,
                          std::abs(static_cast<double>(host[at((y * blocks.nx + x) * column_stride(1))]) - e));
     }
@@ -250,7 +250,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_gold_of_awkward_scans) {
     FilteredScan filtered = filter_projections(device().state(), scan.data, {});
     filtered.ramp_error = 0;                        // what is tested starts from the filtered samples
     if (filtered.view_max[0] < 0x1p-100) continue;  // attacked with the filter
-    for (const char* filter : {"linear", "cubic"}) {
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
       const int upsampling = 2 << (turn++ % 4);
       const ColumnBlocks block{3, 3, 0.37, 0.41, {{scan.target[0] - 0.5, scan.target[1] - 0.4}}, {}};
       const double row = scan.target[2] / scan.data.geometry.pitch_v +
@@ -270,7 +270,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_errors_of_the_filtered_samples) {
   const ParallelGeometry g = geometry(5, 4, 24);
   const double e = 0x1p-10;
   for (const int upsampling : {2, 8})
-    for (const char* filter : {"linear", "cubic"})
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
       for (const double row : {1.5, 0.5, 3.4}) {
         const double place = middle_of_column(g.center, upsampling) + 0.5 / upsampling;  // on a column
         const auto wu = resampling_matrix(g.columns, std::array{place}, 0, 1, 0),
@@ -313,7 +313,8 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_the_product_along_rows_alone) {
       const UpsampledSlab slab = upsampler(own, positions);
       const auto host = slab.values.to_host();
       Arithmetic a;
-      a.bound = arithmetic_bound(upsampler, f, FieldSups{}, columns, {1, 1, 1, 1, {{0, 0}}, {}}, "linear");
+      a.bound = arithmetic_bound(upsampler, f, FieldSups{}, columns, {1, 1, 1, 1, {{0, 0}}, {}},
+                                 Interpolation::linear);
       for (std::size_t z = 0; z < 16; ++z) {
         const ExactColumns exact(g, own, f.samples, positions[z]);
         for (std::int64_t n = 0; n < own.count; ++n)
@@ -330,7 +331,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_long_biased_sums) {
   for (const std::int64_t views : {8192, 65536}) {
     ParallelGeometry g = geometry(views, 1, 8);
     g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
-    for (const char* filter : {"linear", "cubic"})
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
       for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
         if (views > 8192 && term != 1.75) continue;
         const FilteredScan f = given_samples(
@@ -348,7 +349,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
   constexpr std::int64_t columns = 2048;
   ParallelGeometry g = geometry(2, 1, columns);
   g.theta_rad = {0.1234, 1.3};
-  for (const char* filter : {"linear", "cubic"})
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
     for (const std::size_t m : {2047u, 1500u}) {
       const FilteredScan f = given_samples(g, [&](auto, auto, std::size_t u) {
         return std::sin(reference::frequency(m, columns) * (static_cast<double>(u) + 0.5) + 0.1);

@@ -138,7 +138,7 @@ void check_global(const Scan& scan, Chain& chain, const GoldLattice& l, const Ra
   const double rounding =
       chain.filtered.ramp_error * lebesgue_constant(g.columns) * lebesgue_constant(g.rows);
   const double d = g.pitch_u / rates.upsampling;
-  const bool cubic = std::string(rates.u_filter) == "cubic";
+  const bool cubic = rates.interpolation == Interpolation::cubic;
   const double curvature =
       cubic ? 3.0 / 128 * std::pow(d, 4) * std::pow(pi / g.pitch_u, 2) * chain.sups.second_u
             : d * d / 8 * chain.sups.second_u;
@@ -221,9 +221,9 @@ BOOST_AUTO_TEST_CASE(no_wave_of_the_map_exceeds_a_bound) {
       Chain chain(scan.data);
       // The filters and rates of gold take turns; over the map each meets every other.
       const int gold = 2 << ((turn / 4 + turn) % 4);
-      attack(scan, chain, {upsampling, "linear", gold}, 0.9, Place::cell, true);
-      attack(scan, chain, {upsampling, "cubic", gold}, 0.9, Place::top, true);
-      attack(scan, chain, {upsampling, "linear", 2 << (turn % 3)}, 1.4, Place::bottom, false);
+      attack(scan, chain, {upsampling, Interpolation::linear, gold}, 0.9, Place::cell, true);
+      attack(scan, chain, {upsampling, Interpolation::cubic, gold}, 0.9, Place::top, true);
+      attack(scan, chain, {upsampling, Interpolation::linear, 2 << (turn % 3)}, 1.4, Place::bottom, false);
     }
 }
 
@@ -234,7 +234,7 @@ BOOST_AUTO_TEST_CASE(no_field_whose_views_peak_together_exceeds_a_bound) {
         for (const double sign : {1.0, -1.0}) {
           const Scan scan = axis_peak(upsampling, low, sign, flat);
           Chain chain(scan.data);
-          for (const char* filter : {"linear", "cubic"})
+          for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
             for (const int gold : {2, 4, 8, 16}) {
               attack(scan, chain, {upsampling, filter, gold}, 0.5, Place::cell, gold == 4);
               attack(scan, chain, {upsampling, filter, gold}, 0.9,

@@ -58,8 +58,8 @@ std::uint64_t floats_of(const ColumnBlocks& blocks, std::int64_t rows) {
 }
 
 // Device against the naive reference on the device's own slab.
-void check_reference(const ProjectionSet& scan, int rate, const std::string& filter,
-                     const ColumnBlocks& blocks, std::int64_t rows) {
+void check_reference(const ProjectionSet& scan, int rate, Interpolation filter, const ColumnBlocks& blocks,
+                     std::int64_t rows) {
   Device device;
   const FilteredScan filtered = filter_projections(device.state(), scan, {});
   Upsampler upsampler(device.state(), filtered);
@@ -69,7 +69,7 @@ void check_reference(const ProjectionSet& scan, int rate, const std::string& fil
   back_project(device.state(), filtered.geometry, slab, blocks, filter, out);
   const auto q = read_back(slab);
   // A fused multiply-add per weight and view; cubic weights round up to 8 times themselves.
-  const std::int64_t roundings = (filter == "cubic" ? 4 : 2) * slab.views + 8;
+  const std::int64_t roundings = (filter == Interpolation::cubic ? 4 : 2) * slab.views + 8;
   const double position = position_error(filtered.geometry, slab.columns, blocks);
   std::int64_t compared = 0, wrong = 0;
   for_each_sample(out.to_host(), blocks, rows, [&](double x, double y, std::int64_t z, double computed) {
@@ -105,8 +105,7 @@ reference::UpsampledViews exact_views(const ProjectionSet& scan, const Upsampled
 }
 
 std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, const UpsampledSlab& slab,
-                               const ColumnBlocks& blocks, const std::string& filter,
-                               const ColumnTuning& tuning) {
+                               const ColumnBlocks& blocks, Interpolation filter, const ColumnTuning& tuning) {
   opencl::DeviceArray<float> out(state, floats_of(blocks, slab.rows), "columns");
   out.fill(0.0f);
   back_project(state, g, slab, blocks, filter, out, tuning);
@@ -116,7 +115,7 @@ std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, 
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(back_project_matches_reference_over_odd_extents) {
-  for (const char* filter : {"linear", "cubic"})
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
     for (const auto& [views, rows, columns] : {std::array{1, 1, 9}, {7, 3, 31}, {19, 5, 24}})
       for (const auto& [nx, ny, nz] :
            {std::array<std::int64_t, 3>{1, 1, 1}, {3, 5, 17}, {13, 2, 33}, {7, 9, 48}})
@@ -132,13 +131,13 @@ BOOST_AUTO_TEST_CASE(back_project_matches_reference_over_odd_extents) {
 
 BOOST_AUTO_TEST_CASE(several_blocks_match_reference_wherever_they_lie) {
   const ProjectionSet scan = noise_scan(11, 3, 27);
-  for (const char* filter : {"linear", "cubic"})
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
     check_reference(scan, 8, filter, {5, 7, 0.25, 0.25, {{0, 0}, {-9.3, 2.1}, {4.0, -8.7}, {1e-3, 5.5}}}, 9);
 }
 
 BOOST_AUTO_TEST_CASE(blocks_beyond_the_detector_match_where_all_views_are_hit_and_stay_finite) {
   const ProjectionSet scan = noise_scan(6, 2, 15);
-  for (const char* filter : {"linear", "cubic"}) {
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
     const ColumnBlocks blocks{33, 29, 1.0, 1.0, {{-16, -14}, {-4, -40}}};
     check_reference(scan, 2, filter, blocks, 5);
     Device device;
@@ -158,12 +157,12 @@ BOOST_AUTO_TEST_CASE(off_centre_axis_and_pitch_follow_the_geometry) {
   ProjectionSet scan = noise_scan(9, 3, 25);
   scan.geometry.center = 10.3;
   scan.geometry.pitch_u = 0.1;
-  for (const char* filter : {"linear", "cubic"})
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
     check_reference(scan, 4, filter, {9, 9, 0.03, 0.05, {{-0.13, -0.22}, {0.2, 0.3}}}, 6);
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_bound_is_never_exceeded) {
-  for (const char* filter : {"linear", "cubic"})
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
     for (const int rate : {2, 8})
       for (const auto& [views, rows, columns] : {std::array{13, 1, 24}, {17, 6, 33}}) {
         const ProjectionSet scan = noise_scan(views, rows, columns, static_cast<unsigned>(views + rate));
@@ -203,7 +202,7 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
   for (const double v : q.values) magnitude = std::max(magnitude, std::abs(v));
   magnitude *= 1.25 * static_cast<double>(slab.views);  // the largest sum of |cubic weights|
   const double position = position_error(filtered.geometry, slab.columns, blocks) * 2 * 4.0 / 3 * magnitude;
-  for (const char* filter : {"linear", "cubic"}) {
+  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
     const auto run = [&](const ColumnTuning& tuning) {
       return with_tuning(device.state(), filtered.geometry, slab, blocks, filter, tuning);
     };

@@ -26,9 +26,8 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
   PlanSettings sampled;
   sampled.coefficients = "sampled";
   sampled.granularity = 2;
-  const Plan plan = make_plan(device, scan, grid, {}, {8, "linear", 8}, {0.1, {}}, sampled);
+  const Plan plan = make_plan(device, scan, grid, {}, {8, Interpolation::linear, 8}, {0.1, {}}, sampled);
   BuildOptions options;
-  options.granularity = 2;
   options.storage = StorageChoice::f32;
   const BuildResult whole = build(device, scan, plan, options);
   const support::TemporaryFolder folder;
@@ -74,7 +73,7 @@ BOOST_AUTO_TEST_CASE(journal_of_another_build_is_refused_with_what_differs) {
   const Grid grid = grid_of(scan, {8, 8, 4}, 1.0);
   const support::TemporaryFolder folder;
   const auto build_with = [&](const ProjectionSet& of, double epsilon, Closing closing) {
-    const Plan plan = make_plan(device, of, grid, {}, {8, "linear", 8}, {epsilon, {}});
+    const Plan plan = make_plan(device, of, grid, {}, {8, Interpolation::linear, 8}, {epsilon, {}});
     Journal journal(folder / "o.journal", true);
     BuildOptions options;
     options.closing = closing;

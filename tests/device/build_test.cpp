@@ -31,6 +31,7 @@ struct Wanted {
   bool isotropic = false;
   std::optional<LevelTriple> coarsening{};
   std::optional<double> epsilon_abs{};  // in place of epsilon
+  int granularity = 4;
 };
 
 struct Built {
@@ -42,8 +43,8 @@ Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   Device device("", wanted.max_memory);
   PlanSettings settings;
   if (wanted.sampled) settings.coefficients = "sampled";
-  if (wanted.isotropic) settings.levels = "isotropic";
-  settings.granularity = wanted.options.granularity;
+  if (wanted.isotropic) settings.levels = Levels::isotropic;
+  settings.granularity = wanted.granularity;
   settings.coarsening = wanted.coarsening;
   Tolerance tolerance{{}, wanted.epsilon_abs};
   if (!wanted.epsilon_abs) tolerance.relative = wanted.epsilon;
@@ -193,7 +194,7 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_every_storage) {
 
 BOOST_AUTO_TEST_CASE(eight_bits_that_leave_no_room_are_refused_and_auto_takes_more) {
   const ProjectionSet scan = noise_scan(19, 9, 33, 3);
-  Wanted wanted{grid_of(scan, {8, 8, 7}, 0.9), 0.004, {32, "cubic", 16}};
+  Wanted wanted{grid_of(scan, {8, 8, 7}, 0.9), 0.004, {32, Interpolation::cubic, 16}};
   wanted.options.storage = StorageChoice::u8;  // half a step is about the whole tolerance
   BOOST_CHECK_EXCEPTION(build_of(scan, wanted), ToleranceError, [](const ToleranceError& e) {
     const std::string text = e.what();
@@ -223,7 +224,7 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_the_paper_closing) {
 // Closing `paper` raises bricks that coarse gold decided to levels that coarse gold does not resolve.
 BOOST_AUTO_TEST_CASE(certificate_holds_where_the_paper_closing_raises_easy_bricks) {
   ProjectionSet scan = simulated(sphere(2.8), 17, 9, 24);
-  Wanted wanted{make_grid(scan.geometry, {}), 0.03, {{}, "auto", 8}};
+  Wanted wanted{make_grid(scan.geometry, {}), 0.03, {{}, {}, 8}};
   wanted.options.closing = Closing::paper;
   wanted.sampled = wanted.isotropic = true;
   const Built built = build_of(scan, wanted);
@@ -235,8 +236,8 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_for_every_u_filter_and_granulari
   const ProjectionSet scan = noise_scan(17, 7, 29, 5);
   const Grid grid = grid_of(scan, {9, 7, 6}, 0.8);
   for (const int granularity : {1, 2, 4})
-    for (const char* filter : {"linear", "cubic"})
-      check_all(scan, {grid, 0.15, {16, filter, 8}, {granularity, {}, {}}}, 2);
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+      check_all(scan, {grid, 0.15, {16, filter, 8}, {}, 0, false, false, {}, {}, granularity}, 2);
 }
 
 BOOST_AUTO_TEST_CASE(certificate_holds_to_the_edge_of_the_covered_region) {
@@ -259,7 +260,7 @@ BOOST_AUTO_TEST_CASE(bricks_are_at_most_twice_as_thick_as_their_grid) {
   const ProjectionSet scan = noise_scan(14, 3, 25, 7);
   Wanted wanted{grid_of(scan, {8, 8, 1}, 1.0, Vec3{-4, -4, -0.5}), 0.1};
   for (const int granularity : {1, 2, 4}) {
-    wanted.options.granularity = granularity;
+    wanted.granularity = granularity;
     const Built built = build_of(scan, wanted);
     BOOST_TEST(built.result.volume.granularity == std::min(granularity, 2));
     check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 200, 3));
@@ -270,7 +271,9 @@ BOOST_AUTO_TEST_CASE(bricks_are_at_most_twice_as_thick_as_their_grid) {
 BOOST_AUTO_TEST_CASE(region_of_interest_is_certified_and_the_rest_left_at_level_0) {
   const ProjectionSet scan = noise_scan(15, 9, 33, 8);
   const std::array<double, 6> roi{-3, -2, -2, 1, 3, 1};
-  const Wanted wanted{grid_of(scan, {16, 16, 8}, 1.0), 0.05, {}, {2, roi, {}}};
+  Wanted wanted{grid_of(scan, {16, 16, 8}, 1.0), 0.05};
+  wanted.options.roi = roi;
+  wanted.granularity = 2;
   const Built built = build_of(scan, wanted);
   check_certificate(scan, built,
                     random_points({roi[0], roi[1], roi[2]}, {roi[3], roi[4], roi[5]}, 40, 150, 5));
@@ -310,7 +313,7 @@ BOOST_AUTO_TEST_CASE(plan_refuses_what_cannot_do_and_no_more) {
   const ProjectionSet scan = noise_scan(15, 7, 29, 9);
   Device device;
   const Grid grid = grid_of(scan, {8, 8, 6}, 0.9);
-  const RateOptions rates{16, "cubic", 4};
+  const RateOptions rates{16, Interpolation::cubic, 4};
   const auto plan_at = [&](double epsilon_abs) {
     return make_plan(device, scan, grid, {}, rates, {{}, epsilon_abs});
   };
@@ -331,7 +334,8 @@ BOOST_AUTO_TEST_CASE(notes_of_the_scan_reach_the_certificate) {
 
 BOOST_AUTO_TEST_CASE(window_certifies_what_lies_in_it_with_fewer_tiles) {
   const ProjectionSet scan = noise_scan(15, 7, 29, 9);
-  Wanted wanted{grid_of(scan, {12, 12, 6}, 0.9), 0.05, {}, {1, {}, {}}};
+  Wanted wanted{grid_of(scan, {12, 12, 6}, 0.9), 0.05};
+  wanted.granularity = 1;
   const Built whole = build_of(scan, wanted);
   const double middle = 0.3 * whole.plan.reference_range, half = 0.15 * whole.plan.reference_range;
   wanted.options.window = {middle - half, middle + half};
@@ -356,7 +360,7 @@ BOOST_AUTO_TEST_CASE(levels_per_axis_and_per_brick_are_certified_and_continuous)
   for (const bool isotropic : {false, true}) {
     Wanted wanted{grid_of(scan, {10, 9, 6}, 0.8), 0.1};
     wanted.isotropic = isotropic;
-    wanted.options.granularity = 2;
+    wanted.granularity = 2;
     const Built built = build_of(scan, wanted);
     const MixedVolume& v = built.result.volume;
     const bool triples = std::any_of(v.level.begin(), v.level.end(),
@@ -445,7 +449,7 @@ BOOST_AUTO_TEST_CASE(absurd_tolerance_is_out_of_reach) {
   BOOST_CHECK_THROW(make_plan(device, scan, grid, {}, {}, {unreachable, {}}), ToleranceError);
   // What gold and projections may err by at these rates is no tolerance: nothing is left for the volume. A
   // plan that does not count them foresees how much that is.
-  const RateOptions coarse{2, "linear", 2};
+  const RateOptions coarse{2, Interpolation::linear, 2};
   PlanSettings comparison;
   comparison.terms = "grid";
   const ErrorBudget budget = make_plan(device, scan, grid, {}, coarse, {whole_range, {}}, comparison).budget;
@@ -464,7 +468,7 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_a_certificate_that_holds) {
   const ProjectionSet scan = noise_scan(24, 33, 33, 13);
   const Grid grid = grid_of(scan, {12, 12, 24}, 0.9);
   for (const std::uint64_t mebibytes : {48, 512}) {
-    const Wanted wanted{grid, 0.2, {8, "cubic", 8}, {}, mebibytes << 20};
+    const Wanted wanted{grid, 0.2, {8, Interpolation::cubic, 8}, {}, mebibytes << 20};
     const Built built = build_of(scan, wanted);
     check_certificate(scan, built, random_points(grid.origin, end_of(grid), 40, 100, 7));
     check_shared_bits(built.result.volume);
@@ -486,7 +490,7 @@ double node_tolerance_of(const Built& built) {
   Device device;
   const Plan& plan = built.plan;
   const SamplerTerms t = sampler_terms(field_slopes(as_mixed(plan.base)), plan.grid, probe_sampler(device),
-                                       longest_atlas(device.info()), plan.epsilon_abs, plan.gold_rate);
+                                       longest_atlas(device.info()), plan.epsilon_abs, plan.rates.gold);
   return plan.epsilon_abs - built.result.certificate.budget.arithmetic.value -
          1.25 * std::max(t.buffer.value, t.image3d ? t.image3d->value : 0.0);
 }

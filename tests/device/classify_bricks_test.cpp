@@ -34,7 +34,7 @@ struct Case {
        bool anisotropic = false)
       : chain(scan),
         state(attacks::device().state()),
-        base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, "cubic", {})),
+        base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, Interpolation::cubic, {})),
         host(state),
         gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate, anisotropic)),
         classify(state, gold, bricks, host, nullptr, {},
@@ -62,7 +62,7 @@ struct Case {
         {}, "fine");
   }
   static GoldSettings settings_of(const Grid& grid, int rate, bool anisotropic = false) {
-    GoldSettings s{grid, 2, rate, 8, "cubic"};
+    GoldSettings s{grid, 2, rate, 8, Interpolation::cubic};
     s.midrange = true;
     s.anisotropic = anisotropic;
     return s;

@@ -277,7 +277,7 @@ BOOST_AUTO_TEST_CASE(views_of_a_chunk_are_those_of_the_whole_slab) {
 BOOST_AUTO_TEST_CASE(windowed_filters_err_no_more_than_their_bounds) {
   Device device;
   FieldOptions hann;
-  hann.filter = "hann";
+  hann.filter = RampWindow::hann;
   for (const auto& [columns, rows] : {std::pair<int, int>{1, 1}, {2, 3}, {33, 17}, {150, 5}}) {
     const ProjectionSet scan = noise_scan(3, rows, columns);
     const std::vector<double> exact = convolved(scan, hann);
@@ -302,7 +302,7 @@ BOOST_AUTO_TEST_CASE(rows_are_rounded_once_at_every_size) {
 // On devices that filter by products; others have no direct way.
 BOOST_AUTO_TEST_CASE(slab_straight_from_the_scan_is_that_of_the_filtered_scan) {
   Device device;
-  for (const auto& filter : {"ram-lak", "hann"})
+  for (const RampWindow filter : {RampWindow::ram_lak, RampWindow::hann})
     for (const auto& [columns, rows] : {std::pair<int, int>{1, 1}, {5, 3}, {40, 33}, {150, 18}}) {
       FieldOptions field;
       field.filter = filter;

@@ -90,12 +90,6 @@ struct Chain {
   FieldSups sups;
 };
 
-struct Rates {
-  int upsampling;
-  const char* u_filter;
-  int gold;
-};
-
 struct Node {
   Vec3 position;
   float gold;
@@ -111,7 +105,7 @@ struct BrickNodes {
 std::vector<BrickNodes> stream_nodes(Chain& chain, const Grid& grid, int granularity, const Rates& rates,
                                      double& arithmetic) {
   GoldStream stream(Chain::state(), chain.filtered, chain.upsampler, chain.sups,
-                    {grid, granularity, rates.gold, rates.upsampling, rates.u_filter, {}});
+                    {grid, granularity, rates.gold, rates.upsampling, rates.interpolation, {}});
   arithmetic = stream.arithmetic();
   Index3 n{};
   for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
@@ -223,8 +217,10 @@ double trilinear_error(const Chain& chain, const Grid& grid, int rate, int cells
   return worst;
 }
 
-const std::vector<Rates> all_rates{{2, "linear", 4}, {4, "linear", 4}, {8, "linear", 4}, {16, "linear", 4},
-                                   {2, "cubic", 4},  {4, "cubic", 4},  {8, "cubic", 4},  {16, "cubic", 4}};
+const std::vector<Rates> all_rates{{2, Interpolation::linear, 4}, {4, Interpolation::linear, 4},
+                                   {8, Interpolation::linear, 4}, {16, Interpolation::linear, 4},
+                                   {2, Interpolation::cubic, 4},  {4, Interpolation::cubic, 4},
+                                   {8, Interpolation::cubic, 4},  {16, Interpolation::cubic, 4}};
 
 }  // namespace
 
@@ -248,9 +244,9 @@ BOOST_AUTO_TEST_CASE(projection_bound_of_a_cell_holds_at_its_gold_nodes) {
         }
       }
       BOOST_TEST(nodes > 0);
-      BOOST_TEST(violations == 0, name << ", " << rates.u_filter << " " << rates.upsampling << ": "
-                                       << violations << " of " << nodes << " nodes, error / bound up to "
-                                       << closest);
+      BOOST_TEST(violations == 0, name << ", " << text_of(rates.interpolation) << " " << rates.upsampling
+                                       << ": " << violations << " of " << nodes
+                                       << " nodes, error / bound up to " << closest);
     }
   }
 }
@@ -259,7 +255,10 @@ BOOST_AUTO_TEST_CASE(slack_bounds_trilinear_gold_inside_every_gold_cell) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
   for (const auto& [name, scan] : scans())
-    for (const Rates& rates : {Rates{4, "linear", 2}, {8, "linear", 8}, {8, "cubic", 4}, {16, "cubic", 8}}) {
+    for (const Rates& rates : {Rates{4, Interpolation::linear, 2},
+                               {8, Interpolation::linear, 8},
+                               {8, Interpolation::cubic, 4},
+                               {16, Interpolation::cubic, 8}}) {
       Chain chain(scan);
       double arithmetic = 0, closest = 0;
       std::int64_t violations = 0, tested = 0;
@@ -386,8 +385,8 @@ BOOST_AUTO_TEST_CASE(global_bounds_hold_at_every_rate) {
     const Grid grid = small_grid(scan.geometry, {4, 4, 4});
     const AmplitudeBounds amplitude = amplitude_bounds(chain.filtered, grid, rates);
     for (std::size_t r = 0; r < rates.size(); ++r) {
-      const double linear = interpolation_error(chain, grid, {rates[r], "linear", 2}),
-                   cubic = interpolation_error(chain, grid, {rates[r], "cubic", 2});
+      const double linear = interpolation_error(chain, grid, {rates[r], Interpolation::linear, 2}),
+                   cubic = interpolation_error(chain, grid, {rates[r], Interpolation::cubic, 2});
       const double du = scan.geometry.pitch_u / rates[r], wu = std::numbers::pi / scan.geometry.pitch_u;
       BOOST_TEST(amplitude.projection[r].first == rates[r]);
       BOOST_TEST(linear <= tolerance::bound(amplitude.projection[r].second), name << " " << rates[r]);

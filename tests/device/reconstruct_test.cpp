@@ -59,15 +59,15 @@ BOOST_AUTO_TEST_CASE(cubic_at_high_rate_reaches_the_exact_field) {
     // 3/128 (pi/32)^4 per view is the cubic's own error on a wave at Nyquist; noise holds such waves.
     const double interpolation = 3.0 / 128 * std::pow(std::numbers::pi / 32, 4) * field_scale(scan, {});
     const double rounding = tolerance::fp32_sum(200, field_scale(scan, {}));
-    BOOST_TEST(worst_error(scan, grid, {{}, 32, "cubic"}) <= interpolation + rounding);
+    BOOST_TEST(worst_error(scan, grid, {{}, 32, Interpolation::cubic}) <= interpolation + rounding);
   }
 }
 
 BOOST_AUTO_TEST_CASE(linear_error_falls_by_four_per_doubling) {
   const ProjectionSet scan = noise_scan(19, 5, 33);
   const Grid grid = make_grid(scan.geometry, {});
-  const double at8 = worst_error(scan, grid, {{}, 8, "linear"}),
-               at16 = worst_error(scan, grid, {{}, 16, "linear"});
+  const double at8 = worst_error(scan, grid, {{}, 8, Interpolation::linear}),
+               at16 = worst_error(scan, grid, {{}, 16, Interpolation::linear});
   BOOST_TEST(at16 < at8 / 3);
   BOOST_TEST(at16 > at8 / 5);
 }
@@ -75,10 +75,10 @@ BOOST_AUTO_TEST_CASE(linear_error_falls_by_four_per_doubling) {
 BOOST_AUTO_TEST_CASE(windows_and_cutoff_follow_the_definition) {
   const ProjectionSet scan = noise_scan(11, 3, 24);
   const Grid grid = make_grid(scan.geometry, {});
-  for (const char* filter : {"shepp-logan", "cosine", "hamming", "hann", "ram-lak"}) {
+  for (const auto& [filter, name] : ramp_windows) {
     const FieldOptions field{filter, 0.8, {}};
     const double scale = field_scale(scan, field);
-    BOOST_TEST(worst_error(scan, grid, {field, 32, "cubic"}) <=
+    BOOST_TEST(worst_error(scan, grid, {field, 32, Interpolation::cubic}) <=
                3.0 / 128 * std::pow(std::numbers::pi / 32, 4) * scale + tolerance::fp32_sum(200, scale));
   }
 }
@@ -86,7 +86,7 @@ BOOST_AUTO_TEST_CASE(windows_and_cutoff_follow_the_definition) {
 BOOST_AUTO_TEST_CASE(ram_lak_kernel_is_the_closed_form_and_quadrature_agrees) {
   const auto closed = ramp_kernel({}, 0.5, 16);
   // A cutoff a hair below 1 goes through the quadrature; its kernel differs by at most that hair's band.
-  const auto quadrature = ramp_kernel({"ram-lak", 1.0 - 0x1p-40, {}}, 0.5, 16);
+  const auto quadrature = ramp_kernel({RampWindow::ram_lak, 1.0 - 0x1p-40, {}}, 0.5, 16);
   BOOST_TEST(closed[0] == 0.5);
   BOOST_TEST(closed[2] == 0.0);
   for (std::size_t i = 0; i < 16; ++i) BOOST_TEST(std::abs(closed[i] - quadrature[i]) <= 0x1p-38);

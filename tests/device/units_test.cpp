@@ -135,15 +135,15 @@ BOOST_AUTO_TEST_CASE(the_same_scan_in_other_units_has_the_same_certificate) {
 BOOST_AUTO_TEST_CASE(absolute_tolerances_and_windows_are_in_the_units_of_the_user) {
   const ProjectionSet scan = noise_scan(24, 5, 15);
   const Grid grid = small_grid(scan, {6, 6, 4});
-  const Plan plan = make_plan(device(), scan, grid, {}, {8, "cubic", 4}, {{}, 0.05});
+  const Plan plan = make_plan(device(), scan, grid, {}, {8, Interpolation::cubic, 4}, {{}, 0.05});
   BuildOptions options;
   options.window = {0.0, 0.2};
   const BuildResult reference = build(device(), scan, plan, options);
   const Units units{-30, -20, 10};
   const double density = std::ldexp(1.0, units.density());
   const ProjectionSet other = in_other_units(scan, units);
-  const Plan other_plan =
-      make_plan(device(), other, to_world(grid, units), {}, {8, "cubic", 4}, {{}, 0.05 * density});
+  const Plan other_plan = make_plan(device(), other, to_world(grid, units), {}, {8, Interpolation::cubic, 4},
+                                    {{}, 0.05 * density});
   options.window = {0.0, 0.2 * density};
   const BuildResult b = build(device(), other, other_plan, options);
   check_same_volume(reference.volume, b.volume, units);
@@ -199,10 +199,10 @@ BOOST_AUTO_TEST_CASE(slack_that_is_no_number_is_infinite) {
   attacks::Chain chain(scan);
   chain.sups.value = std::numeric_limits<double>::quiet_NaN();  // of which rounding is made
   const Grid grid = small_grid(scan, {4, 4, 4});
-  const GoldSettings settings{grid, 2, 4, 8, "cubic", {}};
+  const GoldSettings settings{grid, 2, 4, 8, Interpolation::cubic, {}};
   GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups, settings);
   const Volume base =
-      reconstruct_field(device().state(), chain.filtered, chain.upsampler, grid, 8, "cubic", {});
+      reconstruct_field(device().state(), chain.filtered, chain.upsampler, grid, 8, Interpolation::cubic, {});
   const DeviceField field(device().state(), as_mixed(base, 2));
   const std::vector<std::uint8_t> near = stream.bricks_near_coverage();
   const opencl::DeviceArray<std::uint8_t> selected(device().state(), std::span<const std::uint8_t>(near),

@@ -1,5 +1,6 @@
-// The quick form of `bench paper` against recorded numbers (tests/paper/paper_quick.json), and what the recorded
-// ones may differ by on another device: rounding of the fields, and bricks that rounding alone decides.
+// The quick form of `bench paper` against recorded numbers (tests/paper/paper_quick.json), and what the
+// recorded ones may differ by on another device: rounding of the fields, and bricks that rounding alone
+// decides.
 #define BOOST_TEST_MODULE paper
 #include <boost/test/unit_test.hpp>
 

@@ -300,8 +300,12 @@ struct Made {
 };
 
 std::string options_of(const ParallelGeometry& g, const MixedVolume& v, const Certificate& c) {
-  Json j{{"granularity", v.granularity}, {"base", {1, 1, 1}},      {"terms", "all"},
-         {"upsampling", c.upsampling_u}, {"u_filter", c.u_filter}, {"gold", c.gold_rate}};
+  Json j{{"granularity", v.granularity},
+         {"base", {1, 1, 1}},
+         {"terms", "all"},
+         {"upsampling", c.rates.upsampling},
+         {"u_filter", text_of(c.rates.interpolation)},
+         {"gold", c.rates.gold}};
   j["geometry"] = {{"columns", g.columns},    {"rows", g.rows},     {"pitch_u", g.pitch_u},
                    {"pitch_v", g.pitch_v},    {"center", g.center}, {"unit", g.unit},
                    {"theta_rad", g.theta_rad}};

@@ -260,9 +260,9 @@ BOOST_AUTO_TEST_CASE(volumes_of_other_rates_windows_and_regions_hold) {
   BuildOptions window, roi;
   window.window = {0.0, 0.1};
   roi.roi = std::array<double, 6>{-2, -2, -1, 2, 1, 2};
-  for (const Made& m :
-       {made(scan, {8, 7, 6}, 0.3, {8, "linear", 4}), made(scan, {8, 7, 6}, 0.2, {8, "cubic", 8}),
-        made(scan, {8, 7, 6}, 0.1, {}, window), made(scan, {8, 7, 6}, 0.1, {}, roi)}) {
+  for (const Made& m : {made(scan, {8, 7, 6}, 0.3, {8, Interpolation::linear, 4}),
+                        made(scan, {8, 7, 6}, 0.2, {8, Interpolation::cubic, 8}),
+                        made(scan, {8, 7, 6}, 0.1, {}, window), made(scan, {8, 7, 6}, 0.1, {}, roi)}) {
     const VerifyResult r = measured(m);
     BOOST_TEST(r.holds, r.failure);
   }
@@ -272,7 +272,7 @@ BOOST_AUTO_TEST_CASE(volumes_of_other_rates_windows_and_regions_hold) {
 BOOST_AUTO_TEST_CASE(right_certificates_of_coarse_gold_are_agreed_with) {
   std::int64_t finer = 0;
   for (const unsigned seed : {3u, 4u})
-    for (const char* filter : {"linear", "cubic"})
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
       for (const int gold : {2, 4}) {
         const Made m =
             made(noise_scan(15, 7, 29, seed), {8, 7, 6}, gold == 2 ? 0.6 : 0.2, {16, filter, gold});

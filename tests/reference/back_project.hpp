@@ -33,9 +33,10 @@ struct BackProjected {
 
 /// `filter`: linear between columns, or the cubic through the four nearest.
 inline BackProjected back_project(const UpsampledViews& q, const ParallelGeometry& g, double x, double y,
-                                  std::int64_t z, const std::string& filter) {
+                                  std::int64_t z, Interpolation filter) {
   BackProjected out;
-  const std::int64_t below = filter == "cubic" ? 1 : 0, above = filter == "cubic" ? 2 : 1;
+  const std::int64_t below = filter == Interpolation::cubic ? 1 : 0,
+                     above = filter == Interpolation::cubic ? 2 : 1;
   for (std::int64_t k = 0; k < q.views; ++k) {
     const double theta = g.theta_rad[static_cast<std::size_t>(k)];
     const double s = q.columns.column_of((x * std::cos(theta) + y * std::sin(theta)) / g.pitch_u + g.center);
@@ -56,7 +57,7 @@ inline BackProjected back_project(const UpsampledViews& q, const ParallelGeometr
     double steepest = 0;
     for (std::int64_t i = n - below - 1; i <= n + above; ++i)
       steepest = std::max(steepest, std::abs(q.at(k, i + 1, z) - q.at(k, i, z)));
-    out.slope += (filter == "cubic" ? 4.0 / 3 : 1.0) * steepest;
+    out.slope += (filter == Interpolation::cubic ? 4.0 / 3 : 1.0) * steepest;
   }
   return out;
 }

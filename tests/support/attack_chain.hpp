@@ -16,12 +16,10 @@ namespace vdvr::attacks {
 
 using support::device;
 
-struct Rates {
-  int upsampling;
-  const char* u_filter;
-  int gold;
+struct Rates : vdvr::Rates {
   [[nodiscard]] std::string name() const {
-    return std::string(u_filter) + " " + std::to_string(upsampling) + ", gold " + std::to_string(gold);
+    return std::string(text_of(interpolation)) + " " + std::to_string(upsampling) + ", gold " +
+           std::to_string(gold);
   }
 };
 
@@ -29,7 +27,7 @@ struct Rates {
 inline std::vector<Rates> all_rates() {
   std::vector<Rates> all;
   for (const int upsampling : {2, 4, 8, 16})
-    for (const char* filter : {"linear", "cubic"})
+    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
       for (const int gold : {2, 4, 8, 16}) all.push_back({upsampling, filter, gold});
   return all;
 }
@@ -95,7 +93,7 @@ struct GoldLattice {
 /// Streams the grid in bricks of one base cell, so that P is known per base cell.
 inline GoldLattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
   GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
-                    {grid, 1, rates.gold, rates.upsampling, rates.u_filter, {}});
+                    {grid, 1, rates.gold, rates.upsampling, rates.interpolation, {}});
   GoldLattice out;
   out.grid = grid;
   out.rate = rates.gold;

@@ -23,8 +23,8 @@ inline Certificate full_certificate() {
   c.measured_max = 0.7 / 3;
   c.measured_total = 0.3;
   c.worst_at = {1.0 / 7, -2.0 / 7, 3e22};
-  c.upsampling_u = 16;
-  c.gold_rate = 8;
+  c.rates.upsampling = 16;
+  c.rates.gold = 8;
   c.bounds = {{"projection", "amplitude", 8, 0.1, false},
               {"projection", "curvature", 16, 1.0 / 11, true},
               {"gold", "paper Eq. 7", 8, 0.25, false}};

@@ -307,20 +307,22 @@ inline void draw_options(Random& random, Case& c) {
   c.against = one_of(random, {Against::range, Against::range, Against::absolute, Against::largest});
   if (chance(random, 0.5)) c.rates.upsampling = one_of(random, {2, 4, 8, 16, 32, 64});
   if (chance(random, 0.7)) c.rates.gold = one_of(random, {2, 2, 4, 4, 8, 8, 16, 32});
-  c.rates.u_filter = one_of<const char*>(random, {"auto", "auto", "linear", "cubic"});
+  c.rates.interpolation = one_of<std::optional<Interpolation>>(
+      random, {std::nullopt, std::nullopt, Interpolation::linear, Interpolation::cubic});
   c.settings.coefficients = one_of<const char*>(random, {"midrange", "midrange", "sampled"});
-  c.settings.levels = one_of<const char*>(random, {"anisotropic", "anisotropic", "isotropic"});
+  c.settings.levels = one_of(random, {Levels::anisotropic, Levels::anisotropic, Levels::isotropic});
   if (chance(random, 0.15)) {
     c.options.closing = Closing::paper;
     c.settings.coefficients = "sampled";
-    c.settings.levels = "isotropic";
+    c.settings.levels = Levels::isotropic;
   }
   c.settings.foresee = chance(random, 0.3);
-  c.settings.granularity = c.options.granularity = one_of(random, {1, 2, 2, 4, 4, 4, 8});
+  c.settings.granularity = one_of(random, {1, 2, 2, 4, 4, 4, 8});
   c.options.storage = one_of(random, {StorageChoice::automatic, StorageChoice::automatic, StorageChoice::f32,
                                       StorageChoice::u16, StorageChoice::u8});
   if (chance(random, 0.3))
-    c.field.filter = one_of<const char*>(random, {"shepp-logan", "cosine", "hamming", "hann"});
+    c.field.filter =
+        one_of(random, {RampWindow::shepp_logan, RampWindow::cosine, RampWindow::hamming, RampWindow::hann});
   if (chance(random, 0.15)) c.field.cutoff = one_of(random, {0.5, 0.8});
 }
 
@@ -329,7 +331,7 @@ inline bool draw_whole_grid(Random& random, Case& c) {
   const ParallelGeometry& g = c.scan.geometry;
   if (!chance(random, 0.1) || g.columns > 17 || c.rates.gold.value_or(32) > 8) return false;
   c.grid = make_grid(g, {});
-  c.options.granularity = c.settings.granularity = std::max(2, c.options.granularity);
+  c.settings.granularity = std::max(2, c.settings.granularity);
   return true;
 }
 
@@ -377,7 +379,7 @@ inline void draw_base(Random& random, Case& c) {
   // Cells and bricks must be whole base cells.
   for (std::size_t a = 0; a < 3; ++a)
     if (base[2 - a] > 0) c.grid.cells[a] += c.grid.cells[a] % 2;
-  if (c.options.granularity == 1) c.settings.granularity = c.options.granularity = 2;
+  if (c.settings.granularity == 1) c.settings.granularity = 2;
   if (c.options.closing != Closing::paper) c.settings.coarsening = base;
 }
 

@@ -383,8 +383,7 @@ inline bool same_samples(const SampleBlock& a, double step_a, const SampleBlock&
 inline std::string difference(const BuildResult& one, const BuildResult& scaled, double density) {
   const MixedVolume &a = one.volume, &b = scaled.volume;
   const Certificate &p = one.certificate, &q = scaled.certificate;
-  if (p.upsampling_u != q.upsampling_u || p.u_filter != q.u_filter || p.gold_rate != q.gold_rate)
-    return "other rates";
+  if (p.rates != q.rates) return "other rates";
   if (a.coarsening != b.coarsening) return "another base";
   // A file's step is a normal number: integers of smaller densities are coarser.
   if (b.step == 0x1p-126 && a.step * density < b.step) return {};

@@ -1,5 +1,6 @@
 // A layer between the program and the OpenCL loader, put there with LD_PRELOAD: lowers the limits that
-// devices report, refuses what lies beyond them, and fails chosen calls. Only for tests/program/faults_test.cpp.
+// devices report, refuses what lies beyond them, and fails chosen calls. Only for
+// tests/program/faults_test.cpp.
 //   VDVR_SHIM_MAX_ALLOC, VDVR_SHIM_GLOBAL_MEM   bytes
 //   VDVR_SHIM_IMAGES=0, VDVR_SHIM_IMAGE3D=N     no images; largest extent of a 3D image
 //   VDVR_SHIM_BUFFER_FAILS=N                    the N-th buffer and all after it are refused

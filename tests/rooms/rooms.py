@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom.
+
+  rooms.py ROOT               one line per fault; exit 1 if there is any
+  rooms.py ROOT --self-test   plants one fault of each kind in a copy and checks that it is found
+"""
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+
+# A room includes the public headers and rooms above it.
+ROOMS = ["system", "opencl", "io", "scan", "simulate", "fbp", "volume", "sampler", "bounds", "gold", "certify", "verify",
+         "render", "picture"]
+MOST_FILES = 25
+# What kernels include: `shared` is compiled by the host too, `device` is not.
+KERNEL_HEADERS = {"shared", "device"}
+# Headers of declarations whose definitions are several files, or generated.
+SEVERAL_SOURCES = {
+    "host/opencl/state.hpp": ["device.cpp", "program.cpp", "codes.cpp"],
+    "host/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
+    "host/opencl/device_end.hpp": ["device.cpp"],
+}
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
+
+
+def includes(path):
+    return INCLUDE.findall(path.read_text(encoding="utf-8"))
+
+
+def files(folder, *suffixes):
+    return sorted(p for p in folder.rglob("*") if p.suffix in suffixes) if folder.is_dir() else []
+
+
+def code_of(text):
+    """Without comments, literals and preprocessor lines."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.S)
+    text = re.sub(r'"(?:\\.|[^"\\\n])*"', '""', text)
+    return re.sub(r"^\s*#(?:[^\n]*\\\n)*[^\n]*", "", text, flags=re.M)
+
+
+def declares(text):
+    """Whether a header declares a function that it does not define."""
+    depth_of_body, statement = 0, ""
+    open_scopes = []  # True: namespace, class or struct, whose declarations count; False: a body
+    for c in code_of(text):
+        if c == "{":
+            scope = re.search(r"\b(namespace|class|struct|union|extern)\b[^;()]*$", statement) is not None
+            open_scopes.append(scope)
+            depth_of_body += not scope
+            statement = ""
+        elif c == "}":
+            depth_of_body -= not open_scopes.pop()
+            statement = ""
+        elif c == ";" and depth_of_body == 0:
+            is_function = re.search(r"\w\s*\([^()]*(?:\([^()]*\)[^()]*)*\)\s*(const|noexcept|override|\s)*$", statement)
+            if is_function and not re.search(r"\b(using|friend|typedef|static_assert|return|inline constexpr)\b|[=]\s*\w*\s*\(",
+                                             statement):
+                return True
+            statement = ""
+        elif depth_of_body == 0:
+            statement += c
+    return False
+
+
+def faults(root):
+    host = root / "host"
+    for path in sorted(host.iterdir()):
+        if path.is_file():
+            yield f"{path.relative_to(root)}: lies loose in host/"
+        elif path.name not in ROOMS:
+            yield f"{path.relative_to(root)}: is no room"
+    for room in ROOMS:
+        found = files(host / room, ".hpp", ".cpp")
+        if len(found) > MOST_FILES:
+            yield f"host/{room}: {len(found)} files, more than {MOST_FILES}"
+        for path in found:
+            yield from faults_of_host_file(root, room, path)
+    yield from faults_of_kernels(root)
+    for path in files(root / "include", ".hpp"):
+        for name in includes(path):
+            if not name.startswith("vdvr/"):
+                yield f"{path.relative_to(root)}: a public header includes {name}"
+    for folder in ("apps", "examples"):
+        for path in files(root / folder, ".hpp", ".cpp"):
+            for name in includes(path):
+                if name.split("/")[0] in ("host", "shared", "device", "tests"):
+                    yield f"{path.relative_to(root)}: includes {name}, but only include/vdvr is public"
+    for path in sorted((root / "tests").glob("*.[ch]pp")):
+        yield f"{path.relative_to(root)}: lies loose in tests/"
+
+
+def faults_of_host_file(root, room, path):
+    name = path.relative_to(root)
+    if path.parent != root / "host" / room:
+        yield f"{name}: lies deeper than its room"
+    for included in includes(path):
+        parts = included.split("/")
+        if parts[0] == "host":
+            if len(parts) != 3 or parts[1] not in ROOMS or ROOMS.index(parts[1]) > ROOMS.index(room):
+                yield f"{name}: includes {included}, which is below it"
+        elif parts[0] not in ("vdvr", "shared"):
+            yield f"{name}: includes {included}"
+    if path.suffix == ".hpp" and declares(path.read_text(encoding="utf-8")):
+        sources = SEVERAL_SOURCES.get(str(name), [path.with_suffix(".cpp").name])
+        for source in sources:
+            if not (path.parent / source).is_file():
+                yield f"{name}: has no source of its stem, {source}"
+
+
+def faults_of_kernels(root):
+    kernels = root / "kernels"
+    launches = {}
+    for source in files(root / "host", ".cpp", ".hpp"):
+        for program in re.findall(r'"(\w+/\w+)"', source.read_text(encoding="utf-8")):
+            launches.setdefault(program, []).append(source)
+    for path in files(kernels, ".cl", ".h"):
+        name, room = path.relative_to(root), path.parent.name
+        if path.parent.parent != kernels or room not in set(ROOMS) | KERNEL_HEADERS:
+            yield f"{name}: lies in no room"
+            continue
+        if path.suffix == ".cl" and f"{room}/{path.stem}" not in launches:
+            yield f"{name}: nobody builds the program {room}/{path.stem}"
+        for source in launches.get(f"{room}/{path.stem}", []):
+            if path.suffix == ".cl" and source.parent.name != room:
+                yield f"{name}: is launched from another room, {source.relative_to(root)}"
+        for included in includes(path):
+            if included.split("/")[0] not in KERNEL_HEADERS:
+                yield f"{name}: includes {included}"
+            elif room == "shared" and not included.startswith("shared/"):
+                yield f"{name}: the host would have to compile {included}"
+
+
+def plant(root, path, text):
+    target = root / path
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text((target.read_text() if target.exists() else "") + text)
+
+
+FAULTS = [
+    ("host/loose.hpp", "#pragma once\n", "lies loose in host/"),
+    ("host/attic/x.hpp", "#pragma once\n", "is no room"),
+    ("host/fbp/back_project.hpp", '#include "host/gold/gold_settings.hpp"\n', "which is below it"),
+    ("host/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/fbp/coverage.cpp: includes"),
+    ("host/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
+    ("include/vdvr/grid.hpp", '#include "host/system/parallel.hpp"\n', "a public header includes"),
+    ("apps/vdvr/x.cpp", '#include "host/system/parallel.hpp"\n', "only include/vdvr is public"),
+    ("examples/x.cpp", '#include "shared/mixed_sampler.h"\n', "only include/vdvr is public"),
+    ("tests/loose_test.cpp", "\n", "lies loose in tests/"),
+    ("kernels/fbp/lonely.cl", "\n", "nobody builds the program"),
+    ("kernels/loose.cl", "\n", "lies in no room"),
+    ("kernels/shared/untested.h", '#include "device/largest.h"\n', "the host would have to compile"),
+]
+
+
+def self_test(root):
+    missed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for path, text, expected in FAULTS:
+            copy = pathlib.Path(folder) / "tree"
+            for name in ("host", "include", "kernels", "apps", "examples", "tests"):
+                if (root / name).is_dir():
+                    shutil.copytree(root / name, copy / name, ignore=shutil.ignore_patterns("*.png", "*.h5"))
+            plant(copy, path, text)
+            if not any(path.split("/")[-1] in f and expected in f or expected in f and "attic" in f for f in faults(copy)):
+                print(f"planted in {path}, not found: {expected}")
+                missed += 1
+            shutil.rmtree(copy)
+        copy = pathlib.Path(folder) / "tree"
+        shutil.copytree(root / "host", copy / "host")
+        shutil.copytree(root / "tests", copy / "tests")
+        for i in range(MOST_FILES + 1):
+            plant(copy, f"host/fbp/many_{i}.hpp", "#pragma once\n")
+        if not any("more than" in f for f in faults(copy)):
+            print("a room of too many files, not found")
+            missed += 1
+    return missed
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    found = list(faults(root))
+    for fault in found:
+        print(fault)
+    missed = self_test(root) if "--self-test" in sys.argv else 0
+    return 1 if found or missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
