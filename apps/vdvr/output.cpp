@@ -65,8 +65,7 @@ void print_result(const CommonOptions& common, const Json& json, const std::func
   }
 }
 
-// --- JSON
-// -------------------------------------------------------------------------------------------------------------
+// --- JSON ---
 
 Json grid_json(const Grid& g) {
   return {{"cells", g.cells}, {"origin", g.origin}, {"spacing", g.spacing}, {"unit", g.unit}};
@@ -149,8 +148,7 @@ Json levels_json(const MixedVolume& volume) {
 
 Json seconds_json(const std::map<std::string, double>& seconds) { return Json(seconds); }
 
-// --- text
-// -------------------------------------------------------------------------------------------------------------
+// --- text ---
 
 std::string vec_text(const Vec3& v) { return fmt::format("{:.6g}, {:.6g}, {:.6g}", v[0], v[1], v[2]); }
 

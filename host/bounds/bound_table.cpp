@@ -1,4 +1,4 @@
-// Launchers of the projection half of kernels/bounds/bound_table.cl (docs/error-bounds.md, sections 5 and 6).
+// Launches kernels/bounds/bound_table.cl (docs/error-bounds.md, sections 5 and 6).
 #include "host/bounds/bound_table.hpp"
 
 #include <algorithm>

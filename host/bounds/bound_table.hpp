@@ -1,5 +1,5 @@
 // Bounds that are sums over views of derivative maxima under a cell's shadow: P, the error of interpolating
-// the projections, and the remainder of T (docs/error-bounds.md, sections 5 and 6). Called by gold_stream.cpp
+// the projections, and the remainder of T (docs/error-bounds.md, sections 5 and 6). Called by cell_bounds.cpp
 // and plan.cpp.
 #pragma once
 

@@ -16,8 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// --- writing
-// ----------------------------------------------------------------------------------------------------------
+// --- writing ---
 
 /// JSON has no NaN and no infinity; the JSON library would write null, which reads as "not measured".
 double finite(const char* member, double value) {
@@ -64,8 +63,7 @@ Json options(const std::string& text) {
   return parsed;
 }
 
-// --- reading
-// ----------------------------------------------------------------------------------------------------------
+// --- reading ---
 
 /// A value with its place, so that every refusal names the member.
 class Member {

@@ -1,5 +1,5 @@
-// Launchers of the projection half of kernels/bounds/bound_table.cl, and the closed-form bounds
-// (docs/error-bounds.md).
+// Bounds in closed form, from sups over the detector, for which row_sup of kernels/bounds/bound_table.cl is
+// launched (docs/error-bounds.md).
 #include "host/bounds/projection_bounds.hpp"
 
 #include <fmt/format.h>

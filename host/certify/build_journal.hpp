@@ -1,5 +1,5 @@
-// What a build writes into its journal: what it depends on, and the parts of its records. Called by
-// build.cpp.
+// What a build writes into its journal: what it depends on, and the parts of its records. Called by build.cpp
+// and classify_bricks.cpp.
 #pragma once
 
 #include "host/gold/gold_stream.hpp"

@@ -1,4 +1,5 @@
-// A block of samples times a matrix along one of its axes: cosine analysis, derivatives.
+// A block of samples times a matrix along one of its axes: cosine analysis, derivatives. Called by
+// cosine_spectrum.cpp and paper_bounds.cpp.
 #pragma once
 
 #include <cstdint>

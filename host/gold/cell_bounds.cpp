@@ -1,4 +1,4 @@
-// Launches project_bound on the tables of bound_table.cpp.
+// Keeps what bound_table.cpp computes, layer by layer, so that two rates of gold share it.
 #include "host/gold/cell_bounds.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// What is done to a batch of gold blocks: fit, classify, extract, measure. Called by build.cpp, plan.cpp,
-// foresee.cpp. Launches kernels/gold/classify.cl and verify.cl.
+// What is done to a batch of gold blocks: fit, classify, extract, measure. Called by classify_bricks.cpp,
+// plan.cpp and measure_tightness.cpp. Launches kernels/gold/classify.cl and kernels/gold/measure.cl.
 #include <algorithm>
 #include <bit>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Gold, block by block: F on the grid refined by the gold rate, with the node slack T + P beside it, never
-// whole in memory (docs/error-bounds.md). Called by plan.cpp, foresee.cpp, build.cpp and
+// whole in memory (docs/error-bounds.md). Called by plan.cpp, foresee.cpp, classify_bricks.cpp, build.cpp and
 // measure_tightness.cpp.
 //
 // A slab is a run of base cells in z whose filtered rows are on the device; blocks are columns of base cells

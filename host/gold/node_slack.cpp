@@ -1,4 +1,4 @@
-// Launches kernels/bounds/bound_table.cl on batches of gold blocks.
+// Launches kernels/gold/node_slack.cl on batches of gold blocks.
 #include "host/gold/node_slack.hpp"
 
 #include <algorithm>

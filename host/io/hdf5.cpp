@@ -146,8 +146,7 @@ bool chunks_fit(hid_t data, hid_t creation, hid_t space, hid_t type) {
 
 }  // namespace
 
-// --- reading
-// ----------------------------------------------------------------------------------------------------------
+// --- reading ---
 
 void Hdf5Dataset::read(std::span<const std::int64_t> start, std::span<const std::int64_t> count,
                        double* out) const {
@@ -296,8 +295,7 @@ std::optional<std::vector<double>> Hdf5File::numbers_attribute(const std::string
   return values;
 }
 
-// --- writing
-// ----------------------------------------------------------------------------------------------------------
+// --- writing ---
 
 Hdf5File Hdf5File::create(const std::filesystem::path& path) {
   const Quiet quiet;

@@ -1,8 +1,8 @@
 // The HDF5 C API behind handles that close themselves and errors that are exceptions: FileError on reading,
 // ResourceError on writing, each with file and object path. HDF5's own messages are silenced and quoted in
 // ours. External links, external storage and virtual datasets are refused: a scan is one file, and its hash
-// covers all of it. Called by host/scan/hdf5_scan.cpp,
-// host/io/volume_stack.cpp and the tests. Not thread-safe, as HDF5 itself.
+// covers all of it. Called by hdf5_scan.cpp, read_scan.cpp, volume_stack.cpp and the tests. Not thread-safe,
+// as HDF5 itself.
 #pragma once
 
 #include <hdf5.h>

@@ -16,8 +16,7 @@
 
 namespace vdvr::io::hdf5_file {
 
-// --- how a dataset is stored
-// ----------------------------------------------------------------------------------------------------------
+// --- how a dataset is stored ---
 
 namespace {
 
@@ -129,8 +128,7 @@ std::optional<std::string> check_storage(Dataset& d, std::uint64_t file_bytes) {
   return d.packing.deflated ? check_deflated(d, chunks, file_bytes) : check_plain(d, chunks, file_bytes);
 }
 
-// --- what a chunk holds
-// ----------------------------------------------------------------------------------------------------------
+// --- what a chunk holds ---
 
 namespace {
 

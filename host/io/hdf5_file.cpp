@@ -153,8 +153,7 @@ Shape chunk_shape(const Shape& shape, std::uint64_t bytes_per_element) {
   return chunk;
 }
 
-// --- writing
-// ----------------------------------------------------------------------------------------------------------
+// --- writing ---
 
 Writer::Writer(const std::filesystem::path& file, const std::filesystem::path& shown, unsigned deflate_level)
     : shown_(shown.string()), deflate_level_(deflate_level) {
@@ -278,8 +277,7 @@ void Writer::close() {
   if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0 || !file_.reset()) fail("cannot be flushed");
 }
 
-// --- reading
-// ----------------------------------------------------------------------------------------------------------
+// --- reading ---
 
 Reader::Reader(const std::filesystem::path& path) : shown_(path.string()) {
   std::error_code error;

@@ -147,8 +147,7 @@ void set_spacing(const Header& header, RasterHeader& out, const std::vector<doub
   }
 }
 
-// --- MetaImage
-// --------------------------------------------------------------------------------------------------------
+// --- MetaImage ---
 
 void set_met_type(const Header& header, const std::string& name, RasterHeader& out) {
   using enum ScalarKind;
@@ -228,8 +227,7 @@ RasterHeader read_meta_image(Header& header) {
   return out;
 }
 
-// --- NRRD
-// -------------------------------------------------------------------------------------------------------------
+// --- NRRD ---
 
 void set_nrrd_type(const Header& header, const std::string& name, RasterHeader& out) {
   using enum ScalarKind;
@@ -326,8 +324,7 @@ RasterHeader read_nrrd(Header& header) {
   return out;
 }
 
-// --- samples
-// ----------------------------------------------------------------------------------------------------------
+// --- samples ---
 
 template <typename T>
 void convert(const unsigned char* from, std::int64_t count, bool swap, double* out) {

@@ -54,8 +54,7 @@ void append_samples(const std::string& name, Volume& volume, const std::vector<d
   }
 }
 
-// --- HDF5
-// ----------------------------------------------------------------------------------------------------------------
+// --- HDF5 ---
 
 /// An attribute z, y, x turned to x, y, z.
 std::optional<Vec3> zyx_attribute(const io::Hdf5File& file, const std::string& dataset,
@@ -82,8 +81,7 @@ void read_hdf5_grid(const io::Hdf5File& file, const std::string& dataset, const 
                                   name, grid.spacing[a], grid.origin[a], "xyz"[a]));
 }
 
-// --- TIFF
-// ----------------------------------------------------------------------------------------------------------------
+// --- TIFF ---
 
 std::vector<fs::path> tiff_files(const fs::path& folder) {
   std::vector<std::string> names;

@@ -28,8 +28,7 @@ void check_frames(const std::filesystem::path& path, const std::vector<Image>& f
                                    frames[0].height, f.width, f.height));
 }
 
-// --- APNG
-// ----------------------------------------------------------------------------------------------------------------
+// --- APNG ---
 
 void append_u32(std::string& out, std::uint32_t v) {
   for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<char>(v >> shift));
@@ -79,8 +78,7 @@ std::string frame_control(std::uint32_t sequence, const Image& image, int frame_
   return data;
 }
 
-// --- GIF
-// -----------------------------------------------------------------------------------------------------------------
+// --- GIF ---
 
 int append_gif(GifFileType* gif, const GifByteType* bytes, int count) {
   static_cast<std::string*>(gif->UserData)

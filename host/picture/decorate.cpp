@@ -87,8 +87,7 @@ void line(Image& image, glm::dvec2 a, glm::dvec2 b, double width, const Colour& 
   }
 }
 
-// --- projection
-// ----------------------------------------------------------------------------------------------------------
+// --- projection ---
 
 /// The ray-caster's camera: `right` and `up` span the picture's plane at distance one.
 struct View {

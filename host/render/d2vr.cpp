@@ -100,8 +100,7 @@ void store_upsampled(Projections& p, const FilteredScan& filtered, const Progres
 
 }  // namespace
 
-// --- the field
-// --------------------------------------------------------------------------------------------------------
+// --- the field ---
 
 VdvrDetector Projections::detector(const Grid& grid) const {
   const ParallelGeometry& g = geometry;
@@ -228,8 +227,7 @@ std::vector<float> D2vrField::at(std::span<const Vec3> points, const Progress& p
   });
 }
 
-// --- the scene
-// --------------------------------------------------------------------------------------------------------
+// --- the scene ---
 
 std::vector<cl_float2> occupied_ranges(const Volume& v, int granularity) {
   const Index3 n = v.grid.samples(), cells = v.grid.cells;

@@ -31,8 +31,7 @@ namespace {
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
 
-// --- which bricks can matter
-// ------------------------------------------------------------------------------------------
+// --- which bricks can matter ---
 
 /// By brick 0 where the transfer function may show something, else the stretch of it that its values lie in.
 std::vector<std::uint8_t> empty_bricks(const Impl& v, const BakedTransfer& table, float slack) {
@@ -79,8 +78,7 @@ void update_distance(Impl& v, const RenderOptions& o, const BakedTransfer& table
   v.frame.distance_key = std::move(key);
 }
 
-// --- parameters
-// -------------------------------------------------------------------------------------------------------
+// --- parameters ---
 
 double length_unit(const Grid& g) { return *std::min_element(g.spacing.begin(), g.spacing.end()); }
 
@@ -184,8 +182,7 @@ VdvrSlice make_slice(const Impl& v, const RenderOptions& o) {
   return s;
 }
 
-// --- the sampler
-// ------------------------------------------------------------------------------------------------------
+// --- the sampler ---
 
 std::pair<SamplerKind, std::string> choose_sampler(Device& device, const ResidentVolume& v,
                                                    SamplerKind asked) {

@@ -37,8 +37,7 @@ struct FloatPicture {
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
 
-// --- for a field that takes the place of the volume's (d2vr.cpp)
-// ------------------------------------------------------
+// --- for a field that takes the place of the volume's (d2vr.cpp) ---
 
 struct DvrFrame {
   opencl::Range range;

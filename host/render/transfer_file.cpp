@@ -75,8 +75,7 @@ void each(std::size_t count, const std::string& what, Body&& body) {
   }
 }
 
-// --- our own
-// -------------------------------------------------------------------------------------------------------------
+// --- our own ---
 
 TransferFunction read_own(const json& file) {
   const json& points = list_of(file, "points", "{\"value\", \"rgb\", \"opacity\"}");
@@ -92,8 +91,7 @@ TransferFunction read_own(const json& file) {
   return f;
 }
 
-// --- 3D Slicer
-// -----------------------------------------------------------------------------------------------------------
+// --- 3D Slicer ---
 
 template <class Value, class ReadValue>
 std::vector<CurveNode<Value>> slicer_nodes(const json& component, const char* key, ReadValue&& read) {
@@ -141,8 +139,7 @@ TransferFunction read_slicer(const json& file) {
   return f;
 }
 
-// --- ParaView
-// ------------------------------------------------------------------------------------------------------------
+// --- ParaView ---
 
 ColourSpace colour_space(const json& preset, std::string& note) {
   const std::string name = preset.contains("ColorSpace") && preset["ColorSpace"].is_string()

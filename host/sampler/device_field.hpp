@@ -1,5 +1,6 @@
 // A stored field on the device: sample buffer, brick records, and what kernels must be compiled for to read
-// them. Called by gold_stream.cpp, verify_field.cpp and resident_volume.cpp; read by mixed_sampler.h.
+// them. Called by build.cpp, verify_field.cpp, verify_terms.cpp and resident_volume.cpp; read by
+// mixed_sampler.h.
 #pragma once
 
 #include "host/opencl/array.hpp"

@@ -62,8 +62,7 @@ double parabola_peak(double a, double b, double c) {
   return bend == 0 ? 0 : std::clamp(0.5 * (a - c) / bend, -0.5, 0.5);
 }
 
-// --- opposite views
-// ---------------------------------------------------------------------------------------------------
+// --- opposite views ---
 
 struct Pair {
   std::int64_t a, b;
@@ -178,8 +177,7 @@ std::optional<CenterEstimate> from_opposite_views(const ProjectionSet& scan) {
       quality};
 }
 
-// --- a half turn
-// ------------------------------------------------------------------------------------------------------
+// --- a half turn ---
 
 // True for views in order of angle, equally spaced, that fill half a turn without repeating its end.
 bool is_half_turn(const std::vector<double>& theta) {

@@ -195,8 +195,7 @@ RawScan open_data_exchange(const Hdf5File& file) {
   return scan;
 }
 
-// --- NXtomo
-// -----------------------------------------------------------------------------------------------------------
+// --- NXtomo ---
 
 // A group's child by its usual name, else the first of the NeXus class.
 std::string child_of(const Hdf5File& file, const std::string& group, const std::string& nx_class,

@@ -31,8 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// --- which reader
-// -----------------------------------------------------------------------------------------------------
+// --- which reader ---
 
 // The signature may follow a user block of 512, 1024, ... bytes (HDF5 File Format Specification, III.A).
 bool is_hdf5(const fs::path& path) {
@@ -85,8 +84,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
                   "or NRRD stack; or its first bytes are missing");
 }
 
-// --- geometry and memory
-// ----------------------------------------------------------------------------------------------
+// --- geometry and memory ---
 
 ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
   ParallelGeometry g;
@@ -121,8 +119,7 @@ void require_room(const io::RawScan& raw, const ScanOptions& options, const std:
   io::require_memory(bytes, options.max_memory_bytes, name + ": the projections");
 }
 
-// --- samples
-// ----------------------------------------------------------------------------------------------------------
+// --- samples ---
 
 // Runs `work(k)` for k < count on all cores; the first exception comes out here.
 template <typename Work>
@@ -185,8 +182,7 @@ void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& p
         "the scan holds float64 or wide integers: F is that of its values rounded to float32");
 }
 
-// --- report
-// -----------------------------------------------------------------------------------------------------------
+// --- report ---
 
 // One file: its own hash. Several: the hash of the sorted lines "sha256 name\n".
 std::string hash_of(const io::RawScan& raw, bool folder) {

@@ -62,8 +62,7 @@ bool is_coarse(const MixedVolume& v) { return v.coarsening != LevelTriple{0, 0, 
 /// As the file and its hash have it, z, y, x.
 std::array<std::int64_t, 3> wide(const LevelTriple& zyx) { return {zyx[0], zyx[1], zyx[2]}; }
 
-// --- writing
-// ----------------------------------------------------------------------------------------------------------
+// --- writing ---
 
 void write_grid(h5::Writer& file, const MixedVolume& v) {
   file.group("/grid");
@@ -99,8 +98,7 @@ void write_block(h5::Writer& file, const std::string& path, const h5::Shape& sha
   file.dataset(path + "_shift", {b.shift.size()}, std::span<const std::uint8_t>(b.shift));
 }
 
-// --- reading
-// ----------------------------------------------------------------------------------------------------------
+// --- reading ---
 
 int read_version(const h5::Reader& file) {
   if (!file.has_attribute("/", "format") || file.text_attribute("/", "format") != "vdvr")
@@ -356,8 +354,7 @@ Certificate read_certificate(const std::string& path, const std::string& json) {
   }
 }
 
-// --- seal
-// ------------------------------------------------------------------------------------------------------------
+// --- seal ---
 
 /// Of all objects that a reader looks at. Paths of /tiles come after "/tiles" itself.
 std::vector<h5::Attribute> all_attributes(const h5::Reader& file) {
@@ -404,8 +401,7 @@ std::string read_altered(const h5::Reader& file, VdvrFile& result) {
       altered, altered.empty() ? "" : "; ", found, result.certificate.content_sha256);
 }
 
-// --- content hash
-// -----------------------------------------------------------------------------------------------------
+// --- content hash ---
 
 template <class T>
 void add(Sha256& hash, std::span<const T> values) {

@@ -1,8 +1,8 @@
 // The field of D2VR at the points of a packet, and its gradient: the sum over the views of the filtered
 // projections (weights included), bilinear between detector samples (Rautek, Csebfalvi, Grimm, Bruckner and
-// Groeller 2006). 0 where a view misses the point; above and below the
-// detector the outermost row counts. Lane by lane the same operations in the same order.
-// Included by d2vr.cl, in the place of packet_sampler.h.
+// Groeller 2006). It is 0 where a view misses the point; above and below the detector the outermost row
+// counts. Lane by lane the same operations in the same order. Included by d2vr.cl, in the place of
+// packet_sampler.h.
 //
 // Layouts: field[view][u][v], because a bilinear footprint then takes two neighbours in two columns; what
 // stands where brick records stand for stored volumes, `bricks`, is one float4 a view: column = x c.x + y c.y

@@ -4,8 +4,8 @@
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
 //
-// VDVR_LIT: the buffer holds lit samples (host/sampler/lit_samples.hpp), each the float32 sample and behind it the
-// gradient there, so that light costs no further samples.
+// VDVR_LIT: the buffer holds lit samples (host/sampler/lit_samples.hpp), each the float32 sample and behind
+// it the gradient there, so that light costs no further samples.
 #ifndef VDVR_PACKET_SAMPLER_H
 #define VDVR_PACKET_SAMPLER_H
 #ifndef VDVR_LIT
@@ -152,8 +152,7 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
 }
 #endif
 
-// --- buffer: cells and their corners
-// -----------------------------------------------------------------------------------------------------------
+// --- buffer: cells and their corners ---
 #ifdef VDVR_SAMPLER_BUFFER
 
 // The number of a sample in each lane: `lane` + `all`. What is the same in all lanes is kept apart because it

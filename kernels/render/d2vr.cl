@@ -1,5 +1,5 @@
 // D2VR: ray-casting straight from the filtered projections (Rautek et al. 2006), and the same field at
-// points. The rays, leaps, colours and light of raycast.cl over the field of shared/d2vr_field.h, so that a
+// points. The rays, leaps, colours and light of raycast.cl over the field of device/d2vr_field.h, so that a
 // picture differs from that of a stored volume by the field alone.
 //
 // Layouts: field and views as in d2vr_field.h; points[i] in cells, values[i]. Called by: D2vrField::at and

@@ -1,5 +1,5 @@
 // Ray-casting of the mixed-resolution field: emission-absorption (dvr), iso-surfaces (iso), maximum (mip),
-// slice. One source for both samplers and for packets of 1 to 16 rays per work-item (shared/packet.h).
+// slice. One source for both samplers and for packets of 1 to 16 rays per work-item (device/packet.h).
 //
 // Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, and each belongs to the brick that
 // vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
@@ -7,9 +7,8 @@
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where
 // worth sampling), ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities
-// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth
-// | bound). Called by:
-// raycast() in host/render/raycast.cpp.
+// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth | bound). Called
+// by raycast() in host/render/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif

@@ -82,8 +82,7 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
 #undef PUT
 }
 
-// --- closing: one tile a work-item
-// -----------------------------------------------------------------------------------------------------------
+// --- closing: one tile a work-item ---
 
 typedef struct {
   __global uint2* samples;

@@ -1,5 +1,6 @@
 // Measures the image3d sampler: what it returns at given texel coordinates, and how fast both samplers run.
-// Called by: probe_sampler() in host/sampler/probe_sampler.cpp. Calls: vdvr_sample_in_brick of mixed_sampler.h.
+// Called by: probe_sampler() in host/sampler/probe_sampler.cpp. Calls: vdvr_sample_in_brick of
+// mixed_sampler.h.
 #include "shared/mixed_sampler.h"
 
 // A device without images cannot compile image arguments.

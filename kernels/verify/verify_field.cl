@@ -13,7 +13,7 @@
 
 #define RADIUS 2
 
-// --- F at nodes -------------------------------------------------------------------------------------------
+// --- F at nodes ---
 
 // Lane i of a float8 belongs to the node x + i.
 #define FOR_TILE(M) M(0, s0) M(1, s1) M(2, s2) M(3, s3) M(4, s4) M(5, s5) M(6, s6) M(7, s7)
@@ -68,7 +68,7 @@ __kernel void verify_field(__global float* field, __global const float* table, _
   FOR_TILE(PUT)
 }
 
-// --- |V - F| at nodes -------------------------------------------------------------------------------------
+// --- |V - F| at nodes ---
 
 inline __global const float* field_column(__global const float* field, int4 item, int4 first, int x, int y,
                                           int cells, int nx, int ny, int z_padded) {
@@ -120,7 +120,7 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
   }
 }
 
-// --- fourth differences -----------------------------------------------------------------------------------
+// --- fourth differences ---
 
 inline float16 second(__global const float* p, int stride) {
   const float16 c = vload16(0, p);
@@ -179,7 +179,7 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
                                        largest_of_16(xy), largest_of_16(xz), largest_of_16(yz), 0.0f, 0.0f);
 }
 
-// --- cells ------------------------------------------------------------------------------------------------
+// --- cells ---
 
 // h^2 times the second derivative: the second difference less `correction` twelfths of the fourth.
 inline float16 curvature(__global const float* p, int stride, float correction) {

@@ -274,8 +274,7 @@ BOOST_AUTO_TEST_CASE(types_whose_bytes_are_not_those_in_memory_are_refused) {
   H5Tclose(narrow);
 }
 
-// --- certified volumes
-// ------------------------------------------------------------------------------------------------
+// --- certified volumes ---
 
 BOOST_AUTO_TEST_CASE(deflated_and_plain_files_hold_the_same_volume_of_every_type) {
   const Folder folder;

@@ -12,8 +12,7 @@ using namespace vdvr::support;
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 
-// --- the two real scans
-// -------------------------------------------------------------------------------------------------
+// --- the two real scans ---
 
 BOOST_AUTO_TEST_CASE(diamond_is_read_with_air_at_zero) {
   const ProjectionSet scan = read_scan(data / "diamond-24737");
@@ -80,8 +79,7 @@ BOOST_AUTO_TEST_CASE(tooth_without_a_description_finds_its_centre) {
   BOOST_TEST(has(refusal(data / "aps-tooth/tooth.h5", options), "centre 640"));
 }
 
-// --- Data Exchange
-// ------------------------------------------------------------------------------------------------------
+// --- Data Exchange ---
 
 BOOST_AUTO_TEST_CASE(data_exchange_counts_become_line_integrals) {
   const TemporaryFolder folder;
@@ -215,8 +213,7 @@ BOOST_AUTO_TEST_CASE(links_out_of_the_file_are_refused) {
   BOOST_TEST(refusal(folder / "b.h5") != "accepted");
 }
 
-// --- NXtomo
-// -------------------------------------------------------------------------------------------------------------
+// --- NXtomo ---
 
 BOOST_AUTO_TEST_CASE(nxtomo_is_sorted_by_its_image_key) {
   const TemporaryFolder folder;
@@ -237,8 +234,7 @@ BOOST_AUTO_TEST_CASE(nxtomo_with_wrong_keys_is_refused) {
   BOOST_TEST(has(refusal(write_nxtomo(folder / "c.nxs", {2, 1, 0, 7, 3, 0, 0, 0})), "key 7"));
 }
 
-// --- what is no scan
-// ------------------------------------------------------------------------------------------------------
+// --- what is no scan ---
 
 BOOST_AUTO_TEST_CASE(files_of_other_kinds_are_refused) {
   const TemporaryFolder folder;

@@ -15,8 +15,7 @@ using namespace vdvr::support;
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 
-// --- TIFF and folders
-// -----------------------------------------------------------------------------------------------------
+// --- TIFF and folders ---
 
 BOOST_AUTO_TEST_CASE(tiff_samples_of_every_type_are_read_to_the_bit) {
   const TemporaryFolder folder;
@@ -133,8 +132,7 @@ BOOST_AUTO_TEST_CASE(blank_flat_and_odd_sized_projection_are_refused_by_name) {
   BOOST_TEST(has(folder_refusal(folder, description), "view_9.tif"));
 }
 
-// --- stacks
-// ---------------------------------------------------------------------------------------------------------------
+// --- stacks ---
 
 BOOST_AUTO_TEST_CASE(stack_is_read_with_its_angles_file) {
   const TemporaryFolder folder;

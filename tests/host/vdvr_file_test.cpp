@@ -14,8 +14,7 @@
 using namespace vdvr;
 using namespace vdvr::support;
 
-// --- round trips
-// ------------------------------------------------------------------------------------------------------
+// --- round trips ---
 
 BOOST_AUTO_TEST_CASE(round_trip_keeps_every_bit) {
   const Folder folder;
@@ -142,8 +141,7 @@ BOOST_AUTO_TEST_CASE(chunks_are_contiguous_and_hardly_padded) {
   BOOST_TEST((chunk_shape({1}, 70'000'000) == Shape{1}));
 }
 
-// --- damage
-// -----------------------------------------------------------------------------------------------------------
+// --- damage ---
 
 BOOST_AUTO_TEST_CASE(a_truncated_file_is_rejected_at_every_length) {
   const Folder folder;
@@ -230,8 +228,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_file_is_rejected) {
   BOOST_TEST(says(refusal(folder.path / "text.vdvr"), {"text.vdvr", "HDF5"}));
 }
 
-// --- crafted files
-// ----------------------------------------------------------------------------------------------------
+// --- crafted files ---
 
 BOOST_AUTO_TEST_CASE(a_newer_or_invalid_format_version_is_refused) {
   BOOST_TEST(says(refusal_after(set_integer("/", "format_version", 5)), {"format_version", "5", "newer"}));
@@ -401,8 +398,7 @@ BOOST_AUTO_TEST_CASE(a_missing_or_broken_certificate_is_refused) {
   BOOST_TEST(refusal_after(set_certificate(to_json(support::full_certificate()))) == "accepted");
 }
 
-// --- limits and writing
-// -----------------------------------------------------------------------------------------------
+// --- limits and writing ---
 
 BOOST_AUTO_TEST_CASE(reading_honours_the_memory_limit) {
   const Folder folder;

@@ -153,8 +153,7 @@ support::Edit nudge_attribute(const std::string& object, const std::string& name
 
 }  // namespace
 
-// --- the seal
-// ---------------------------------------------------------------------------------------------------------
+// --- the seal ---
 
 BOOST_AUTO_TEST_CASE(what_was_written_is_sealed) {
   const support::Folder folder;
@@ -290,8 +289,7 @@ BOOST_AUTO_TEST_CASE(files_of_earlier_programs_open_and_are_unsealed) {
   BOOST_TEST(!file.certificate.sealed);
 }
 
-// --- edits that were sealed again
-// -------------------------------------------------------------------------------------
+// --- edits that were sealed again ---
 
 namespace {
 
@@ -484,8 +482,7 @@ BOOST_AUTO_TEST_CASE(every_number_that_promises_something_is_compared) {
   BOOST_TEST(edits > 50u);
 }
 
-// --- the total, attacked
-// ----------------------------------------------------------------------------------------------
+// --- the total, attacked ---
 
 BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
   // V is F at all gold nodes, and interpolated between them.
@@ -538,8 +535,7 @@ BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
   BOOST_TEST(wrong.failure.find("the certificate bounds it by") != std::string::npos, wrong.failure);
 }
 
-// --- the program
-// ------------------------------------------------------------------------------------------------------
+// --- the program ---
 
 BOOST_AUTO_TEST_CASE(info_render_and_verify_refuse_what_was_edited) {
   const support::Folder folder;

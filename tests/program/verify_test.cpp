@@ -413,7 +413,7 @@ BOOST_AUTO_TEST_CASE(only_promised_samplers_of_the_device_are_judged) {
   BOOST_TEST(!measured(m, m.volume, c).holds);
 }
 
-// --- the program ------------------------------------------------------------------------------------------
+// --- the program ---
 
 namespace {
 

@@ -43,8 +43,7 @@ inline bool has(const std::string& text, const std::string& part) {
   return found;
 }
 
-// --- an HDF5 file written with the plain C API, independent of host/io
-// ---------------------------------------------------
+// --- an HDF5 file written with the plain C API, independent of host/io ---
 
 class Hdf5Writer {
  public:
@@ -143,8 +142,7 @@ inline Path write_exchange(const Path& path, const Exchange& e) {
   return path;
 }
 
-// --- TIFF made by libtiff itself
-// -----------------------------------------------------------------------------------------
+// --- TIFF made by libtiff itself ---
 
 template <typename T>
 void write_tiff(const Path& path, int rows, int columns, const std::vector<T>& samples, int format,
