@@ -15,7 +15,7 @@
 #include "host/certify/close_boundaries.hpp"
 #include "host/certify/raise_levels.hpp"
 #include "host/certify/result_units.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/gold/worst_node.hpp"
 #include "host/opencl/host_memory.hpp"

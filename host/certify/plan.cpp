@@ -17,7 +17,7 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/certify/result_units.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"

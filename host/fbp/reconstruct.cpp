@@ -14,7 +14,7 @@
 
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/huge_pages.hpp"
