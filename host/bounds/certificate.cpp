@@ -317,7 +317,7 @@ std::vector<float> brick_bounds(const Certificate& c, bool image3d) {
         "the file has no bounds by brick: an earlier version wrote it, or nothing is certified; build it "
         "again");
   if (image3d && !c.budget.sampler.image3d)
-    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+    throw InputError("the certificate says nothing of the image3d sampler; take `sampler` buffer");
   const double rest =
       c.budget.arithmetic.value + (image3d ? *c.budget.sampler.image3d : c.budget.sampler.buffer).value;
   std::vector<float> bounds(c.brick_totals.size());

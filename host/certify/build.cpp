@@ -71,7 +71,7 @@ class Builder {
     bricks_.involved.assign(selected_.size(), 0);
     bricks_.samples.resize(selected_.size());
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
-      throw InputError("--roi meets no brick of the grid");
+      throw InputError("`roi` meets no brick of the grid");
 
     filtered_ = filter_projections(state_, scan, plan.field, progress, FilterMethod::automatic,
                                    Precision::fp64, units);
@@ -205,7 +205,7 @@ class Builder {
                     "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
                     to_world(plan_.epsilon_abs, units_), projection ? "the projections" : "gold",
                     to_world(static_cast<double>(slack), units_), to_world(strict, units_),
-                    projection ? "--upsampling, or take --u-filter cubic," : "--gold",
+                    projection ? "`upsampling`, or take `u_filter` cubic," : "`gold`",
                     to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict), units_)));
   }
 
@@ -218,12 +218,12 @@ class Builder {
         to_world(tolerance, units_));
     if (rounds())
       throw ToleranceError(found +
-                           fmt::format("where integer samples round by up to {:.4g}; --storage auto or "
+                           fmt::format("where integer samples round by up to {:.4g}; `storage` auto or "
                                        "f32 may do",
                                        to_world(0.5 * bricks_.lattice.step, units_)));
     throw ToleranceError(
         found +
-        fmt::format("where rounding in fp32 moved gold; raise --gold or allow at least "
+        fmt::format("where rounding in fp32 moved gold; raise `gold` or allow at least "
                     "{:.4g}",
                     to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(total) - tolerance), units_)));
   }

@@ -250,7 +250,7 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const std::int64_t size = shape.tile_size(levels.at(i));
     if (size > samples.end() - next)
-      throw FileError("a journal record lacks samples; start without --resume");
+      throw FileError("a journal record lacks samples; start without `resume`");
     const auto end = next + size;
     std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
     const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();

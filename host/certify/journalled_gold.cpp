@@ -51,7 +51,7 @@ std::size_t JournalledGold::replay(std::int64_t pass, const GoldStream::Work& wo
   if (!same || n < 1 || static_cast<std::uint64_t>(n) > work.first.size() - from)
     throw InputError(
         "the journal's next record is of other blocks than this build asks for; start again without "
-        "--resume");
+        "`resume`");
   std::vector<std::array<std::int64_t, 3>> first;
   for (std::size_t i = from; i < from + static_cast<std::size_t>(n); ++i)
     first.push_back({work.first[i][0], work.first[i][1], work.z});

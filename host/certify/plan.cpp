@@ -64,10 +64,10 @@ void check_rates(const RateOptions& rates) {
     return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n));
   };
   if (rates.upsampling && !power(*rates.upsampling, 2))
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 2 to 64 (rate 1 has no bound)",
+    throw InputError(fmt::format("`upsampling` {} must be a power of two, 2 to 64 (rate 1 has no bound)",
                                  *rates.upsampling));
   if (rates.gold && !power(*rates.gold, 2))
-    throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
+    throw InputError(fmt::format("`gold` {} must be a power of two, 2 to 64", *rates.gold));
 }
 
 void check_granularity(int granularity) {
@@ -224,7 +224,7 @@ void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t
 
 void check_tolerance(const Tolerance& tolerance) {
   if (tolerance.relative.has_value() == tolerance.absolute.has_value())
-    throw InputError("give one of --epsilon and --epsilon-abs");
+    throw InputError("give one of `epsilon` and `epsilon_abs`");
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   if (!(given > 0) || !std::isfinite(given))
     throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
@@ -241,7 +241,7 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
   if (!(plan.epsilon_abs > 0))
     throw InputError(
         "the field is constant over the covered samples, so a relative tolerance means nothing; give "
-        "--epsilon-abs");
+        "`epsilon_abs`");
 }
 
 // How much coarser than the grid the base will be.
@@ -249,8 +249,8 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
   if (const auto& wanted = plan.settings.coarsening) {
     if (is_possible(*wanted, plan.grid, s.granularity, s.rate)) return *wanted;
     throw InputError(fmt::format(
-        "--base {}x{}x{} must divide the granularity {} and the grid's {} x {} x {} cells, and "
-        "with --gold {} be at most {}",
+        "`base` {}x{}x{} must divide the granularity {} and the grid's {} x {} x {} cells, and "
+        "with `gold` {} be at most {}",
         1 << (*wanted)[2], 1 << (*wanted)[1], 1 << (*wanted)[0], s.granularity, plan.grid.cells[0],
         plan.grid.cells[1], plan.grid.cells[2], s.rate, (1 << largest_level) / s.rate));
   }
@@ -341,7 +341,7 @@ class Planner {
         static_cast<double>(range.not_covered) / static_cast<double>(plan_.grid.sample_count());
     // One plane of covered samples suffices; none does not.
     if (range.not_covered == plan_.grid.sample_count() && plan_.grid.cells[2] > 1)
-      throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+      throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
     plan_.reference_range = range.high - range.low;
   }
 
@@ -467,7 +467,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   if (tolerance.relative && largest_magnitude(scan.data) == 0)
     throw InputError(
         "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
-        "--epsilon-abs");
+        "`epsilon_abs`");
   const Units units = units_of(scan);
   Tolerance wanted = tolerance;
   if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);

@@ -75,8 +75,8 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
     throw ResourceError(fmt::format(
         "gold at rate {} from {} views of {} upsampled columns needs {:.1f} MiB for its thinnest slab; raise "
-        "--max-memory, "
-        "or choose a smaller --granularity, --upsampling or --gold",
+        "`max_memory`, "
+        "or choose a smaller `granularity`, `upsampling` or `gold`",
         settings.rate, scan.geometry.views(), columns_.count,
         static_cast<double>(slab_bytes(slab_bricks_ * g)) / (1 << 20)));
   }

@@ -38,8 +38,8 @@ void before_device_ends(Forget forget) {
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
     throw ResourceError(
-        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or "
-                    "choose a smaller --size",
+        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise `max_memory`, or "
+                    "choose a smaller `size`",
                     what, static_cast<double>(bytes) / (1 << 20), static_cast<double>(left()) / (1 << 20),
                     static_cast<double>(limit_) / (1 << 20)));
   }
@@ -72,7 +72,7 @@ void BufferPool::clear() {
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
     throw ResourceError(fmt::format(
-        "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device", what,
+        "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller `size` or another `device`", what,
         bytes, info.name, info.max_allocation));
   }
   cl::Buffer buffer = pool.take(bytes);
@@ -211,7 +211,7 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
     std::string names;
     for (const auto& [device, info] : found)
       names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
-    throw DeviceError(fmt::format("no device matches --device '{}'; there are:{}", selector, names));
+    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
   }
   try {
     state_->device = chosen->first;

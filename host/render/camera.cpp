@@ -13,8 +13,8 @@ namespace vdvr {
 Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom) {
   if (!std::isfinite(azimuth_deg) || !std::isfinite(elevation_deg))
     throw InputError(
-        fmt::format("--azimuth {} and --elevation {} must be finite", azimuth_deg, elevation_deg));
-  if (!(zoom > 0) || !std::isfinite(zoom)) throw InputError(fmt::format("--zoom {} must be positive", zoom));
+        fmt::format("`azimuth` {} and `elevation` {} must be finite", azimuth_deg, elevation_deg));
+  if (!(zoom > 0) || !std::isfinite(zoom)) throw InputError(fmt::format("`zoom` {} must be positive", zoom));
   double diagonal2 = 0;
   Camera camera;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -52,18 +52,18 @@ Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optiona
     throw InputError("the camera's position, focal point and view-up must be finite");
   if (!(view_angle_deg > 0 && view_angle_deg < 180))
     throw InputError(
-        fmt::format("--camera-view-angle {} must lie between 0 and 180 degrees", view_angle_deg));
+        fmt::format("`camera_view_angle` {} must lie between 0 and 180 degrees", view_angle_deg));
   const Vec3 view{focal_point[0] - position[0], focal_point[1] - position[1], focal_point[2] - position[2]};
   const Vec3& up = camera.view_up;
   const double length = std::hypot(view[0], view[1], view[2]), up_length = std::hypot(up[0], up[1], up[2]);
-  if (!(length > 0)) throw InputError("--camera-position and --camera-focal-point are the same point");
+  if (!(length > 0)) throw InputError("`camera_position` and `camera_focal_point` are the same point");
   const double across = std::hypot(view[1] * up[2] - view[2] * up[1], view[2] * up[0] - view[0] * up[2],
                                    view[0] * up[1] - view[1] * up[0]);
   constexpr double parallel = 1e-6;  // of the sine between them: fp32 rays turn by less
   if (across > parallel * length * up_length) return camera;
   if (view_up)
-    throw InputError(up_length > 0 ? "--camera-view-up is parallel to the direction of view; choose another"
-                                   : "--camera-view-up is 0,0,0; it must have a direction");
+    throw InputError(up_length > 0 ? "`camera_view_up` is parallel to the direction of view; choose another"
+                                   : "`camera_view_up` is 0,0,0; it must have a direction");
   // As a slice across z shows it: seen from -z, x to the right and y down.
   camera.view_up = {0, view[2] > 0 ? -1.0 : 1.0, 0};
   return camera;

@@ -37,14 +37,14 @@ std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 void check_options(const ParallelGeometry& g, const D2vrOptions& options) {
   const int n = options.upsampling;
   if (n < 1 || n > 64 || (n & (n - 1)) != 0)
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", n));
+    throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", n));
   if (g.columns < 2)
     throw InputError(fmt::format("a detector of {} columns has nothing to interpolate between", g.columns));
   // Kernels address one view by 32 bits.
   const double most = std::numeric_limits<std::int32_t>::max();
   if (!(static_cast<double>(n * g.columns + 16) * static_cast<double>(n * g.rows + 1) < most))
     throw InputError(
-        fmt::format("{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower --upsampling",
+        fmt::format("{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower `upsampling`",
                     g.columns, g.rows, n));
 }
 
@@ -294,18 +294,18 @@ namespace {
 void check_dvr(const RenderOptions& o) {
   const auto refuse = [](const char* what) {
     throw InputError(
-        fmt::format("{}; D2VR, which has projections instead of a volume, draws --mode dvr with "
-                    "--classification post and --step-mode fixed: build the "
-                    "volume first, or render with --method vdvr or dvr",
+        fmt::format("{}; D2VR, which has projections instead of a volume, draws `mode` dvr with "
+                    "`classification` post and `step_mode` fixed: build the "
+                    "volume first, or render with `method` vdvr or dvr",
                     what));
   };
-  if (o.mode != RenderMode::dvr) refuse("--method d2vr does not draw this --mode");
+  if (o.mode != RenderMode::dvr) refuse("`method` d2vr does not draw this `mode`");
   if (o.classification != Classification::post)
-    refuse("--classification preintegrated does not apply to --method d2vr");
-  if (o.step_mode != StepMode::fixed) refuse("--step-mode level does not apply to --method d2vr");
+    refuse("`classification` preintegrated does not apply to `method` d2vr");
+  if (o.step_mode != StepMode::fixed) refuse("`step_mode` level does not apply to `method` d2vr");
   if (o.gradient == GradientKind::stored)
-    refuse("--gradient stored does not apply to --method d2vr, which has no stored samples");
-  if (o.sampler == SamplerKind::image3d) refuse("--sampler image3d does not apply to --method d2vr");
+    refuse("`gradient` stored does not apply to `method` d2vr, which has no stored samples");
+  if (o.sampler == SamplerKind::image3d) refuse("`sampler` image3d does not apply to `method` d2vr");
 }
 
 }  // namespace

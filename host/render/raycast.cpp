@@ -156,7 +156,7 @@ VdvrSlice make_slice(const Impl& v, const RenderOptions& o) {
   const double lo = g.origin[axis], hi = lo + side(axis), at = o.slice_position.value_or((lo + hi) / 2);
   if (!(at >= lo && at <= hi))
     throw InputError(
-        fmt::format("--slice-position {} lies outside the grid, {} to {} along {}", at, lo, hi, "xyz"[axis]));
+        fmt::format("`slice_position` {} lies outside the grid, {} to {} along {}", at, lo, hi, "xyz"[axis]));
   // One square pixel size for both axes; the slice is centred in the picture.
   const double pixel =
       std::max(side(across) / static_cast<double>(o.width), side(down) / static_cast<double>(o.height));
@@ -190,7 +190,7 @@ std::pair<SamplerKind, std::string> choose_sampler(Device& device, const Residen
   if (asked == SamplerKind::image3d) {
     if (!v.has_image3d())
       throw ResourceError("the image3d sampler cannot be used: " + v.image3d_reason() +
-                          "; use --sampler buffer");
+                          "; use `sampler` buffer");
     return {SamplerKind::image3d, "asked for"};
   }
   if (!v.has_image3d()) return {SamplerKind::buffer, v.image3d_reason()};
@@ -228,7 +228,7 @@ GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind 
                ? GradientKind::stored
                : GradientKind::central;
   if (o.gradient == GradientKind::stored && sampler == SamplerKind::image3d)
-    throw InputError("--gradient stored: the image3d sampler has none; use --sampler buffer");
+    throw InputError("`gradient` stored: the image3d sampler has none; use `sampler` buffer");
   return o.gradient;
 }
 
@@ -427,7 +427,7 @@ Enqueued enqueue_frame(Device& device, const ResidentVolume& volume, const Rende
   check_options(o);
   Impl& v = volume.impl();
   if (o.output == RenderOutput::error && v.bounds.size() == 0)
-    throw InputError("--show error: the volume has no bounds by brick");
+    throw InputError("`show` error: the volume has no bounds by brick");
   FloatPicture result;
   std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
   const float slack = range_slack(device, v, result.sampler);

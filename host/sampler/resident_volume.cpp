@@ -340,7 +340,7 @@ void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type)
 const std::array<cl::Image3D, 3>& ResidentVolume::Impl::atlas() {
   if (atlas_) return *atlas_;
   if (!layout.fits)
-    throw ResourceError("the image3d sampler cannot be used: " + layout.reason + "; use --sampler buffer");
+    throw ResourceError("the image3d sampler cannot be used: " + layout.reason + "; use `sampler` buffer");
   atlas_bricks_ = opencl::DeviceArray<std::uint32_t>(*state, std::span<const std::uint32_t>(texel_records_),
                                                      "brick records of the atlas");
   state->memory.take(layout.bytes(), "image3d atlas");
@@ -361,7 +361,7 @@ const std::array<cl::Image3D, 3>& ResidentVolume::Impl::atlas() {
     atlas_ = std::move(images);
   } catch (const cl::Error& e) {
     state->memory.give(layout.bytes());
-    throw ResourceError(fmt::format("image3d atlas, {}: {} on '{}': {}; use --sampler buffer", layout.reason,
+    throw ResourceError(fmt::format("image3d atlas, {}: {} on '{}': {}; use `sampler` buffer", layout.reason,
                                     e.what(), state->info.name, opencl::code_name(e.err())));
   }
   return *atlas_;

@@ -257,7 +257,7 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
         "/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
   if (max_memory_bytes != 0 && needed > max_memory_bytes)
     throw ResourceError(
-        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise --max-memory", path, needed,
+        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise `max_memory`", path, needed,
                     max_memory_bytes));
   io::require_memory(needed, 0, path);  // deflated, a small file may hold a large volume
 }

@@ -199,7 +199,7 @@ BOOST_AUTO_TEST_CASE(eight_bits_that_leave_no_room_are_refused_and_auto_takes_mo
   BOOST_CHECK_EXCEPTION(build_of(scan, wanted), ToleranceError, [](const ToleranceError& e) {
     const std::string text = e.what();
     return text.find("integer samples round") != std::string::npos &&
-           text.find("--storage") != std::string::npos && text.find("interpolating") == std::string::npos;
+           text.find("`storage`") != std::string::npos && text.find("interpolating") == std::string::npos;
   });
   wanted.options.storage = StorageChoice::automatic;
   const Built built = build_of(scan, wanted);

@@ -404,7 +404,7 @@ BOOST_AUTO_TEST_CASE(reading_honours_the_memory_limit) {
   const Folder folder;
   const fs::path path = write_small(folder);
   BOOST_CHECK_EXCEPTION(read_vdvr(path, 1000), ResourceError, [](const ResourceError& e) {
-    return says(e.what(), {"small.vdvr", "1000", "--max-memory"});
+    return says(e.what(), {"small.vdvr", "1000", "`max_memory`"});
   });
   BOOST_TEST(same_volume(read_vdvr(path, 1 << 20).volume, small_volume()));
 }
