@@ -8,7 +8,7 @@
 
 #include "apps/vdvr/paper.hpp"
 #include "apps/vdvr/progress.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 

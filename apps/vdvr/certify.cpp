@@ -6,9 +6,8 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/progress.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 
@@ -20,21 +19,27 @@ void add_plan_options(Arguments& args) {
   add_rates(args);
 }
 
-CertifyOptions certify_options(const Arguments& args) {
-  return {field_options(args), grid_options(args),  rate_options(args),
-          tolerance(args),     build_options(args), plan_settings(args)};
+Wanted wanted_of(const Arguments& args) {
+  Wanted w;
+  w.options.field = field_options(args);
+  w.options.grid = grid_options(args);
+  w.options.rates = rate_options(args);
+  w.tolerance = tolerance(args);
+  w.options.build = build_options(args);
+  w.options.plan = plan_settings(args);
+  return w;
 }
 
-Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
-                      const Progress& progress) {
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress) {
   Planned planned;
-  planned.scan = load_scan(args.path("IN"), args, options.field, progress);
-  FieldOptions field = options.field;
-  field.center = center_of(field, planned.scan.geometry);
-  const Grid grid = make_grid(planned.scan.geometry, options.grid);
-  planned.plan =
-      make_plan(device, planned.scan, grid, field, options.rates, options.tolerance, options.plan, progress);
+  planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress);
+  planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
   return planned;
+}
+
+BuildResult build_planned(Device& device, const Planned& planned, const Wanted& wanted,
+                          const Progress& progress) {
+  return certify(device, planned.scan, planned.plan, wanted.tolerance, wanted.options, progress);
 }
 
 std::filesystem::path journal_path(const std::filesystem::path& output) {
@@ -78,31 +83,6 @@ int resumable(const Journal& journal, const std::function<int()>& work) {
     if (journal.records() == 0) throw;
     throw Interrupted(e.exit_code(), stays);
   }
-}
-
-BuildResult build_certified(Device& device, const Planned& planned, const CertifyOptions& options,
-                            const Progress& progress) {
-  BuildResult result = [&] {
-    try {
-      return build(device, planned.scan, planned.plan, options.build, progress);
-    } catch (const ToleranceError&) {
-      if (options.build.journal) options.build.journal->remove();  // going on would end here again
-      throw;
-    }
-  }();
-  Certificate& c = result.certificate;
-  // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
-  // (but in a scan of nothing but zeros, whose range is 0).
-  if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
-    throw InputError("--window or --roi leaves no covered gold node to test: nothing would be certified");
-  if (!c.holds_buffer && !c.comparison)
-    throw ToleranceError(fmt::format(
-        "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
-        c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
-  c.options_json = options_json(planned.plan, options.build, options.tolerance.of_max, planned.scan.geometry,
-                                center_of(planned.plan.field, planned.scan.geometry));
-  c.content_sha256 = content_sha256(result.volume);
-  return result;
 }
 
 int certificate_exit_code(const char* command, const Certificate& certificate) {

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "apps/vdvr/options.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/plan.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 
@@ -18,24 +17,22 @@ namespace vdvr::cli {
 void add_plan_options(Arguments& args);
 
 /// Everything that can be refused before a scan is read.
-struct CertifyOptions {
-  FieldOptions field;
-  GridOptions grid;
-  RateOptions rates;
+struct Wanted {
   Tolerance tolerance;
-  BuildOptions build;
-  PlanSettings plan;
+  CertifyOptions options;
   Compression compression = Compression::deflate;  ///< of the file; `build` and `run` fill it in
 };
-CertifyOptions certify_options(const Arguments& args);
+Wanted wanted_of(const Arguments& args);
 
 struct Planned {
   ProjectionSet scan;
   Plan plan;
 };
 /// Reads IN and plans.
-Planned read_and_plan(Device& device, const Arguments& args, const CertifyOptions& options,
-                      const Progress& progress);
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
+/// The second half of vdvr::certify.
+BuildResult build_planned(Device& device, const Planned& planned, const Wanted& wanted,
+                          const Progress& progress);
 
 /// The journal of an output file: beside it, with this name.
 std::filesystem::path journal_path(const std::filesystem::path& output);
@@ -49,11 +46,6 @@ std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions
                                       const std::vector<std::filesystem::path>& outputs);
 /// Calls `work`; an interruption in it says that --resume continues, once there is anything to continue.
 int resumable(const Journal& journal, const std::function<int()>& work);
-
-/// Builds, and completes the certificate with the options and the content's hash. Throws ToleranceError when
-/// it does not hold for the `buffer` sampler, which every device has.
-BuildResult build_certified(Device& device, const Planned& planned, const CertifyOptions& options,
-                            const Progress& progress);
 
 /// 0 when the certificate holds for every sampler of the device it was built on, else 1 after a line on
 /// stderr.

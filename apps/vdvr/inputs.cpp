@@ -1,13 +1,12 @@
 #include "apps/vdvr/inputs.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-
-#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
+#include "vdvr/reconstruct.hpp"
+#include "vdvr/verify_file.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace fs = std::filesystem;
@@ -52,20 +51,10 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   return scan;
 }
 
-double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {
-  return field.center.value_or(geometry.center);
-}
-
-void check_consistency(const fs::path& path, const Certificate& c) {
-  if (const std::string what = contradiction(c); !what.empty())
-    throw MismatchError(fmt::format("{}: the certificate contradicts itself: {}", path.string(), what));
-}
-
-VdvrFile read_certified(const fs::path& path, const Arguments& args, bool unverified) {
+VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {
   const CommonOptions common = common_options(args);
-  VdvrFile file = read_vdvr(path, common.max_memory, unverified ? Altered::report : Altered::refuse);
-  if (unverified) return file;
-  check_consistency(path, file.certificate);
+  if (unverified) return read_vdvr(path, common.max_memory, Altered::report);
+  VdvrFile file = read_certified(path, common.max_memory);
   if (file.seal == Seal::none && !common.quiet)
     say(
         fmt::format("vdvr {}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
@@ -74,32 +63,12 @@ VdvrFile read_certified(const fs::path& path, const Arguments& args, bool unveri
   return file;
 }
 
-void check_input(const fs::path& path, const ProjectionSet& scan, const Certificate& c) {
-  if (scan.report.sha256 == c.input_sha256) return;
-  throw MismatchError(fmt::format(
-      "{}: these are other projections: found {} of {} x {} x {} (views, rows, columns), sha256 {}; the "
-      "volume "
-      "was built from {} of {} with sha256 {}",
-      path.string(), scan.report.name, scan.geometry.views(), scan.geometry.rows, scan.geometry.columns,
-      scan.report.sha256, c.input_name, fmt::join(c.input_shape, " x "), c.input_sha256));
-}
-
-std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate) {
-  const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
-  if (!options.is_object() || !options.contains("geometry")) return std::nullopt;
+void check_projections(const fs::path& path, const ProjectionSet& scan, const Certificate& certificate) {
   try {
-    const auto& g = options.at("geometry");
-    ParallelGeometry geometry;
-    geometry.columns = g.at("columns").get<std::int64_t>();
-    geometry.rows = g.at("rows").get<std::int64_t>();
-    geometry.pitch_u = g.at("pitch_u").get<double>();
-    geometry.pitch_v = g.at("pitch_v").get<double>();
-    geometry.center = g.at("center").get<double>();
-    geometry.unit = g.at("unit").get<std::string>();
-    geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
-    return geometry;
-  } catch (const nlohmann::json::exception& e) {
-    throw FileError(fmt::format("certificate, options.geometry: {}", e.what()));
+    check_input(scan, certificate);
+  } catch (MismatchError& e) {
+    e.add_context(path.string());
+    throw;
   }
 }
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <map>
 
-#include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -54,10 +53,6 @@ const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::auto
                                                     {"f32", StorageChoice::f32},
                                                     {"u16", StorageChoice::u16},
                                                     {"u8", StorageChoice::u8}};
-template <class T>
-std::string name_in(const std::map<std::string, T>& names, T value) {
-  return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; })->first;
-}
 
 bool is_power_of_two(std::int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
@@ -298,26 +293,6 @@ PlanSettings plan_settings(const Arguments& args) {
   if (settings.levels == Levels::anisotropic && build_options(args).closing == Closing::paper)
     throw InputError("--closing paper is defined for --levels isotropic only; or take --closing coarse");
   return settings;
-}
-
-std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
-                         const ParallelGeometry& geometry, double center) {
-  nlohmann::ordered_json j;
-  j["granularity"] = plan.layout.granularity;
-  j["base"] = cells_per_base_sample(plan.layout.coarsening);
-  j["closing"] = name_in(kClosings, build.closing);
-  j["coefficients"] = plan.settings.coefficients;
-  j["levels"] = text_of(plan.layout.levels);
-  j["storage"] = name_in(kStorage, build.storage);
-  j["terms"] = plan.settings.terms;
-  j["epsilon_of"] = epsilon_of_max ? "max" : "range";
-  j["upsampling"] = plan.rates.upsampling;
-  j["u_filter"] = text_of(plan.rates.interpolation);
-  j["gold"] = plan.rates.gold;
-  j["geometry"] = {{"columns", geometry.columns},    {"rows", geometry.rows}, {"pitch_u", geometry.pitch_u},
-                   {"pitch_v", geometry.pitch_v},    {"center", center},      {"unit", geometry.unit},
-                   {"theta_rad", geometry.theta_rad}};
-  return j.dump();
 }
 
 }  // namespace vdvr::cli

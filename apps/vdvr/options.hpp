@@ -2,7 +2,6 @@
 // What belongs to a later version is declared too, so that it is refused by name and never silently ignored.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/vdvr/arguments.hpp"
@@ -57,10 +56,5 @@ void add_limited(Arguments& args, const std::string& name, const std::vector<std
                  const std::vector<std::string>& supported, const std::string& help);
 std::string limited_choice(const Arguments& args, const std::string& name,
                            const std::vector<std::string>& all, const std::vector<std::string>& supported);
-
-/// What a volume is built with, for the certificate's `options`; includes the scan's geometry, so that a
-/// reader of the file can tell which points are covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
-                         const ParallelGeometry& geometry, double center);
 
 }  // namespace vdvr::cli

@@ -8,7 +8,7 @@
 
 #include <cstdio>
 
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;

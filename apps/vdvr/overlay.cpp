@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "host/picture/decorate.hpp"
-#include "host/picture/error_slice.hpp"
+#include "vdvr/decorate.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "apps/vdvr/paper.hpp"
-#include "apps/vdvr/plan_pictures.hpp"
+#include "vdvr/plan_pictures.hpp"
 #include "host/bounds/spectral_error.hpp"
 #include "host/fbp/cosine_spectrum.hpp"
 #include "host/line_plot.hpp"
@@ -186,7 +186,7 @@ void add_spectra(PaperRun& run, const ProjectionSet& scan, const Grid& grid, con
       "The paper finds that the filtered projection's sum is smaller still. As a part of its own maximum it "
       "is "
       "larger: the ramp raises the high frequencies, whose waves err most."};
-  run.json["figure_5"] = {{"object", name}, {"row_sums", sums}, {"spectra", made.json}};
+  run.json["figure_5"] = {{"object", name}, {"row_sums", sums}, {"spectra", Json::parse(made.json)}};
   run.page.sections.push_back(std::move(section));
 }
 

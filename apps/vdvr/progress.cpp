@@ -14,7 +14,7 @@
 #include <thread>
 #include <utility>
 
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "apps/vdvr/inputs.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

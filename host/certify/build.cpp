@@ -20,7 +20,7 @@
 #include "host/gold/worst_node.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

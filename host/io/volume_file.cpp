@@ -13,7 +13,7 @@
 
 #include "host/io/raster_file.hpp"
 #include "host/io/volume_stack.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 

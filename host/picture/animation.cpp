@@ -11,7 +11,7 @@
 
 #include "host/picture/palette.hpp"
 #include "host/picture/png.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -1,4 +1,4 @@
-#include "host/picture/decorate.hpp"
+#include "vdvr/decorate.hpp"
 
 #include <fmt/format.h>
 

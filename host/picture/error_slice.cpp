@@ -1,4 +1,4 @@
-#include "host/picture/error_slice.hpp"
+#include "vdvr/error_slice.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "host/picture/bitmap_font.hpp"
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "host/picture/png.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -20,7 +20,7 @@
 #include "host/scan/preprocess.hpp"
 #include "host/scan/raster_scan.hpp"
 #include "host/scan/scan_folder.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "vdvr/error.hpp"

@@ -18,7 +18,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -17,7 +17,7 @@
 #include "host/verify/verify_scope.hpp"
 #include "host/verify/verify_seams.hpp"
 #include "host/verify/verify_terms.hpp"
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/bounds/covered_range.hpp"
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 
 #include <algorithm>
 

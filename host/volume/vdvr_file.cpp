@@ -16,7 +16,7 @@
 #include <span>
 
 #include "host/io/hdf5_file.hpp"
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "host/volume/seal.hpp"

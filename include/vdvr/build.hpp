@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "vdvr/export.hpp"
 #include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/plan.hpp"
@@ -42,7 +43,7 @@ struct BuildResult {
 /// Throws ToleranceError when the tolerance is out of reach at the plan's rates, InputError when a journal to
 /// resume is of another scan, plan, device or other options. A resumed build gives the volume and the
 /// certificate of one that was never interrupted, to the bit.
-BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
-                  const Progress& progress = {});
+VDVR_API BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan,
+                           const BuildOptions& options, const Progress& progress = {});
 
 }  // namespace vdvr

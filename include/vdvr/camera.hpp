@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -16,11 +17,11 @@ struct Camera {
 /// Azimuth 0 looks along -y with +x to the right, view-up -z (docs/geometry.md); the azimuth turns about z.
 /// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits
 /// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError.
-Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
+VDVR_API Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
 /// Without `view_up` it is -z, and where that is (within 1e-6) the direction of view, the y direction that
 /// leaves +x to the right. Throws InputError: not finite, position and focal point the same, a view_up
 /// parallel to the view, an angle outside (0, 180).
-Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optional<Vec3>& view_up,
-               double view_angle_deg);
+VDVR_API Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optional<Vec3>& view_up,
+                        double view_angle_deg);
 
 }  // namespace vdvr

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/rates.hpp"
@@ -81,14 +82,14 @@ struct Certificate {
 /// What |V - F| can be at covered points of each brick, sampled by `buffer` or image3d: its total, rounding
 /// and the sampler; infinite where nothing was tested. Throws InputError where the certificate has no totals
 /// by brick, or says nothing of image3d.
-std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
+VDVR_API std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
 
 /// One line where the certificate's own numbers do not follow from each other; empty where they do.
-std::string contradiction(const Certificate& certificate);
+VDVR_API std::string contradiction(const Certificate& certificate);
 
 /// The JSON of docs/file-format.md; finite numbers only.
-std::string to_json(const Certificate& certificate);
+VDVR_API std::string to_json(const Certificate& certificate);
 /// Throws FileError naming the missing or ill-typed member.
-Certificate certificate_from_json(const std::string& text);
+VDVR_API Certificate certificate_from_json(const std::string& text);
 
 }  // namespace vdvr

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
@@ -26,7 +27,7 @@ struct D2vrOptions {
 /// F_D2VR(x) = sum over views of weight * bilinear(q_k; t_k(x), z), in fp32, and 0 where a column of
 /// the detector is missed in any view; above and below its outermost rows those count. q_k are the filtered
 /// projections, at the detector's samples or upsampled.
-class D2vrField {
+class VDVR_API D2vrField {
  public:
   /// Cost: the ramp filter, once; upsampled by N views * (N rows * columns * (rows + N columns)) more.
   /// Memory: bytes() on the device. Throws InputError (options, a detector of less than 2 columns, sizes
@@ -58,7 +59,7 @@ class D2vrField {
 /// Empty space: bricks of 4 cells whose values can be seen nowhere are leapt over. The range of a brick is
 /// that of its samples and of those one cell around, widened at both ends by half its extent. That is no
 /// bound: between samples the field may leave it (docs/rendering.md); `skip_empty` off is certain.
-class D2vrScene {
+class VDVR_API D2vrScene {
  public:
   /// Cost: one evaluation of the field per sample of the grid. Throws as ResidentVolume. The field must
   /// outlive it.
@@ -82,6 +83,6 @@ class D2vrScene {
 /// bilinear sum instead of central differences. Throws InputError for another mode, pre-integration, steps by
 /// level and the image3d sampler, which need a stored volume. RenderResult::sampler is
 /// `buffer`.
-RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options);
+VDVR_API RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options);
 
 }  // namespace vdvr

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/export.hpp"
+
 namespace vdvr {
 
 namespace opencl {
@@ -27,7 +29,7 @@ struct DeviceInfo {
 };
 
 /// One device, its context, its in-order queue and its program cache. Move-only; create one per run.
-class Device {
+class VDVR_API Device {
  public:
   /// All devices of all platforms, in a stable order. Empty where no OpenCL platform is installed.
   static std::vector<DeviceInfo> list();

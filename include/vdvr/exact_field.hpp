@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
@@ -12,7 +13,7 @@
 
 namespace vdvr {
 
-class ExactField {
+class VDVR_API ExactField {
  public:
   /// Cost: views * rows * columns^2 (ramp filter and cosine coefficients as direct sums), once.
   ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress = {});

@@ -6,9 +6,11 @@
 #include <memory>
 #include <string>
 
+#include "vdvr/export.hpp"
+
 namespace vdvr {
 
-class Sha256 {
+class VDVR_API Sha256 {
  public:
   Sha256();
   ~Sha256();
@@ -24,7 +26,7 @@ class Sha256 {
 };
 
 /// Throws FileError when the file cannot be read.
-std::string sha256_of_file(const std::filesystem::path& path);
-std::string sha256_of_text(const std::string& text);
+VDVR_API std::string sha256_of_file(const std::filesystem::path& path);
+VDVR_API std::string sha256_of_text(const std::string& text);
 
 }  // namespace vdvr

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "vdvr/export.hpp"
+
 namespace vdvr {
 
 /// std::uint8_t rgb[y][x][3], row 0 on top.
@@ -22,14 +24,14 @@ struct FloatImage {
 
 /// Each is written whole or not at all. Throws InputError (size), ResourceError (disk) or FileError (folder
 /// missing, not writable).
-void write_png(const std::filesystem::path& path, const Image& image);
+VDVR_API void write_png(const std::filesystem::path& path, const Image& image);
 /// NumPy's format 1.0: float32, little-endian, shape (height, width) or, of several channels,
 /// (height, width, channels), C order.
-void write_npy(const std::filesystem::path& path, const FloatImage& image);
+VDVR_API void write_npy(const std::filesystem::path& path, const FloatImage& image);
 /// Frames of one size, shown `frame_ms` each, for ever. APNG is lossless; a viewer without it shows frame 0.
-void write_apng(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
+VDVR_API void write_apng(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
 /// One palette of 255 colours for all frames, median cut over their pixels, ordered dither (which stands
 /// still from frame to frame). Sides up to 65535. GIF counts time in hundredths of a second.
-void write_gif(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
+VDVR_API void write_gif(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
 
 }  // namespace vdvr

@@ -11,12 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/export.hpp"
+
 namespace vdvr {
 
 /// What the work depends on: name and value. A journal is resumed only by work with an equal head.
 using JournalHead = std::map<std::string, std::string>;
 
-class Journal {
+class VDVR_API Journal {
  public:
   /// Opens and locks the file, or makes an empty one. Nothing in it is changed before begin().
   /// `resume`: its records are to be used; else they are replaced. Throws InputError when another process

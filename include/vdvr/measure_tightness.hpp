@@ -5,6 +5,7 @@
 #include <string>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -23,7 +24,8 @@ struct Tightness {
 /// The truth is gold at 4 times the rate from
 /// cubic u at 16x, whose own error is below 1 % of what is measured. Cost: two passes over the grid, then
 /// bricks at the finer rate.
-Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
-                            const FieldOptions& field, const Rates& rates, const Progress& progress = {});
+VDVR_API Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
+                                     const FieldOptions& field, const Rates& rates,
+                                     const Progress& progress = {});
 
 }  // namespace vdvr

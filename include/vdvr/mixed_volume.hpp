@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -23,7 +24,7 @@ using LevelTriple = std::array<std::uint8_t, 3>;
 
 enum class SampleType : std::uint8_t { f32, u16, u8 };  // the order of kernels/shared/mixed_sampler.h
 /// "f32", "u16", "u8".
-const char* text_of(SampleType type);
+VDVR_API const char* text_of(SampleType type);
 /// Which of them base and tiles take.
 enum class StorageChoice { automatic, f32, u16, u8 };
 
@@ -54,7 +55,7 @@ struct SampleBlock {
   }
 };
 /// All samples of a block as floats, exactly. `step` as in MixedVolume.
-std::vector<float> decoded(const SampleBlock& block, double step);
+VDVR_API std::vector<float> decoded(const SampleBlock& block, double step);
 
 /// Tiles of one level triple and one sample type. A triple whose tiles have several types has a part for
 /// each, numbered from 0; tile numbers run on from part to part.
@@ -138,20 +139,20 @@ struct MixedVolume {
 };
 
 /// A volume with every brick at level 0: the uniform grid as a mixed one, so that one sampler serves both.
-MixedVolume as_mixed(const Volume& volume, int granularity = 4);
+VDVR_API MixedVolume as_mixed(const Volume& volume, int granularity = 4);
 
 /// A uniform volume on the grid: the base, decoded; where that is coarser than the grid, the field at the
 /// grid's samples.
-Volume on_grid(const MixedVolume& volume);
+VDVR_API Volume on_grid(const MixedVolume& volume);
 
 /// The brick (x, y, z) a world point belongs to, by the same header; the point is clamped to the grid's box.
-Index3 brick_at(const MixedVolume& volume, const Vec3& point);
+VDVR_API Index3 brick_at(const MixedVolume& volume, const Vec3& point);
 
 /// The value of the certified field at a world point, by the sampler of kernels/shared/mixed_sampler.h on the
 /// host
 /// (`buffer` arithmetic, the same bits as the device). The point must lie in the grid's box; it is clamped to
 /// it.
-float sample_at(const MixedVolume& volume, const Vec3& point);
+VDVR_API float sample_at(const MixedVolume& volume, const Vec3& point);
 
 /// Storage, as defined in docs/file-format.md.
 struct Storage {
@@ -161,6 +162,6 @@ struct Storage {
   std::uint64_t file_bytes = 0;
 };
 /// `interior`: only bricks wholly within 7/8 of the box in x and y, all z.
-Storage storage_of(const MixedVolume& volume, bool interior);
+VDVR_API Storage storage_of(const MixedVolume& volume, bool interior);
 
 }  // namespace vdvr

@@ -7,6 +7,7 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/reconstruct.hpp"
 
@@ -60,8 +61,8 @@ struct Plan {
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.
-Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
-               const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings = {},
-               const Progress& progress = {});
+VDVR_API Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid,
+                        const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
+                        const PlanSettings& settings = {}, const Progress& progress = {});
 
 }  // namespace vdvr

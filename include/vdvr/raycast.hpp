@@ -8,6 +8,7 @@
 
 #include "vdvr/camera.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/resident_volume.hpp"
 #include "vdvr/sampler.hpp"
@@ -85,6 +86,6 @@ struct RenderResult {
 /// on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws
 /// InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had. Mode
 /// `error` throws InputError: error slices are not ray-cast (`run`, `render --mode error`).
-RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
+VDVR_API RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
 
 }  // namespace vdvr

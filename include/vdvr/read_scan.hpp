@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "vdvr/export.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 
@@ -20,11 +21,11 @@ struct ScanOptions {
 /// median and counted, optional air background taken off. Centre: option, else file, else found from opposite
 /// views, else (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated
 /// files, ...).
-ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
-                        const Progress& progress = {});
+VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
+                                 const Progress& progress = {});
 
 /// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
 /// theta in degrees. Written whole or not at all.
-void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
+VDVR_API void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
 
 }  // namespace vdvr

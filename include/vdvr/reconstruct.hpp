@@ -6,6 +6,7 @@
 #include <string>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
@@ -23,11 +24,11 @@ struct GridOptions {
 };
 
 /// Throws InputError for an empty, non-finite or overflowing grid, or a scan with no covered region.
-Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options);
+VDVR_API Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options);
 
 /// How far inside (positive) or outside (negative) the covered region a point lies, in world units; a lower
 /// bound of the distance to the region's boundary outside it. Covered: margin >= 0.
-double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point);
+VDVR_API double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point);
 inline bool is_covered(const ParallelGeometry& geometry, double center, const Vec3& point) {
   return coverage_margin(geometry, center, point) >= 0;
 }
@@ -44,12 +45,12 @@ struct ReconstructOptions {
 /// covered region are 0. Cost: views * samples updates. Memory: views * (columns * upsampling) * rows of one
 /// slab, sized by --max-memory. With `seconds` the stages (filter, upsample, back-project, read back) wait
 /// for each other and are timed.
-Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
-                   const ReconstructOptions& options, const Progress& progress = {},
-                   StageSeconds* seconds = nullptr);
+VDVR_API Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
+                            const ReconstructOptions& options, const Progress& progress = {},
+                            StageSeconds* seconds = nullptr);
 
 /// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
 /// Returns notes for the user: limited angle, grouped views.
-std::vector<std::string> check_scan(const ParallelGeometry& geometry);
+VDVR_API std::vector<std::string> check_scan(const ParallelGeometry& geometry);
 
 }  // namespace vdvr

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr {
@@ -17,7 +18,7 @@ struct ImageLimits;  // host/sampler/resident_volume.hpp
 /// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max, and the
 /// image3d atlas where the device has one that fits (built when a frame first needs it). Must not outlive the
 /// device. Throws ResourceError (memory) and InputError (sizes that do not match, an axis beyond 8192 cells).
-class ResidentVolume {
+class VDVR_API ResidentVolume {
  public:
   ResidentVolume(Device& device, const MixedVolume& volume);
   /// With other limits of the atlas than the device's own.

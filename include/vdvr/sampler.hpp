@@ -6,6 +6,7 @@
 #include <string>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr {
@@ -38,6 +39,6 @@ struct SamplerProbe : FilterProbe {
   std::string note;  ///< the class that delta was charged for, or why there is no image3d sampler
 };
 /// Measured once per device and process (about a second), then remembered.
-SamplerProbe probe_sampler(Device& device);
+VDVR_API SamplerProbe probe_sampler(Device& device);
 
 }  // namespace vdvr

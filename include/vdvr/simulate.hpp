@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -44,22 +45,22 @@ struct Phantom {
 /// Marschner-Lobb's function on |x|, |y| <= half_side (world units), zero outside in x and y, continued in z
 /// over all rows. The paper's set-up: half_side 32/sqrt(2) at pitch 1. Gauss-Legendre quadrature to rounding.
 /// Throws InputError.
-Phantom marschner_lobb(double half_side);
+VDVR_API Phantom marschner_lobb(double half_side);
 /// Modified 3D Shepp-Logan with thin tumours (docs/phantoms.md); `unit`: world units per phantom unit, 64 at
 /// pitch 1. Throws InputError.
-Phantom shepp_logan(double unit);
+VDVR_API Phantom shepp_logan(double unit);
 /// A ball on the axis. Throws InputError unless radius > 0.
-Phantom sphere(double radius, double density = 1);
+VDVR_API Phantom sphere(double radius, double density = 1);
 /// Throws InputError for an empty list, a semi-axis that is not positive, or a value that is not finite.
-Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std::string name);
+VDVR_API Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std::string name);
 /// {"ellipsoids": [{"density", "center", "semi_axes", "phi_deg"}], "background"}; phi_deg and background
 /// default to 0. Throws FileError (path, member, value).
-Phantom read_phantom(const std::filesystem::path& path);
+VDVR_API Phantom read_phantom(const std::filesystem::path& path);
 /// The trilinear interpolation of a volume, zero outside its closed box; line integrals exact to rounding,
 /// cell by cell. The rotation axis is x = y = 0 of the volume's world coordinates. Cost per view: columns *
 /// (nx + ny) * nz. Memory: one reordered copy of the samples. Throws InputError (fewer than 2 samples on an
 /// axis, sizes that do not match).
-Phantom volume_phantom(Volume volume);
+VDVR_API Phantom volume_phantom(Volume volume);
 
 struct SimulateOptions {
   int angles = 180;
@@ -87,6 +88,7 @@ struct SimulateOptions {
 /// columns^2 for the low-pass. Memory: the result, and per core about one fine view in double. The same
 /// options give the same noise on any number of cores. Progress is called from the calling thread only and
 /// may throw. Throws InputError, ResourceError.
-ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, const Progress& progress = {});
+VDVR_API ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options,
+                                const Progress& progress = {});
 
 }  // namespace vdvr

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -27,20 +28,20 @@ struct TransferFunction {
 struct TransferPreset {
   std::string name, purpose;
 };
-const std::vector<TransferPreset>& transfer_presets();
+VDVR_API const std::vector<TransferPreset>& transfer_presets();
 /// A preset by name, stretched over [lo, hi]. Throws InputError. For CT take lo = max(0, minimum): air is 0,
 /// and what lies below is undershoot of the filter. The presets "iso" and "marschner-lobb" have their surface
 /// in the middle.
-TransferFunction transfer_preset(const std::string& name, double lo, double hi);
+VDVR_API TransferFunction transfer_preset(const std::string& name, double lo, double hi);
 /// Told apart by content: our {"points": [{"value", "rgb", "opacity"}]}, a 3D Slicer volume property
 /// (.vp.json) or a ParaView preset (docs/rendering.md). Values as in the file. Throws FileError.
-TransferFunction read_transfer_function(const std::filesystem::path& path);
+VDVR_API TransferFunction read_transfer_function(const std::filesystem::path& path);
 /// Colour and opacity at a value: linear between points, the nearest point's beyond them; the last of several
 /// points at one value.
-TransferPoint transfer_at(const std::vector<TransferPoint>& points, double value);
+VDVR_API TransferPoint transfer_at(const std::vector<TransferPoint>& points, double value);
 /// The same with values mapped linearly so that the first lies at lo and the last at hi. Throws InputError.
-TransferFunction stretched(TransferFunction transfer, double lo, double hi);
+VDVR_API TransferFunction stretched(TransferFunction transfer, double lo, double hi);
 /// The same with opacities of one base cell, the smallest spacing of the grid.
-TransferFunction per_base_cell(TransferFunction transfer, const Grid& grid);
+VDVR_API TransferFunction per_base_cell(TransferFunction transfer, const Grid& grid);
 
 }  // namespace vdvr

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/progress.hpp"
 
 namespace vdvr {
@@ -32,7 +33,7 @@ struct TuneResult {
 /// both ways. Every candidate's samples are compared with the recorded one's before it is timed. Cost: some
 /// twenty such reconstructions per repetition. Throws MismatchError where a candidate's samples differ beyond
 /// rounding.
-TuneResult tune(Device& device, std::int64_t size, std::int64_t views, int repetitions,
-                const Progress& progress = {});
+VDVR_API TuneResult tune(Device& device, std::int64_t size, std::int64_t views, int repetitions,
+                         const Progress& progress = {});
 
 }  // namespace vdvr

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "vdvr/certificate.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr {
@@ -18,7 +19,7 @@ enum class Seal {
   broken,
 };
 /// "unsealed", "sealed", "BROKEN SEAL".
-const char* text_of(Seal seal);
+VDVR_API const char* text_of(Seal seal);
 
 struct VdvrFile {
   MixedVolume volume;
@@ -44,20 +45,20 @@ enum class Compression { none, deflate };
 /// content_sha256 in the certificate is filled in; any other is stored as given. Throws InputError for a
 /// volume that read_vdvr would refuse or a certificate that is not finite, FileError (folder), ResourceError
 /// (disk). Not thread-safe with other users of HDF5.
-void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume, const Certificate& certificate,
-                Compression compression = Compression::deflate);
+VDVR_API void write_vdvr(const std::filesystem::path& path, const MixedVolume& volume,
+                         const Certificate& certificate, Compression compression = Compression::deflate);
 
 /// Reads and checks everything: types, shapes in 64 bits before allocating, tile indices, finite geometry,
 /// checksums; then compares the seal and the content's hash. Throws FileError (path, dataset, value), and
 /// MismatchError for a file that was altered, unless it is to be reported. `max_memory_bytes` 0: no limit.
-VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
-                   Altered altered = Altered::refuse);
+VDVR_API VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
+                            Altered altered = Altered::refuse);
 
 /// True when the file begins like HDF5 and says format = "vdvr".
-bool is_vdvr(const std::filesystem::path& path);
+VDVR_API bool is_vdvr(const std::filesystem::path& path);
 
 /// SHA-256 over grid attributes, step, base, level, tile, tiles, offsets, shifts in that order
 /// (docs/file-format.md).
-std::string content_sha256(const MixedVolume& volume);
+VDVR_API std::string content_sha256(const MixedVolume& volume);
 
 }  // namespace vdvr

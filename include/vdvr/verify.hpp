@@ -9,6 +9,7 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -69,8 +70,8 @@ struct VerifyResult {
 /// the host, then 7 * views multiply-adds per gold node on the device, and what `build` takes to filter, to
 /// reconstruct the base and to measure the tested bricks. Throws ResourceError when --max-memory is too small
 /// for one brick and one view.
-VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
-                    const Certificate& stored, const VerifyOptions& options = {},
-                    const Progress& progress = {});
+VDVR_API VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                             const Certificate& stored, const VerifyOptions& options = {},
+                             const Progress& progress = {});
 
 }  // namespace vdvr

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -11,14 +12,14 @@ namespace vdvr {
 /// .mha/.mhd/.nrrd/.nhdr; FILE.h5:/dataset (three axes z, y, x; attributes `spacing` and `origin` in that
 /// order, `unit`); FILE.tif of several images; a folder of TIFF images, one a slice, in natural order of
 /// their names. Any integer or floating type becomes float. Throws FileError. 0: no memory limit.
-Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
+VDVR_API Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 /// True when read_volume takes it by its name, or as a folder without scan.json that holds TIFF files.
-bool is_volume_input(const std::filesystem::path& path);
+VDVR_API bool is_volume_input(const std::filesystem::path& path);
 /// The file of "FILE.h5:/dataset"; the path itself of any other input.
-std::filesystem::path file_of_volume(const std::filesystem::path& path);
+VDVR_API std::filesystem::path file_of_volume(const std::filesystem::path& path);
 /// float32, by extension .mha or .nrrd; whole or not at all.
-void write_volume(const std::filesystem::path& path, const Volume& volume);
+VDVR_API void write_volume(const std::filesystem::path& path, const Volume& volume);
 /// True when the extension is one of MHA or NRRD.
-bool is_volume_path(const std::filesystem::path& path);
+VDVR_API bool is_volume_path(const std::filesystem::path& path);
 
 }  // namespace vdvr

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "host/picture/error_slice.hpp"
+#include "vdvr/error_slice.hpp"
 #include "host/render/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"

@@ -11,7 +11,7 @@
 #include <numeric>
 #include <set>
 
-#include "host/picture/decorate.hpp"
+#include "vdvr/decorate.hpp"
 #include "host/picture/palette.hpp"
 #include "host/picture/png.hpp"
 #include "tests/support/fields.hpp"

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <set>
 
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "tests/support/hostile_case.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"

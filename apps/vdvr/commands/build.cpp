@@ -11,15 +11,15 @@ namespace vdvr::cli {
 
 namespace {
 
-int build_file(const Arguments& args, const CommonOptions& common, const CertifyOptions& options,
+int build_file(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
                const std::filesystem::path& output) {
   Device device = open_device(common);
   ProgressLine progress(args.command(), common.quiet);
-  const Planned planned = read_and_plan(device, args, options, progress.callback());
-  const BuildResult result = build_certified(device, planned, options, progress.callback());
+  const Planned planned = read_and_plan(device, args, wanted, progress.callback());
+  const BuildResult result = build_planned(device, planned, wanted, progress.callback());
   throw_if_stopped();
-  write_vdvr(output, result.volume, result.certificate, options.compression);
-  options.build.journal->remove();
+  write_vdvr(output, result.volume, result.certificate, wanted.compression);
+  wanted.options.build.journal->remove();
   progress.clear();
 
   const std::uint64_t bytes = std::filesystem::file_size(output);
@@ -27,7 +27,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Certify
                      {"grid", grid_json(result.volume.grid)},
                      {"bricks", levels_json(result.volume)},
                      {"storage", storage_json(result.volume, bytes)},
-                     {"resumed", {{"records", options.build.journal->replayed()}}},
+                     {"resumed", {{"records", wanted.options.build.journal->replayed()}}},
                      {"peak_bytes", device.peak_memory()},
                      {"certificate", certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
@@ -52,14 +52,14 @@ int build_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  CertifyOptions options = certify_options(args);
-  options.plan.foresee = false;
-  options.compression = compression(args);
+  Wanted wanted = wanted_of(args);
+  wanted.options.plan.foresee = false;
+  wanted.compression = compression(args);
   const auto output = args.path("output");
   check_output(output, common.force || continues(args, output), {args.path("IN")});
   const auto journal = open_journal(args, common, output, {output});
-  options.build.journal = journal.get();
-  return resumable(*journal, [&] { return build_file(args, common, options, output); });
+  wanted.options.build.journal = journal.get();
+  return resumable(*journal, [&] { return build_file(args, common, wanted, output); });
 }
 
 }  // namespace vdvr::cli

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
@@ -15,10 +16,11 @@ namespace vdvr {
 using RegionOfInterest = std::optional<std::array<double, 6>>;
 
 /// Whether a certificate with this region speaks of the point.
-bool is_inside(const RegionOfInterest& region, const Vec3& point);
+VDVR_API bool is_inside(const RegionOfInterest& region, const Vec3& point);
 
 /// [bz][by][bx]: bricks that hold a point of the region, or that a sampler may read for one: its coordinate
 /// in fp32 can end in the next brick.
-std::vector<std::uint8_t> bricks_of(const RegionOfInterest& region, const Grid& grid, int granularity);
+VDVR_API std::vector<std::uint8_t> bricks_of(const RegionOfInterest& region, const Grid& grid,
+                                             int granularity);
 
 }  // namespace vdvr

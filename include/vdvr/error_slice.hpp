@@ -7,6 +7,7 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -35,20 +36,20 @@ struct ErrorSlice {
 /// `reconstruct` with cubic 16x upsampling, whose own error is far below any tolerance that a volume can be
 /// certified to. Throws InputError when the slice misses the volume or the picture is too small for its
 /// caption.
-ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
-                       const Certificate& certificate, const ErrorSliceOptions& options,
-                       const Progress& progress = {});
+VDVR_API ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                                const Certificate& certificate, const ErrorSliceOptions& options,
+                                const Progress& progress = {});
 
 /// The same picture from the certificate alone: every pixel shows the bound of |V - F| at the covered points
 /// of its brick (`max_error`, `errors`), or where the file has none by brick the certificate's total; grey
 /// and NaN in bricks that were not tested or lie outside the region of interest. Points that are not covered
 /// cannot be told apart without the projections: the caption says where it holds. Host only. Throws
 /// InputError when the certificate has no total for the sampler, and as above.
-ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& certificate, bool image3d,
-                       const ErrorSliceOptions& options);
+VDVR_API ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& certificate, bool image3d,
+                                const ErrorSliceOptions& options);
 
 /// RenderOutput::error as a picture: bounds in the colours of error slices, nothing black, bricks that were
 /// not tested grey; below it the colours, as in an error slice. `bounds` is kErrorCaption pixels less high.
-Image bound_picture(const FloatImage& bounds, double epsilon_abs);
+VDVR_API Image bound_picture(const FloatImage& bounds, double epsilon_abs);
 
 }  // namespace vdvr

@@ -9,7 +9,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "apps/vdvr/verification.hpp"
-#include "host/picture/error_slice.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -141,15 +141,15 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
   fmt::print("{}\n", dvr == out.outside.end() ? "" : dvr->second);
 }
 
-int run_steps(const Arguments& args, const CommonOptions& common, const CertifyOptions& options,
+int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
               const std::filesystem::path& output, OutputFolder& folder) {
   Device device = open_device(common);
   ProgressLine line(args.command(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
-  out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, options, progress); });
+  out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress); });
   out.built =
-      timed(out.seconds, "build", [&] { return build_certified(device, out.planned, options, progress); });
+      timed(out.seconds, "build", [&] { return build_planned(device, out.planned, wanted, progress); });
   const Certificate& certificate = out.built.certificate;
   out.verified = timed(out.seconds, "verify", [&] {
     return verify(device, out.planned.scan, out.built.volume, certificate, {}, progress);
@@ -159,7 +159,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
   throw_if_stopped();
 
   folder.begin();
-  write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate, options.compression);
+  write_vdvr(folder.file("volume.vdvr"), out.built.volume, certificate, wanted.compression);
   out.files.emplace_back("volume.vdvr", "the certified volume");
   timed(out.seconds, "pictures", [&] {
     draw_pictures(device, folder, out, progress);
@@ -170,7 +170,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
                                     certificate.epsilon_abs));
   throw_if_stopped();
   folder.finish(to_json(certificate));
-  options.build.journal->remove();
+  wanted.options.build.journal->remove();
   out.files.emplace_back("certificate.json", "what is promised, and by which argument");
   line.clear();
 
@@ -190,10 +190,10 @@ int run_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  CertifyOptions options = certify_options(args);
-  options.plan.foresee = false;
-  options.compression = compression(args);
-  if (is_comparison(options.plan, options.build))
+  Wanted wanted = wanted_of(args);
+  wanted.options.plan.foresee = false;
+  wanted.compression = compression(args);
+  if (is_comparison(wanted.options.plan, wanted.options.build))
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);
@@ -201,8 +201,8 @@ int run_command(Arguments& args) {
   std::vector<std::filesystem::path> outputs;
   for (const auto& name : file_names()) outputs.push_back(folder.file(name));
   const auto journal = open_journal(args, common, volume, outputs);
-  options.build.journal = journal.get();
-  return resumable(*journal, [&] { return run_steps(args, common, options, output, folder); });
+  wanted.options.build.journal = journal.get();
+  return resumable(*journal, [&] { return run_steps(args, common, wanted, output, folder); });
 }
 
 }  // namespace vdvr::cli

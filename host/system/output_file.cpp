@@ -1,5 +1,5 @@
 // Whole-or-nothing output files. Called by every writer.
-#include "host/system/atomic_file.hpp"
+#include "vdvr/output_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

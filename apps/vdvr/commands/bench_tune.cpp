@@ -1,6 +1,6 @@
 // vdvr bench tune: launch parameters measured on this device, as a row for the table of
 // host/opencl/column_tuning.cpp.
-#include "apps/vdvr/bench_tune.hpp"
+#include "apps/vdvr/commands/bench_tune.hpp"
 
 #include <fmt/format.h>
 

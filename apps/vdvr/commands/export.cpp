@@ -61,7 +61,7 @@ int export_command(Arguments& args) {
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
   ProgressLine progress(args.command(), common.quiet);
-  const VdvrFile file = read_certified(path, args, args.has("unverified"));
+  const VdvrFile file = open_certified(path, args, args.has("unverified"));
   const Grid grid = finer(file.volume.grid, oversampling);
   const Volume volume = sample_all(file.volume, grid, common.max_memory, progress.callback());
   throw_if_stopped();

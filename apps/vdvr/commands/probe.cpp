@@ -10,9 +10,10 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/progress.hpp"
-#include "host/picture/error_slice.hpp"
-#include "host/system/atomic_file.hpp"
-#include "host/volume/region_of_interest.hpp"
+#include "vdvr/error_slice.hpp"
+#include "vdvr/output_file.hpp"
+#include "vdvr/region_of_interest.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
@@ -99,7 +100,7 @@ std::string level_text(const LevelTriple& l) {
 
 std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
                                    const std::vector<Vec3>& points, const Progress& progress) {
-  const VdvrFile file = read_certified(path, args);
+  const VdvrFile file = open_certified(path, args);
   const MixedVolume& volume = file.volume;
   const Certificate& c = file.certificate;
   std::optional<ParallelGeometry> geometry = noted_geometry(c);
@@ -151,7 +152,7 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
   if (args.has("like")) {
     if (has_field_options(args))
       throw InputError("--like takes the field options from its file; do not give them again");
-    field = read_certified(args.path("like"), args).certificate.field;
+    field = open_certified(args.path("like"), args).certificate.field;
   }
   const ExactField exact(load_scan(path, args, field, progress), field, progress);
   std::vector<Probe> probes(points.size());

@@ -10,7 +10,7 @@
 #include "apps/vdvr/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "host/picture/error_slice.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 
@@ -275,7 +275,7 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   if (!args.has("projections")) return render_bound(common, o, output, kind, scene, options);
   const auto projections = args.path("projections");
   const ProjectionSet scan = load_scan(projections, args, scene.certificate->field, progress.callback());
-  check_input(projections, scan, *scene.certificate);
+  check_projections(projections, scan, *scene.certificate);
   Device device = open_device(common);
   const ErrorSlice slice =
       error_slice(device, scan, scene.volume, *scene.certificate, options, progress.callback());

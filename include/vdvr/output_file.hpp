@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <string>
 
+#include "vdvr/export.hpp"
+
 namespace vdvr::io {
 
-class AtomicFile {
+class VDVR_API AtomicFile {
  public:
   /// Throws FileError when the folder does not exist or cannot be written.
   explicit AtomicFile(std::filesystem::path target);
@@ -28,15 +30,15 @@ class AtomicFile {
 
 /// Removes temporary files that killed writers of `target` left in its folder. Only for whoever knows that no
 /// other process writes it now.
-void remove_leftovers(const std::filesystem::path& target);
+VDVR_API void remove_leftovers(const std::filesystem::path& target);
 
 /// For a program that ends without unwinding: what remove_temporaries removes, files, and folders if they are
 /// empty. Every AtomicFile notes its temporary file.
-void note_temporary(const std::filesystem::path& path);
-void forget_temporary(const std::filesystem::path& path);
-void remove_temporaries();
+VDVR_API void note_temporary(const std::filesystem::path& path);
+VDVR_API void forget_temporary(const std::filesystem::path& path);
+VDVR_API void remove_temporaries();
 
 /// Writes bytes atomically.
-void write_file(const std::filesystem::path& path, const std::string& bytes);
+VDVR_API void write_file(const std::filesystem::path& path, const std::string& bytes);
 
 }  // namespace vdvr::io

@@ -1,19 +1,23 @@
-#include "apps/vdvr/plan_pictures.hpp"
+// The pictures of `vdvr plan --pictures`. Called by programs; calls spectral_error.cpp, cosine_spectrum.cpp
+// and figure.cpp.
+#include "vdvr/plan_pictures.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "host/bounds/spectral_error.hpp"
 #include "host/fbp/cosine_spectrum.hpp"
 #include "host/picture/figure.hpp"
-#include "host/system/atomic_file.hpp"
 #include "vdvr/error_map.hpp"
 
-namespace vdvr::cli {
+namespace vdvr {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 using figure::Raster;
 using figure::Scale;
@@ -265,17 +269,6 @@ void draw_volume(Device& device, Album& album, const Spectrum& s) {
 
 }  // namespace
 
-std::vector<std::string> plan_picture_names() {
-  return {"row.png",
-          "projection-spectrum.png",
-          "projection-map.png",
-          "projection-product.png",
-          "volume-spectrum.png",
-          "volume-map.png",
-          "volume-product.png",
-          "pictures.json"};
-}
-
 PlanPictures plan_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
                            const Progress& progress) {
   const FilteredView view = strongest_view(device, scan, plan.field, progress);
@@ -312,16 +305,7 @@ PlanPictures plan_pictures(Device& device, const ProjectionSet& scan, const Plan
       {"volume", spectrum_json(volume)},
       {"volume_note",
        "the spectrum of the cut-out 1x volume under mirror extension, not of F: it decides nothing"}};
-  return {std::move(album.pictures), json};
+  return {std::move(album.pictures), json.dump()};
 }
 
-Json draw_plan_pictures(Device& device, OutputFolder& folder, const ProjectionSet& scan, const Plan& plan,
-                        const Progress& progress) {
-  const PlanPictures made = plan_pictures(device, scan, plan, progress);
-  folder.begin();
-  for (const auto& p : made.pictures) write_png(folder.file(p.file), p.image);
-  io::write_file(folder.file("pictures.json"), made.json.dump(2) + "\n");
-  return made.json;
-}
-
-}  // namespace vdvr::cli
+}  // namespace vdvr

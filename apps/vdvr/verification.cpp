@@ -1,14 +1,8 @@
-// vdvr verify: measures a certificate again from the projections and the packed volume alone.
-#include "vdvr/verify.hpp"
+#include "apps/vdvr/verification.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-
-#include "apps/vdvr/inputs.hpp"
-#include "apps/vdvr/progress.hpp"
-#include "apps/vdvr/verification.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr::cli {
 
@@ -96,76 +90,6 @@ void print_verification(const VerifyResult& m, const Certificate& c) {
     fmt::print("    {:<18} {} between nodes: at most {:.1f} % of what the certificate bounds there\n",
                "points", m.points_evaluated, 100 * m.worst_share);
   for (const std::string& what : m.differences) fmt::print("    DIFFERS            {}\n", what);
-}
-
-namespace {
-
-/// F is the file's; options given anyway must say the same.
-void check_field_options(const Arguments& args, const FieldOptions& stored) {
-  if (!has_field_options(args)) return;
-  const FieldOptions given = field_options(args);
-  const bool same = (!args.has("filter") || given.filter == stored.filter) &&
-                    (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
-                    (!args.has("center") || given.center == stored.center);
-  if (!same)
-    throw InputError(
-        fmt::format("the file was certified for filter {}, cutoff {}, centre {}; verify takes them from it",
-                    text_of(stored.filter), stored.cutoff, stored.center.value_or(0)));
-}
-
-}  // namespace
-
-int verify_command(Arguments& args) {
-  args.positional("FILE", "the certified volume")
-      .value("projections", "IN", "the projections it was built from")
-      .flag("exhaustive", "every gold node; otherwise a stratified sample of bricks and the worst ones");
-  add_scan(args);
-  add_field(args);
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  const auto path = args.path("FILE"), projections = args.path("projections");
-  if (kind_of(path, args) != InputKind::certified)
-    throw InputError(fmt::format("{}: is not a certified volume", path.string()));
-
-  ProgressLine progress(args.command(), common.quiet);
-  const VdvrFile file = read_vdvr(path, common.max_memory, Altered::report);
-  const Certificate& certificate = file.certificate;
-  const std::string& altered = file.altered;
-  // Damaged samples are named below; a certificate that is not the one written has nothing to compare with.
-  if (file.seal == Seal::broken && content_sha256(file.volume) == certificate.content_sha256)
-    throw MismatchError(fmt::format("{}: {}", path.string(), altered));
-  if (altered.empty()) check_consistency(path, certificate);
-  if (certificate.comparison)
-    throw MismatchError(
-        fmt::format("{}: was built for comparison: it carries no promise to verify", path.string()));
-  check_field_options(args, certificate.field);
-  const ProjectionSet scan = load_scan(projections, args, certificate.field, progress.callback());
-  check_input(projections, scan, certificate);
-  Device device = open_device(common);
-  VerifyOptions options;
-  // An altered content may err anywhere: say where it does.
-  options.exhaustive = args.has("exhaustive") || !altered.empty();
-  const VerifyResult result = verify(device, scan, file.volume, certificate, options, progress.callback());
-  progress.clear();
-
-  Json json = {{"file", path.string()},
-               {"projections", projections.string()},
-               {"exhaustive", options.exhaustive},
-               {"seal", text_of(file.seal)},
-               {"content_matches", altered.empty()}};
-  json.update(verification_json(result, certificate));
-  print_result(common, json, [&] {
-    fmt::print("{}: {}, {}input matches its hash\n", path.string(), text_of(file.seal),
-               altered.empty() ? "content matches its hash, " : "");
-    print_verification(result, certificate);
-  });
-  if (!altered.empty())
-    throw MismatchError(
-        fmt::format("{}: {}; {}", path.string(), altered,
-                    result.holds ? "it is still within epsilon everywhere tested" : result.failure));
-  if (!result.holds) throw MismatchError(fmt::format("{}: {}", path.string(), result.failure));
-  return 0;
 }
 
 }  // namespace vdvr::cli

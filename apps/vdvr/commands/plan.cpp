@@ -9,9 +9,10 @@
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/plan_pictures.hpp"
 #include "apps/vdvr/progress.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
+#include "vdvr/plan_pictures.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -61,6 +62,28 @@ void print_plan(const Planned& p) {
   print_notes(plan.notes);
 }
 
+/// Every file that will be written; pictures.json comes last and says that the folder is complete.
+std::vector<std::string> picture_names() {
+  return {"row.png",
+          "projection-spectrum.png",
+          "projection-map.png",
+          "projection-product.png",
+          "volume-spectrum.png",
+          "volume-map.png",
+          "volume-product.png",
+          "pictures.json"};
+}
+
+/// Draws and writes them; the content of pictures.json.
+Json write_pictures(Device& device, OutputFolder& folder, const Planned& p, const Progress& progress) {
+  const PlanPictures made = plan_pictures(device, p.scan, p.plan, progress);
+  folder.begin();
+  for (const auto& picture : made.pictures) write_png(folder.file(picture.file), picture.image);
+  Json json = Json::parse(made.json);
+  io::write_file(folder.file("pictures.json"), json.dump(2) + "\n");
+  return json;
+}
+
 void print_pictures(const Json& pictures) {
   fmt::print("pictures in    {}\n", pictures["folder"].get<std::string>());
   for (const auto& [name, shows] : pictures["files"].items())
@@ -80,19 +103,19 @@ int plan_command(Arguments& args) {
   refuse(args, {"roi", "window"},
          "a plan is for the whole grid; use --size and --origin, or give it to build");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
-  const CertifyOptions options = certify_options(args);
+  const Wanted wanted = wanted_of(args);
   std::optional<OutputFolder> folder;
   if (args.has("pictures")) {
     kind_of(args.path("IN"), args);
-    folder.emplace(args.path("pictures"), plan_picture_names(), common.force);
+    folder.emplace(args.path("pictures"), picture_names(), common.force);
   }
 
   Device device = open_device(common);
   ProgressLine progress(args.command(), common.quiet);
-  const Planned planned = read_and_plan(device, args, options, progress.callback());
+  const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   Json json = plan_json(planned), pictures;
   if (folder) {
-    pictures = draw_plan_pictures(device, *folder, planned.scan, planned.plan, progress.callback());
+    pictures = write_pictures(device, *folder, planned, progress.callback());
     pictures["folder"] = args.path("pictures").string();
     json["pictures"] = pictures;
   }

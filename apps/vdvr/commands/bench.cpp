@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "apps/vdvr/bench_paper.hpp"
-#include "apps/vdvr/bench_tune.hpp"
+#include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
@@ -136,8 +136,8 @@ int bench_build(Arguments& args) {
   if (!args.parse()) return 0;
   refuse(args, {"resume"}, "a timing has nothing to resume; give it to build");
   const CommonOptions common = common_options(args);
-  CertifyOptions options = certify_options(args);
-  options.plan.foresee = false;
+  Wanted wanted = wanted_of(args);
+  wanted.options.plan.foresee = false;
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
   ProgressLine progress("bench", common.quiet);
   Device device = open_device(common);
@@ -147,9 +147,9 @@ int bench_build(Arguments& args) {
   for (std::size_t i = 0; i < repetitions; ++i) {
     built.reset();
     const auto start = Clock::now();
-    const Planned planned = read_and_plan(device, args, options, progress.callback());
+    const Planned planned = read_and_plan(device, args, wanted, progress.callback());
     plan_seconds = since(start);
-    built = build_certified(device, planned, options, progress.callback());
+    built = build_planned(device, planned, wanted, progress.callback());
     seconds.push_back(since(start));
   }
   progress.clear();

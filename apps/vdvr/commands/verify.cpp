@@ -1,0 +1,72 @@
+// vdvr verify: measures a certificate again from the projections and the packed volume alone.
+#include "vdvr/verify_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/progress.hpp"
+#include "apps/vdvr/verification.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr::cli {
+
+namespace {
+
+/// F is the file's; options given anyway must say the same.
+void check_field_options(const Arguments& args, const FieldOptions& stored) {
+  if (!has_field_options(args)) return;
+  const FieldOptions given = field_options(args);
+  const bool same = (!args.has("filter") || given.filter == stored.filter) &&
+                    (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
+                    (!args.has("center") || given.center == stored.center);
+  if (!same)
+    throw InputError(
+        fmt::format("the file was certified for filter {}, cutoff {}, centre {}; verify takes them from it",
+                    text_of(stored.filter), stored.cutoff, stored.center.value_or(0)));
+}
+
+}  // namespace
+
+int verify_command(Arguments& args) {
+  args.positional("FILE", "the certified volume")
+      .value("projections", "IN", "the projections it was built from")
+      .flag("exhaustive", "every gold node; otherwise a stratified sample of bricks and the worst ones");
+  add_scan(args);
+  add_field(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const auto path = args.path("FILE"), projections = args.path("projections");
+  if (kind_of(path, args) != InputKind::certified)
+    throw InputError(fmt::format("{}: is not a certified volume", path.string()));
+
+  ProgressLine progress(args.command(), common.quiet);
+  const VdvrFile file = read_to_verify(path, common.max_memory);
+  const Certificate& certificate = file.certificate;
+  check_field_options(args, certificate.field);
+  const ProjectionSet scan = load_scan(projections, args, certificate.field, progress.callback());
+  check_projections(projections, scan, certificate);
+  Device device = open_device(common);
+  VerifyOptions options;
+  options.exhaustive = args.has("exhaustive");
+  const FileVerification result = verify_file(device, file, scan, options, progress.callback());
+  progress.clear();
+
+  Json json = {{"file", path.string()},
+               {"projections", projections.string()},
+               {"exhaustive", result.exhaustive},
+               {"seal", text_of(file.seal)},
+               {"content_matches", result.content_matches}};
+  json.update(verification_json(result.measured, certificate));
+  print_result(common, json, [&] {
+    fmt::print("{}: {}, {}input matches its hash\n", path.string(), text_of(file.seal),
+               result.content_matches ? "content matches its hash, " : "");
+    print_verification(result.measured, certificate);
+  });
+  if (!result.holds) throw MismatchError(fmt::format("{}: {}", path.string(), result.failure));
+  return 0;
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,150 @@
+// What a program over the library needs to certify: plan, build and the certificate completed. Called by
+// programs; calls plan.cpp and build.cpp.
+#include "vdvr/certify.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "vdvr/error.hpp"
+#include "vdvr/vdvr_file.hpp"
+
+namespace vdvr {
+namespace {
+
+const char* text_of(Closing closing) {
+  return closing == Closing::coarse ? "coarse" : closing == Closing::paper ? "paper" : "none";
+}
+
+const char* text_of(StorageChoice storage) {
+  switch (storage) {
+    case StorageChoice::f32:
+      return vdvr::text_of(SampleType::f32);
+    case StorageChoice::u16:
+      return vdvr::text_of(SampleType::u16);
+    case StorageChoice::u8:
+      return vdvr::text_of(SampleType::u8);
+    case StorageChoice::automatic:
+      break;
+  }
+  return "auto";
+}
+
+// What the stages below take for granted of one another.
+void check_options(const CertifyOptions& options) {
+  const BuildOptions& build = options.build;
+  if (build.window && !(build.window->first <= build.window->second))
+    throw InputError(fmt::format("window: {} lies above {}", build.window->first, build.window->second));
+  if (build.roi)
+    for (std::size_t a = 0; a < 3; ++a)
+      if (!((*build.roi)[a] < (*build.roi)[a + 3]))
+        throw InputError(fmt::format("roi: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
+  const PlanSettings& plan = options.plan;
+  if (plan.levels == Levels::isotropic && plan.coarsening.value_or(LevelTriple{}) != LevelTriple{})
+    throw InputError("coarsening: isotropic levels have the grid itself as their base");
+  if (build.closing != Closing::paper) return;
+  if (plan.coefficients != "sampled")
+    throw InputError("closing 'paper' feeds bricks with samples of F: take coefficients 'sampled' with it");
+  if (plan.levels != Levels::isotropic)
+    throw InputError("closing 'paper' is defined for isotropic levels only");
+}
+
+// What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
+// covered without the projections.
+std::string options_json(const Plan& plan, const BuildOptions& build, const Tolerance& tolerance,
+                         const ParallelGeometry& geometry) {
+  const LevelTriple& c = plan.layout.coarsening;
+  nlohmann::ordered_json j;
+  j["granularity"] = plan.layout.granularity;
+  j["base"] = std::array{1 << c[2], 1 << c[1], 1 << c[0]};  // cells per base sample, x, y, z
+  j["closing"] = text_of(build.closing);
+  j["coefficients"] = plan.settings.coefficients;
+  j["levels"] = vdvr::text_of(plan.layout.levels);
+  j["storage"] = text_of(build.storage);
+  j["terms"] = plan.settings.terms;
+  j["epsilon_of"] = tolerance.of_max ? "max" : "range";
+  j["upsampling"] = plan.rates.upsampling;
+  j["u_filter"] = vdvr::text_of(plan.rates.interpolation);
+  j["gold"] = plan.rates.gold;
+  j["geometry"] = {{"columns", geometry.columns},
+                   {"rows", geometry.rows},
+                   {"pitch_u", geometry.pitch_u},
+                   {"pitch_v", geometry.pitch_v},
+                   {"center", center_of(plan.field, geometry)},
+                   {"unit", geometry.unit},
+                   {"theta_rad", geometry.theta_rad}};
+  return j.dump();
+}
+
+BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, const Plan& plan,
+                             const BuildOptions& options, const Progress& progress) {
+  try {
+    return build(device, scan, plan, options, progress);
+  } catch (const ToleranceError&) {
+    if (options.journal) options.journal->remove();  // going on would end here again
+    throw;
+  }
+}
+
+void refuse_empty_promise(const Certificate& c) {
+  // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
+  // (but in a scan of nothing but zeros, whose range is 0).
+  if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
+    throw InputError("window or roi leaves no covered gold node to test: nothing would be certified");
+  if (!c.holds_buffer && !c.comparison)
+    throw ToleranceError(fmt::format(
+        "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
+        c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
+}
+
+}  // namespace
+
+Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
+               const CertifyOptions& options, const Progress& progress) {
+  check_options(options);
+  FieldOptions field = options.field;
+  field.center = center_of(field, scan.geometry);
+  const Grid grid = make_grid(scan.geometry, options.grid);
+  return make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
+}
+
+BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
+                    const CertifyOptions& options, const Progress& progress) {
+  CertifyOptions used = options;
+  used.plan.foresee = false;
+  const Plan plan = make_plan(device, scan, tolerance, used, progress);
+  return certify(device, scan, plan, tolerance, used, progress);
+}
+
+BuildResult certify(Device& device, const ProjectionSet& scan, const Plan& plan, const Tolerance& tolerance,
+                    const CertifyOptions& options, const Progress& progress) {
+  check_options(options);
+  BuildResult result = build_or_give_up(device, scan, plan, options.build, progress);
+  Certificate& c = result.certificate;
+  refuse_empty_promise(c);
+  c.options_json = options_json(plan, options.build, tolerance, scan.geometry);
+  c.content_sha256 = content_sha256(result.volume);
+  return result;
+}
+
+std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate) {
+  const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
+  if (!options.is_object() || !options.contains("geometry")) return std::nullopt;
+  try {
+    const auto& g = options.at("geometry");
+    ParallelGeometry geometry;
+    geometry.columns = g.at("columns").get<std::int64_t>();
+    geometry.rows = g.at("rows").get<std::int64_t>();
+    geometry.pitch_u = g.at("pitch_u").get<double>();
+    geometry.pitch_v = g.at("pitch_v").get<double>();
+    geometry.center = g.at("center").get<double>();
+    geometry.unit = g.at("unit").get<std::string>();
+    geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
+    return geometry;
+  } catch (const nlohmann::json::exception& e) {
+    throw FileError(fmt::format("certificate, options.geometry: {}", e.what()));
+  }
+}
+
+}  // namespace vdvr

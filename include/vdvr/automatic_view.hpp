@@ -1,0 +1,46 @@
+// A view that suits a volume when nobody said how to look at it: where its picture-worthy values lie, a
+// transfer function, a camera, the sampler that its certificate allows.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/export.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/raycast.hpp"
+
+namespace vdvr {
+
+/// Where the picture-worthy values lie, from the base samples.
+struct Brightness {
+  double lo = 0, hi = 0;  ///< the bulk of the samples, without outliers
+  double grey_lo = 0,
+         grey_hi = 0;          ///< window of slices: small dense parts may saturate, so that the rest is seen
+  double threshold = 0;        ///< between the densest material and the rest (Otsu's criterion)
+  double soft = 0;             ///< within the rest, between background and soft material
+  Vec3 dense_center{0, 0, 0};  ///< centroid of what lies above the threshold
+};
+/// Host only. Cost: a few passes over the samples on the grid; memory: a float of each.
+VDVR_API Brightness brightness_of(const MixedVolume& volume);
+
+/// Background clear, soft material a veil, dense material solid, each where the volume's own samples part.
+VDVR_API TransferFunction two_material_transfer(const Brightness& brightness);
+
+/// The sampler to render with: `automatic` becomes `buffer` where the certificate does not hold for image3d.
+/// One that was asked for by name stays.
+VDVR_API SamplerKind safe_sampler(SamplerKind asked, const std::optional<Certificate>& certificate);
+
+/// All of it: two materials, an iso-surface at the threshold, the grey window and the middle of the dense
+/// part for slices, the whole volume seen at azimuth 30 and elevation 20 degrees, the safe sampler.
+/// Everything else as RenderOptions has it. Cost: brightness_of.
+VDVR_API RenderOptions automatic_view(const MixedVolume& volume,
+                                      const std::optional<Certificate>& certificate = {});
+
+/// True for volumes of a cell or two in z, of which only slices across z show anything.
+VDVR_API bool is_thin(const Grid& grid);
+
+/// What lies between the certified field and the pixels of such a picture: no certificate covers it.
+VDVR_API std::string outside_certificate(const RenderOptions& options);
+
+}  // namespace vdvr

@@ -1,0 +1,8 @@
+// What a shared library of VDVR shows of itself: the functions and classes marked here, all of include/vdvr.
+#pragma once
+
+#if defined(__GNUC__)
+#define VDVR_API __attribute__((visibility("default")))
+#else
+#define VDVR_API
+#endif

@@ -1,0 +1,142 @@
+// What a program over the library is promised: certify() completes and refuses, verify_file() holds a file to
+// its projections.
+#define BOOST_TEST_MODULE certify
+#include <boost/test/unit_test.hpp>
+#include <functional>
+#include <string>
+
+#include "tests/support/device.hpp"
+#include "tests/support/scans.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "vdvr/certify.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/verify_file.hpp"
+
+using namespace vdvr;
+using support::device;
+using vdvr::testing::simulated;
+
+namespace {
+
+const ProjectionSet& scan() {
+  static const ProjectionSet made = simulated(sphere(4), 21, 7, 24);
+  return made;
+}
+
+Tolerance part_of_range(double fraction) { return {fraction, {}}; }
+
+const BuildResult& certified() {
+  static const BuildResult made = certify(device(), scan(), part_of_range(0.2));
+  return made;
+}
+
+std::string refusal(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+bool names(const std::string& message, const std::string& what) {
+  return message.find(what) != std::string::npos;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_certificate_is_complete) {
+  const Certificate& c = certified().certificate;
+  BOOST_TEST(c.holds_buffer);
+  BOOST_TEST(c.content_sha256 == content_sha256(certified().volume));
+  BOOST_TEST(contradiction(c) == "");
+  const auto geometry = noted_geometry(c);
+  BOOST_REQUIRE(geometry.has_value());
+  const ParallelGeometry& wanted = scan().geometry;
+  BOOST_TEST(geometry->columns == wanted.columns);
+  BOOST_TEST(geometry->rows == wanted.rows);
+  BOOST_TEST(geometry->pitch_u == wanted.pitch_u);
+  BOOST_TEST(geometry->center == wanted.center);
+  BOOST_TEST(geometry->theta_rad == wanted.theta_rad, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(planned_before_or_at_once_it_is_the_same_volume) {
+  const Plan plan = make_plan(device(), scan(), part_of_range(0.2));
+  const BuildResult again = certify(device(), scan(), plan, part_of_range(0.2));
+  BOOST_TEST(again.certificate.content_sha256 == certified().certificate.content_sha256);
+  BOOST_TEST(again.certificate.options_json == certified().certificate.options_json);
+}
+
+BOOST_AUTO_TEST_CASE(a_tolerance_out_of_reach_is_refused) {
+  BOOST_CHECK_THROW(certify(device(), scan(), part_of_range(1e-9)), ToleranceError);
+  BOOST_CHECK_THROW(certify(device(), scan(), part_of_range(0)), InputError);
+}
+
+BOOST_AUTO_TEST_CASE(a_window_that_no_value_meets_promises_nothing_and_is_refused) {
+  CertifyOptions options;
+  options.build.window = {100, 200};
+  const std::string why = refusal([&] { certify(device(), scan(), part_of_range(0.2), options); });
+  BOOST_TEST(names(why, "nothing would be certified"));
+}
+
+// Each names the field, not an option of the program.
+BOOST_AUTO_TEST_CASE(options_that_exclude_each_other_are_refused_by_name) {
+  const auto refused = [](const std::string& field, const std::function<void(CertifyOptions&)>& change) {
+    CertifyOptions options;
+    change(options);
+    const std::string why = refusal([&] { make_plan(device(), scan(), part_of_range(0.2), options); });
+    BOOST_TEST(names(why, field), "'" << why << "' does not name " << field);
+    BOOST_TEST(!names(why, "--"), why);
+  };
+  refused("window", [](CertifyOptions& o) { o.build.window = {2, 1}; });
+  refused("roi", [](CertifyOptions& o) { o.build.roi = {0, 0, 0, 1, -1, 1}; });
+  refused("coarsening", [](CertifyOptions& o) {
+    o.plan.levels = Levels::isotropic;
+    o.plan.coarsening = LevelTriple{1, 0, 0};
+  });
+  refused("coefficients", [](CertifyOptions& o) { o.build.closing = Closing::paper; });
+}
+
+BOOST_AUTO_TEST_CASE(a_file_holds_against_its_projections_and_no_others) {
+  const support::TemporaryFolder folder;
+  const auto path = folder / "v.vdvr";
+  write_vdvr(path, certified().volume, certified().certificate);
+  const FileVerification verified = verify_file(device(), path, scan());
+  BOOST_TEST(verified.holds, verified.failure);
+  BOOST_TEST(verified.content_matches);
+  BOOST_TEST(!verified.exhaustive);
+  BOOST_TEST(read_certified(path).certificate.content_sha256 == certified().certificate.content_sha256);
+
+  ProjectionSet other = scan();
+  other.report.sha256 = std::string(64, '0');
+  const std::string why = refusal([&] { verify_file(device(), path, other); });
+  BOOST_TEST(names(why, "other projections"), why);
+}
+
+BOOST_AUTO_TEST_CASE(altered_samples_are_measured_everywhere_and_do_not_hold) {
+  VdvrFile file;
+  file.volume = certified().volume;
+  file.certificate = certified().certificate;
+  file.altered = "the samples were changed";
+  const FileVerification verified = verify_file(device(), file, scan());
+  BOOST_TEST(!verified.holds);
+  BOOST_TEST(verified.exhaustive);
+  BOOST_TEST(verified.measured.holds);
+  BOOST_TEST(names(verified.failure, "still within epsilon"), verified.failure);
+}
+
+BOOST_AUTO_TEST_CASE(what_promises_nothing_cannot_be_verified) {
+  const support::TemporaryFolder folder;
+  CertifyOptions options;
+  options.plan.terms = "grid";
+  const BuildResult compared = certify(device(), scan(), part_of_range(0.2), options);
+  BOOST_TEST(compared.certificate.comparison);
+  write_vdvr(folder / "c.vdvr", compared.volume, compared.certificate);
+  BOOST_CHECK_THROW(read_to_verify(folder / "c.vdvr"), MismatchError);
+
+  Certificate wrong = certified().certificate;
+  wrong.total_buffer *= 0.5;
+  write_vdvr(folder / "w.vdvr", certified().volume, wrong);
+  const std::string why = refusal([&] { read_certified(folder / "w.vdvr"); });
+  BOOST_TEST(names(why, "w.vdvr: the certificate contradicts itself"), why);
+}

@@ -1,0 +1,85 @@
+# The library of KIND (static, shared), installed from BUILD into an empty prefix, and the examples built on it: by find_package
+# and by pkg-config. They run on a simulated scan and refuse what the program refuses.
+set(work "${BUILD}/tests/package_${KIND}")
+set(prefix "${work}/prefix")
+file(REMOVE_RECURSE "${work}")
+file(MAKE_DIRECTORY "${work}")
+set(ENV{PKG_CONFIG_PATH} "${prefix}/${LIBDIR}/pkgconfig")
+
+# run(CODE WORDS...): ends the test unless WORDS end with CODE; `output` and `errors` hold what they said.
+function(run wanted)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE said ERROR_VARIABLE complained
+    OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_STRIP_TRAILING_WHITESPACE WORKING_DIRECTORY "${work}")
+  if(NOT code STREQUAL wanted)
+    message(FATAL_ERROR "${ARGN}\nended with ${code}, not ${wanted}:\n${said}\n${complained}")
+  endif()
+  set(output "${said}" PARENT_SCOPE)
+  set(errors "${complained}" PARENT_SCOPE)
+endfunction()
+
+function(expect_equal what found wanted)
+  if(NOT found STREQUAL wanted)
+    message(FATAL_ERROR "${what}:\n${found}\nnot\n${wanted}")
+  endif()
+endfunction()
+
+run(0 "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}" --component "vdvr_${KIND}")
+file(READ "${prefix}/${LIBDIR}/cmake/vdvr/vdvrConfig.cmake" config)
+file(READ "${prefix}/${LIBDIR}/cmake/vdvr/vdvrTargets.cmake" targets)
+if(KIND STREQUAL "shared")
+  # What the library links itself is no business of its user.
+  if(config MATCHES "find_dependency\\(" OR targets MATCHES "clFFT|hdf5|OpenCL")
+    message(FATAL_ERROR "the package names private dependencies:\n${config}\n${targets}")
+  endif()
+  string(REGEX REPLACE "\\.[0-9]+$" "" soversion "${VERSION}")
+  file(READ_SYMLINK "${prefix}/${LIBDIR}/libvdvr.so.${soversion}" real)
+  expect_equal("SOVERSION" "${real}" "libvdvr.so.${VERSION}")
+endif()
+
+# By find_package.
+run(0 "${CMAKE_COMMAND}" -S "${SOURCE}/examples" -B "${work}/found" -G "${GENERATOR}" "-DCMAKE_MAKE_PROGRAM=${MAKE}"
+  "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_PREFIX_PATH=${prefix}")
+run(0 "${CMAKE_COMMAND}" --build "${work}/found")
+
+# By pkg-config, as a shell puts it.
+set(static "")
+if(KIND STREQUAL "static")
+  set(static "--static")
+endif()
+run(0 "${PKG_CONFIG}" --cflags --libs ${static} vdvr)
+separate_arguments(flags UNIX_COMMAND "${output}")
+run(0 "${CXX}" -std=c++20 "${SOURCE}/examples/certify.cpp" ${flags} "-Wl,-rpath,${prefix}/${LIBDIR}" -o "${work}/certify")
+
+run(0 "${VDVR}" simulate --phantom sphere --detector 21x7 --angles 24 -o "${work}/scan.h5")
+run(0 "${VDVR}" build "${work}/scan.h5" --epsilon 20% -o "${work}/program.vdvr")
+run(0 "${VDVR}" info --json "${work}/program.vdvr")
+string(JSON wanted_hash GET "${output}" certificate content_sha256)
+string(JSON wanted_options GET "${output}" certificate options)
+run(1 "${VDVR}" build "${work}/scan.h5" --epsilon 0.000000001 -o "${work}/never.vdvr" --quiet)
+string(REPLACE "vdvr build: " "certify: " refusal "${errors}")
+foreach(certify IN ITEMS "${work}/found/certify" "${work}/certify")
+  file(REMOVE "${work}/example.vdvr")
+  run(0 "${certify}" "${work}/scan.h5" 0.2 "${work}/example.vdvr")
+  run(0 "${VDVR}" info --json "${work}/example.vdvr")
+  string(JSON hash GET "${output}" certificate content_sha256)
+  string(JSON options GET "${output}" certificate options)
+  expect_equal("content of ${certify}" "${hash}" "${wanted_hash}")
+  expect_equal("options of ${certify}" "${options}" "${wanted_options}")
+  run(1 "${certify}" "${work}/scan.h5" 0.000000001 "${work}/never.vdvr")
+  expect_equal("refusal of ${certify}" "${errors}" "${refusal}")
+  if(EXISTS "${work}/never.vdvr")
+    message(FATAL_ERROR "${certify} wrote what it refused")
+  endif()
+endforeach()
+
+# The other example, on the volume of the first.
+file(MAKE_DIRECTORY "${work}/pictures")
+run(0 "${work}/found/render" "${work}/example.vdvr" "${work}/scan.h5" "${work}/pictures")
+foreach(name IN ITEMS volume error)
+  file(SIZE "${work}/pictures/${name}.png" bytes)
+  if(bytes LESS 1000)
+    message(FATAL_ERROR "${name}.png has ${bytes} bytes")
+  endif()
+endforeach()
+run(0 "${VDVR}" simulate --phantom sphere --detector 21x7 --angles 25 -o "${work}/other.h5")
+run(1 "${work}/found/render" "${work}/example.vdvr" "${work}/other.h5" "${work}/pictures")
