@@ -57,6 +57,6 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
 
 /// 0 when the certificate holds for every sampler of the device it was built on, else 1 after a line on
 /// stderr.
-int certificate_exit_code(const char* command, const Certificate& certificate);
+int certificate_exit_code(const std::string& who, const Certificate& certificate);
 
 }  // namespace vdvr::cli

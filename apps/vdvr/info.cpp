@@ -5,7 +5,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 
@@ -70,7 +70,7 @@ int volume_info(const std::filesystem::path& path, const CommonOptions& common) 
 }
 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
   const Grid grid = make_grid(scan.geometry, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());

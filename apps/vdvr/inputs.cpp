@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/volume_file.hpp"
@@ -68,9 +68,9 @@ VdvrFile read_certified(const fs::path& path, const Arguments& args, bool unveri
   check_consistency(path, file.certificate);
   if (file.seal == Seal::none && !common.quiet)
     say(
-        fmt::format("vdvr {}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
+        fmt::format("{}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
                     "its certificate with the projections\n",
-                    args.command(), path.string()));
+                    args.who(), path.string()));
   return file;
 }
 

@@ -67,26 +67,6 @@ std::optional<int> rate(const Arguments& args, const std::string& name, std::int
 
 }  // namespace
 
-void add_common(Arguments& args) {
-  args.group("Common")
-      .value("device", "INDEX|cpu|gpu|NAME", "OpenCL device (default: a GPU if there is one)")
-      .value("max-memory", "2G", "limit of our host and device allocations together")
-      .flag("json", "one JSON object on standard output, nothing else")
-      .flag("quiet", "no progress and no summary")
-      .flag("force", "overwrite existing outputs")
-      .flag("help,h", "this text");
-}
-
-CommonOptions common_options(const Arguments& args) {
-  CommonOptions common;
-  common.device = args.text_or("device", "");
-  if (args.has("max-memory")) common.max_memory = parse_bytes("--max-memory", args.text("max-memory"));
-  common.json = args.has("json");
-  common.quiet = args.has("quiet");
-  common.force = args.has("force");
-  return common;
-}
-
 void add_scan(Arguments& args) {
   args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view");
 }

@@ -10,7 +10,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/plan_pictures.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -85,7 +85,7 @@ int plan_command(Arguments& args) {
   }
 
   Device device = open_device(common);
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, options, progress.callback());
   Json json = plan_json(planned), pictures;
   if (folder) {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/cosine_spectrum.hpp"
+#include "vdvr/cosine_spectrum.hpp"
 #include "host/figure.hpp"
-#include "host/io/atomic_file.hpp"
-#include "host/spectral_error.hpp"
+#include "vdvr/output_file.hpp"
+#include "vdvr/spectral_error.hpp"
 #include "vdvr/error_map.hpp"
 
 namespace vdvr::cli {

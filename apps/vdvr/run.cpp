@@ -7,7 +7,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "host/error_slice.hpp"
 #include "vdvr/error.hpp"
@@ -144,7 +144,7 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
 int run_steps(const Arguments& args, const CommonOptions& common, const CertifyOptions& options,
               const std::filesystem::path& output, OutputFolder& folder) {
   Device device = open_device(common);
-  ProgressLine line(args.command(), common.quiet);
+  ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
   out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, options, progress); });
@@ -176,7 +176,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const CertifyO
 
   const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
   print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
-  return certificate_exit_code(args.command(), certificate);
+  return certificate_exit_code(args.who(), certificate);
 }
 
 }  // namespace

@@ -3,7 +3,8 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
+
+#include "vdvr/output_file.hpp"
 
 namespace vdvr::io {
 
@@ -29,14 +30,5 @@ class AtomicFile {
 /// Removes temporary files that killed writers of `target` left in its folder. Only for whoever knows that no
 /// other process writes it now.
 void remove_leftovers(const std::filesystem::path& target);
-
-/// For a program that ends without unwinding: what remove_temporaries removes, files, and folders if they are
-/// empty. Every AtomicFile notes its temporary file.
-void note_temporary(const std::filesystem::path& path);
-void forget_temporary(const std::filesystem::path& path);
-void remove_temporaries();
-
-/// Writes bytes atomically.
-void write_file(const std::filesystem::path& path, const std::string& bytes);
 
 }  // namespace vdvr::io
