@@ -33,10 +33,6 @@ std::string digest(const ProjectionSet& scan, const Plan& plan) {
   return sha.hex();
 }
 
-const char* name(Closing closing) {
-  return closing == Closing::coarse ? "coarse" : closing == Closing::paper ? "paper" : "none";
-}
-
 const char* name(StorageChoice storage) {
   switch (storage) {
     case StorageChoice::f32:
@@ -71,12 +67,12 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"spacing", exact_list(plan.grid.spacing)},
       {"epsilon", exact(plan.epsilon_abs)},
       {"rates", fmt::format("u {}x {}, gold {}x", plan.upsampling_u, plan.u_filter, plan.gold_rate)},
-      {"coefficients", plan.settings.coefficients},
+      {"coefficients", text_of(plan.settings.comparison.coefficients)},
       {"levels", plan.settings.levels},
-      {"terms", plan.settings.terms},
+      {"terms", text_of(plan.settings.comparison.terms)},
       {"base", fmt::format("{}", fmt::join(plan.coarsening, ","))},
       {"granularity", std::to_string(stream.settings().granularity)},
-      {"closing", name(options.closing)},
+      {"closing", text_of(plan.settings.comparison.closing)},
       {"storage", name(options.storage)},
       {"window",
        options.window ? exact_list(std::array{options.window->first, options.window->second}) : "none"},

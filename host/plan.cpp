@@ -231,7 +231,7 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   plan.epsilon = given;
   plan.epsilon_abs = given * plan.reference_range;
-  if (tolerance.absolute || tolerance.of_max) {
+  if (tolerance.absolute || plan.settings.comparison.epsilon_of_max) {
     plan.epsilon_abs = tolerance.absolute ? given : given * largest;
     plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   }
@@ -310,7 +310,9 @@ Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto all = candidates(rates);
   set_epsilon(plan, tolerance,
-              tolerance.of_max ? largest_of_gold(state, filtered, upsampler, sups, grid, all.front()) : 0);
+              settings.comparison.epsilon_of_max
+                  ? largest_of_gold(state, filtered, upsampler, sups, grid, all.front())
+                  : 0);
   report(progress, "plan", 0.3);
 
   plan.bounds = global_bounds(state, filtered, sups, plan.base, settings.foresee);
@@ -318,10 +320,10 @@ Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units
 
   // The cheapest rates whose slack leaves most of the tolerance to the grid; failing that, whatever fits at
   // all.
-  const bool grid_only = settings.terms == "grid";
+  const bool grid_only = settings.comparison.terms == Terms::grid;
   const auto settings_at = [&](const Rates& r) {
     GoldSettings s{grid, fitting_granularity(settings.granularity, grid), r.gold, r.upsampling, r.u_filter};
-    s.midrange = settings.coefficients == "midrange";
+    s.midrange = settings.comparison.coefficients == Coefficients::midrange;
     s.grid_only = grid_only;
     s.anisotropic = settings.levels == "anisotropic";
     s.coarsening = plan.coarsening;
@@ -385,7 +387,7 @@ Plan plan_in_units(Device& device, const ProjectionSet& scan, const Units& units
   report(progress, "plan", 0.8);
 
   plan.coarsening = coarsening_of(plan, coverage, settings_at(r), t);
-  if (settings.coefficients == "midrange") {
+  if (settings.comparison.coefficients == Coefficients::midrange) {
     start = now();
     plan.fitted = take_base(plan.base, plan.coarsening);
     fit_base_samples(state, filtered, upsampler, sups, settings_at(r), plan.fitted, {});

@@ -16,7 +16,6 @@ using namespace vdvr::hostile;
 
 namespace {
 
-const char* name_of(Closing c) { return c == Closing::paper ? "paper" : "coarse"; }
 const char* name_of(StorageChoice s) {
   return s == StorageChoice::automatic ? "auto"
          : s == StorageChoice::f32     ? "f32"
@@ -27,14 +26,14 @@ const char* name_of(StorageChoice s) {
 // What a reader needs to know of a case; the seed alone makes it again.
 std::string text_of_case(const Case& c) {
   const auto rate = [](const std::optional<int>& n) { return n ? std::to_string(*n) : std::string("auto"); };
-  std::string text = c.name + "; grid " + std::to_string(c.grid.cells[0]) + "x" +
-                     std::to_string(c.grid.cells[1]) + "x" + std::to_string(c.grid.cells[2]) + " of " +
-                     detail::text_of(c.grid.spacing) + " px at " + detail::text_of(c.grid.origin) +
-                     "; upsampling " + rate(c.rates.upsampling) + " " + c.rates.u_filter + ", gold " +
-                     rate(c.rates.gold) + ", " + c.settings.coefficients + ", " + c.settings.levels +
-                     ", closing " + name_of(c.options.closing) + ", granularity " +
-                     std::to_string(c.options.granularity) + ", storage " + name_of(c.options.storage) +
-                     ", " + c.field.filter + " " + detail::text_of(c.field.cutoff);
+  std::string text =
+      c.name + "; grid " + std::to_string(c.grid.cells[0]) + "x" + std::to_string(c.grid.cells[1]) + "x" +
+      std::to_string(c.grid.cells[2]) + " of " + detail::text_of(c.grid.spacing) + " px at " +
+      detail::text_of(c.grid.origin) + "; upsampling " + rate(c.rates.upsampling) + " " + c.rates.u_filter +
+      ", gold " + rate(c.rates.gold) + ", " + text_of(c.settings.comparison.coefficients) + ", " +
+      c.settings.levels + ", closing " + text_of(c.settings.comparison.closing) + ", granularity " +
+      std::to_string(c.options.granularity) + ", storage " + name_of(c.options.storage) + ", " +
+      c.field.filter + " " + detail::text_of(c.field.cutoff);
   if (const auto& base = c.settings.coarsening)
     text += ", base " + std::to_string(1 << (*base)[2]) + "x" + std::to_string(1 << (*base)[1]) + "x" +
             std::to_string(1 << (*base)[0]);

@@ -53,15 +53,15 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
     c.tolerance.absolute = options.epsilon;
   } else {
     c.tolerance.relative = options.epsilon;
-    c.tolerance.of_max = !ours;
+    c.epsilon_of_max = !ours;
   }
   if (!ours) {
     // What --paper stands for (apps/vdvr/options.cpp).
     rates = {8, "linear", 8};
-    plan_settings.coefficients = "sampled";
-    plan_settings.terms = "grid";
+    plan_settings.comparison = {Coefficients::sampled, Terms::grid,
+                                options.settings == Settings::paper ? Closing::paper : Closing::none,
+                                c.epsilon_of_max};
     plan_settings.levels = "isotropic";
-    build_options.closing = options.settings == Settings::paper ? Closing::paper : Closing::none;
     build_options.storage = StorageChoice::f32;
     if (options.settings == Settings::paper_cells) build_options.granularity = plan_settings.granularity = 1;
   }

@@ -35,6 +35,7 @@ struct Case {
   Settings settings = Settings::ours;
   double epsilon = 0;  ///< as asked for
   Tolerance tolerance;
+  bool epsilon_of_max = false;  ///< what a relative tolerance is of
   MixedVolume volume;
   Certificate certificate;
   double seconds = 0;  ///< plan and build, in memory

@@ -80,41 +80,51 @@ void claim_projections(const Json& all, std::vector<Claim>& claims) {
                     held(one / eight > 30), "another object: the sums differ, the factor is the claim"});
 }
 
+/// What the paper's own settings give at one tolerance.
+void claim_threshold(const Json& table, double e, std::vector<Claim>& claims) {
+  const Json cells = case_of(table, "paper, cell by cell", e),
+             open = case_of(table, "paper, closing none", e), closed = case_of(table, "paper", e);
+  if (cells.is_null() || open.is_null() || closed.is_null()) {
+    claims.push_back({"Table 2", fmt::format("Marschner-Lobb at {}", percent(e)), "", Verdict::not_run,
+                      "--quick leaves it out"});
+    return;
+  }
+  const double said_rms = open["paper"]["rms"], said = open["paper"]["samples_ratio"];
+  const double rms = cells["to_function"]["rms"], closed_rms = closed["to_function"]["rms"];
+  const double before = open["storage"]["interior"]["samples_ratio"],
+               after = closed["storage"]["interior"]["samples_ratio"];
+  claims.push_back({"Table 2", fmt::format("{}: RMS {:.3g}", percent(e), said_rms),
+                    fmt::format("{:.3g} refined cell by cell ({:+.1f} %), {:.3g} in closed bricks of 4", rms,
+                                100 * (rms / said_rms - 1), closed_rms),
+                    held(std::abs(rms / said_rms - 1) <= 0.1),
+                    "held within 10 %; whole bricks refine more than need be"});
+  claims.push_back(
+      {"Table 2", fmt::format("{}: storage {:.2f} times", percent(e), said),
+       fmt::format("{:.2f} before closing ({:+.0f} %), {:.2f} after", before, 100 * (before / said - 1),
+                   after),
+       held(std::abs(before / said - 1) <= 0.16),
+       fmt::format("held within 16 % before closing; the closing of Fig. 9 makes it {:.1f} times as much",
+                   after / before)});
+}
+
+/// The same tolerance, certified.
+void claim_ours(const Json& table, double e, std::vector<Claim>& claims) {
+  const Json ours = case_of(table, "ours", e);
+  if (ours.is_null()) return;
+  const double said = ours["paper"]["samples_ratio"], mine = ours["storage"]["interior"]["samples_ratio"],
+               bytes = ours["storage"]["interior"]["bytes_ratio"];
+  claims.push_back({"Table 2, ours", fmt::format("{}: the same tolerance, certified", percent(e)),
+                    fmt::format("{:.2f} samples, {:.2f} bytes per base", mine, bytes),
+                    mine < said ? Verdict::improved : Verdict::not_reproduced,
+                    mine < said
+                        ? "coefficients fitted to the filter, closing to the coarse side, integer tiles"
+                        : "a certificate counts the errors of gold, projections and rounding too"});
+}
+
 void claim_thresholds(const Json& all, std::vector<Claim>& claims) {
-  const Json& table = all["table_2_marschner_lobb"];
   for (const double e : {0.04, 0.03, 0.02, 0.01}) {
-    const Json cells = case_of(table, "paper, cell by cell", e),
-               open = case_of(table, "paper, closing none", e), closed = case_of(table, "paper", e),
-               ours = case_of(table, "ours", e);
-    if (cells.is_null() || open.is_null() || closed.is_null() || ours.is_null()) {
-      claims.push_back({"Table 2", fmt::format("Marschner-Lobb at {}", percent(e)), "", Verdict::not_run,
-                        "--quick leaves it out"});
-      continue;
-    }
-    const double said_rms = open["paper"]["rms"], said = open["paper"]["samples_ratio"];
-    const double rms = cells["to_function"]["rms"], closed_rms = closed["to_function"]["rms"];
-    const double before = open["storage"]["interior"]["samples_ratio"],
-                 after = closed["storage"]["interior"]["samples_ratio"],
-                 mine = ours["storage"]["interior"]["samples_ratio"],
-                 bytes = ours["storage"]["interior"]["bytes_ratio"];
-    claims.push_back({"Table 2", fmt::format("{}: RMS {:.3g}", percent(e), said_rms),
-                      fmt::format("{:.3g} refined cell by cell ({:+.1f} %), {:.3g} in closed bricks of 4",
-                                  rms, 100 * (rms / said_rms - 1), closed_rms),
-                      held(std::abs(rms / said_rms - 1) <= 0.1),
-                      "held within 10 %; whole bricks refine more than need be"});
-    claims.push_back(
-        {"Table 2", fmt::format("{}: storage {:.2f} times", percent(e), said),
-         fmt::format("{:.2f} before closing ({:+.0f} %), {:.2f} after", before, 100 * (before / said - 1),
-                     after),
-         held(std::abs(before / said - 1) <= 0.16),
-         fmt::format("held within 16 % before closing; the closing of Fig. 9 makes it {:.1f} times as much",
-                     after / before)});
-    claims.push_back({"Table 2, ours", fmt::format("{}: the same tolerance, certified", percent(e)),
-                      fmt::format("{:.2f} samples, {:.2f} bytes per base", mine, bytes),
-                      mine < said ? Verdict::improved : Verdict::not_reproduced,
-                      mine < said
-                          ? "coefficients fitted to the filter, closing to the coarse side, integer tiles"
-                          : "a certificate counts the errors of gold, projections and rounding too"});
+    claim_threshold(all["table_2_marschner_lobb"], e, claims);
+    claim_ours(all["table_2_marschner_lobb"], e, claims);
   }
 }
 

@@ -60,8 +60,11 @@ Lobb measure_lobb(Report& run) {
   lobb.field = field_on(run.device, lobb.test.scan, lobb.lattice, run.progress);
   for (const Published& p : kPublished) {
     if (run.quick && p.epsilon < 0.02) continue;
-    for (const Settings s : {Settings::paper_cells, Settings::paper_open, Settings::paper, Settings::ours})
-      lobb.cases.push_back(measure_case(run, lobb, s, p.epsilon));
+    // A build in the paper's settings takes its whole gold standard: --quick makes them at 3 % alone.
+    if (!run.quick || p.epsilon == 0.03)
+      for (const Settings s : {Settings::paper_cells, Settings::paper_open, Settings::paper})
+        lobb.cases.push_back(measure_case(run, lobb, s, p.epsilon));
+    lobb.cases.push_back(measure_case(run, lobb, Settings::ours, p.epsilon));
   }
   return lobb;
 }

@@ -46,7 +46,8 @@ void print_claims(const Json& json, const std::filesystem::path& output) {
 
 int run(cli::Arguments& args) {
   args.value("output,o", "DIR", "the folder for paper.json, CSV, NumPy and PNG files")
-      .flag("quick", "fewer points, views, frames and thresholds: minutes instead of a quarter of an hour")
+      .flag("quick",
+            "fewer points, views, frames and thresholds: two minutes instead of a quarter of an hour")
       .value("head", "FILE.mha",
              "the head of scripts/fetch-head, for Fig. 14 and the rows of carp and beetle");
   cli::add_common(args);

@@ -164,7 +164,7 @@ void add_spectra(Report& run, const ProjectionSet& scan, const Grid& grid, const
   const Plan plan = [&] {
     PlanSettings settings;
     settings.foresee = false;
-    settings.terms = "grid";
+    settings.comparison.terms = Terms::grid;
     Tolerance tolerance;
     tolerance.relative = 0.03;
     return make_plan(run.device, scan, grid, {}, {8, "linear", 8}, tolerance, settings, run.progress);

@@ -13,7 +13,7 @@ void measure_speeds(Report& run, const std::string& object, const TestScan& test
   report(run.progress, "speed", 0);
   RenderOptions view = timing_view(test.grid);
   view.transfer = transfer;
-  const int many = 4 * run.frames(), few = std::max(2, run.frames() / 2);
+  const int many = 4 * run.frames(), few = run.frames() / 2;
   std::vector<SpeedRow> rows;
   const auto time = [&](const std::string& method, std::uint64_t bytes, int frames, const auto& draw) {
     rows.push_back(

@@ -38,7 +38,7 @@ Json case_json(const Case& c) {
   return {{"settings", text_of(c.settings)},
           {"epsilon", c.epsilon},
           {"epsilon_of", c.tolerance.absolute ? "density"
-                         : c.tolerance.of_max ? "maximum"
+                         : c.epsilon_of_max   ? "maximum"
                                               : "range"},
           {"epsilon_abs", c.certificate.epsilon_abs},
           {"reference_range", c.certificate.reference_range},

@@ -303,8 +303,8 @@ int bench_command(Arguments& args) {
   if (name == "bounds") return bench_bounds(args);
   if (name == "tune") return bench_tune(args);
   if (!name.empty())
-    throw InputError(fmt::format(
-        "'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
+    throw InputError(
+        fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
   args.group(
           "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N] | bounds IN | "
           "tune; each has its own --help")

@@ -29,7 +29,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Certify
                      {"storage", storage_json(result.volume, bytes)},
                      {"resumed", {{"records", options.build.journal->replayed()}}},
                      {"peak_bytes", device.peak_memory()},
-                     {"certificate", certificate_json(result.certificate)},
+                     {record_name(result.certificate), certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
     print_scan(planned.scan);

@@ -101,7 +101,7 @@ BuildResult build_certified(Device& device, const Planned& planned, const Certif
         c.total_buffer, c.epsilon_abs, c.worst_at[0], c.worst_at[1], c.worst_at[2]));
   BuildOptions taken = options.build;
   taken.granularity = result.volume.granularity;  // less than asked for on a grid thinner than a brick
-  c.options_json = options_json(planned.plan, taken, options.tolerance.of_max, planned.scan.geometry,
+  c.options_json = options_json(planned.plan, taken, planned.scan.geometry,
                                 center_of(planned.plan.field, planned.scan.geometry));
   c.content_sha256 = content_sha256(result.volume);
   return result;
@@ -113,11 +113,11 @@ int certificate_exit_code(const std::string& who, const Certificate& certificate
     return 1;
   }
   if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
-  say(fmt::format(
-      "{}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
-      "render with "
-      "--sampler buffer, or ask for a larger epsilon\n",
-      who));
+  say(
+      fmt::format("{}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
+                  "render with "
+                  "--sampler buffer, or ask for a larger epsilon\n",
+                  who));
   return 1;
 }
 

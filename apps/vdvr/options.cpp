@@ -44,8 +44,6 @@ const std::vector<Limited> kBuildLimits{
      "error terms that are charged (default all; grid is for comparison, never certified)"},
     {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of (default range)"}};
 
-const std::map<std::string, Closing> kClosings{
-    {"coarse", Closing::coarse}, {"paper", Closing::paper}, {"none", Closing::none}};
 const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::automatic},
                                                     {"f32", StorageChoice::f32},
                                                     {"u16", StorageChoice::u16},
@@ -160,7 +158,6 @@ Tolerance tolerance(const Arguments& args) {
   if (args.has("epsilon") == args.has("epsilon-abs"))
     throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
   Tolerance result;
-  result.of_max = args.choice("epsilon-of", {"range", "max"}, args.has("paper") ? "max" : "range") == "max";
   if (args.has("epsilon-abs")) {
     result.absolute = args.positive_or("epsilon-abs", 0);
     return result;
@@ -216,8 +213,6 @@ BuildOptions build_options(const Arguments& args) {
   for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
   const bool paper = args.has("paper");
   BuildOptions build;
-  build.closing =
-      kClosings.at(args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse"));
   build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
   build.granularity = static_cast<int>(args.integer_or("granularity", build.granularity, 1, 8));
   if (!is_power_of_two(build.granularity))
@@ -253,40 +248,63 @@ std::optional<LevelTriple> coarsening(const Arguments& args) {
 
 }  // namespace
 
-PlanSettings plan_settings(const Arguments& args) {
+namespace {
+
+/// One of `values` by its name; `fallback` where the option is not given.
+template <class T>
+T choice_of(const Arguments& args, const std::string& name, const std::vector<T>& values, T fallback) {
+  std::vector<std::string> names;
+  for (const T value : values) names.emplace_back(text_of(value));
+  const std::string given = args.choice(name, names, text_of(fallback));
+  return values[static_cast<std::size_t>(std::find(names.begin(), names.end(), given) - names.begin())];
+}
+
+Comparison comparison(const Arguments& args) {
   const bool paper = args.has("paper");
+  Comparison c;
+  c.coefficients = choice_of(args, "coefficients", {Coefficients::midrange, Coefficients::sampled},
+                             paper ? Coefficients::sampled : Coefficients::midrange);
+  c.terms = choice_of(args, "terms", {Terms::all, Terms::grid}, paper ? Terms::grid : Terms::all);
+  c.closing = choice_of(args, "closing", {Closing::coarse, Closing::paper, Closing::none},
+                        paper ? Closing::paper : Closing::coarse);
+  c.epsilon_of_max = args.choice("epsilon-of", {"range", "max"}, paper ? "max" : "range") == "max";
+  return c;
+}
+
+}  // namespace
+
+PlanSettings plan_settings(const Arguments& args) {
   PlanSettings settings;
-  settings.coefficients =
-      args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
-  settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
-  settings.levels =
-      args.choice("levels", {"isotropic", "anisotropic"},
-                  paper || build_options(args).closing == Closing::paper ? "isotropic" : "anisotropic");
+  settings.comparison = comparison(args);
+  const bool paper = args.has("paper"), paper_closing = settings.comparison.closing == Closing::paper;
+  settings.levels = args.choice("levels", {"isotropic", "anisotropic"},
+                                paper || paper_closing ? "isotropic" : "anisotropic");
   settings.granularity = build_options(args).granularity;
   settings.coarsening = coarsening(args);
   if (settings.coarsening.value_or(LevelTriple{}) != LevelTriple{} && settings.levels == "isotropic")
     throw InputError(
         "--base: isotropic levels have the grid itself as their base; take --levels anisotropic");
-  if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
+  if (settings.comparison.coefficients == Coefficients::midrange && paper_closing)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
         "coarse");
-  if (settings.levels == "anisotropic" && build_options(args).closing == Closing::paper)
+  if (settings.levels == "anisotropic" && paper_closing)
     throw InputError("--closing paper is defined for --levels isotropic only; or take --closing coarse");
   return settings;
 }
 
-std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
-                         const ParallelGeometry& geometry, double center) {
+std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
+                         double center) {
+  const Comparison& comparison = plan.settings.comparison;
   nlohmann::ordered_json j;
   j["granularity"] = build.granularity;
   j["base"] = cells_per_base_sample(plan.coarsening);
-  j["closing"] = name_in(kClosings, build.closing);
-  j["coefficients"] = plan.settings.coefficients;
+  j["closing"] = text_of(comparison.closing);
+  j["coefficients"] = text_of(comparison.coefficients);
   j["levels"] = plan.settings.levels;
   j["storage"] = name_in(kStorage, build.storage);
-  j["terms"] = plan.settings.terms;
-  j["epsilon_of"] = epsilon_of_max ? "max" : "range";
+  j["terms"] = text_of(comparison.terms);
+  j["epsilon_of"] = comparison.epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.upsampling_u;
   j["u_filter"] = plan.u_filter;
   j["gold"] = plan.gold_rate;

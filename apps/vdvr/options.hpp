@@ -49,7 +49,7 @@ std::string limited_choice(const Arguments& args, const std::string& name,
 
 /// What a volume is built with, for the certificate's `options`; includes the scan's geometry, so that a
 /// reader of the file can tell which points are covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, bool epsilon_of_max,
-                         const ParallelGeometry& geometry, double center);
+std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry,
+                         double center);
 
 }  // namespace vdvr::cli

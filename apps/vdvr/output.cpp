@@ -85,6 +85,9 @@ Json budget_json(const ErrorBudget& b) {
 }
 
 Json certificate_json(const Certificate& certificate) { return Json::parse(to_json(certificate)); }
+std::string record_name(const Certificate& certificate) {
+  return certificate.comparison ? "comparison" : "certificate";
+}
 
 std::array<int, 3> cells_per_base_sample(const LevelTriple& c) { return {1 << c[2], 1 << c[1], 1 << c[0]}; }
 

@@ -32,6 +32,8 @@ Json report_json(const InputReport& report);
 Json bounds_json(const std::vector<Bound>& bounds);
 Json budget_json(const ErrorBudget& budget);
 Json certificate_json(const Certificate& certificate);
+/// "certificate", or "comparison" where it is the record of one.
+std::string record_name(const Certificate& certificate);
 /// Along x, y, z.
 std::array<int, 3> cells_per_base_sample(const LevelTriple& coarsening);
 Json seconds_json(const std::map<std::string, double>& seconds);

@@ -193,7 +193,7 @@ int run_command(Arguments& args) {
   CertifyOptions options = certify_options(args);
   options.plan.foresee = false;
   options.compression = compression(args);
-  if (is_comparison(options.plan, options.build))
+  if (options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);

@@ -52,7 +52,8 @@ struct Certificate {
   double reference_range = 0;  ///< max - min of F over covered 1x samples
   /// Stored in a file that holds a seal over it (docs/file-format.md).
   bool sealed = false;
-  /// Built by settings that leave terms or the closing out, to compare with: it promises nothing.
+  /// No certificate, but the record of a volume that nothing certifies (Comparison): what was measured and
+  /// with what it was built. It promises nothing, and a file keeps it under another name.
   bool comparison = false;
   bool holds_buffer = false;
   std::optional<bool> holds_image3d;
@@ -93,7 +94,8 @@ std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
 /// One line where the certificate's own numbers do not follow from each other; empty where they do.
 std::string contradiction(const Certificate& certificate);
 
-/// The JSON of docs/file-format.md; finite numbers only.
+/// The JSON of docs/file-format.md; finite numbers only. A record of a comparison has neither 'holds' nor
+/// 'total'.
 std::string to_json(const Certificate& certificate);
 /// Throws FileError naming the missing or ill-typed member.
 Certificate certificate_from_json(const std::string& text);

@@ -7,15 +7,15 @@
 
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/certificate.hpp"
+#include "vdvr/comparison.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 
 struct Tolerance {
-  std::optional<double> relative;  ///< fraction of the reference range
+  std::optional<double> relative;  ///< fraction of the reference range, or as the settings' comparison says
   std::optional<double> absolute;  ///< density units; one of the two is set
-  bool of_max = false;             ///< relative to max |F| over covered samples, as in the paper
 };
 
 struct RateOptions {
@@ -24,11 +24,9 @@ struct RateOptions {
   std::optional<int> gold;        ///< none: auto
 };
 
-/// What is stored, and which error terms the tolerance must cover.
+/// What is stored, and what is foreseen.
 struct PlanSettings {
-  std::string coefficients = "midrange";  ///< midrange: samples fitted to the trilinear filter | sampled
-  std::string terms =
-      "all";  ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
+  Comparison comparison{};
   std::string levels = "anisotropic";  ///< anisotropic: a level per axis | isotropic: one per brick
   int granularity = 4;                 ///< for what is foreseen
   /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to

@@ -1,6 +1,6 @@
-// `vdvr bench paper` given what it cannot use, and interrupted: refused before minutes of work, and no half
+// `vdvr-paper` given what it cannot use, and interrupted: refused before minutes of work, and no half
 // of a report. What a whole report holds: paper_test.
-#define BOOST_TEST_MODULE cli_paper
+#define BOOST_TEST_MODULE paper_cli
 #include <boost/test/unit_test.hpp>
 
 #include <csignal>
@@ -16,27 +16,40 @@ namespace fs = std::filesystem;
 namespace {
 
 std::vector<std::string> paper(const std::vector<std::string>& more) {
-  std::vector<std::string> words{"bench", "paper", "--quick"};
+  std::vector<std::string> words{"--quick"};
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
 
+Program program() {
+  Program p(folder().path());
+  p.binary = VDVR_PAPER_BINARY;
+  return p;
+}
+
 /// Refused in one line, so before the first stage reports.
 void check_refused_at_once(const std::vector<std::string>& more, const std::string& named) {
-  check_refused(paper(more), named);
-  BOOST_TEST(is_one_line(bytes_of(at("std.err"))), bytes_of(at("std.err")));
+  const Ended r = program().run(paper(more));
+  BOOST_TEST_CONTEXT("vdvr-paper said: " << r.err) {
+    BOOST_TEST(r.code == 2);
+    BOOST_TEST(r.out.empty());
+    BOOST_TEST(r.err.rfind("vdvr-paper: ", 0) == 0);
+    BOOST_TEST(r.err.find(named) != std::string::npos);
+    BOOST_TEST(is_one_line(r.err));
+  }
 }
 
 /// Runs until `stage` begins, then sends the signal.
 void check_interrupted(const std::vector<std::string>& more, const std::string& stage, int signal) {
-  const pid_t child = start(paper(more));
-  wait_for("vdvr bench: " + stage + "\n");
+  write(at("std.err"), "");
+  const pid_t child = program().start(paper(more));
+  wait_for("vdvr-paper: " + stage + "\n");
   ::kill(child, signal);
-  const Ended r = finish(child);
+  const Ended r = program().finish(child);
   BOOST_TEST_CONTEXT(stage << ", signal " << signal << ": " << r.err) {
     BOOST_TEST(r.code == 128 + signal);
     BOOST_TEST(r.out.empty());
-    BOOST_TEST(last_line(r.err) == "vdvr bench: interrupted\n");
+    BOOST_TEST(last_line(r.err) == "vdvr-paper: interrupted\n");
   }
   check_no_temporary_file_is_left();
 }
@@ -45,19 +58,23 @@ void check_interrupted(const std::vector<std::string>& more, const std::string& 
 
 BOOST_AUTO_TEST_CASE(unknown_options_and_stray_words_are_refused) {
   check_refused_at_once({"-o", at("x"), "--frobnicate"}, "--frobnicate");
-  check_refused_at_once({"-o", at("x"), "--frobnicate"}, "vdvr bench paper --help");
+  check_refused_at_once({"-o", at("x"), "--frobnicate"}, "vdvr-paper --help");
   check_refused_at_once({"-o", at("x"), "stray"}, "too many");
   check_refused_at_once({"-o", at("x"), "--max-memory", "lots"}, "--max-memory");
-  BOOST_TEST(run(paper({"-o", at("x"), "--device", "no such device"})).code == 3);
+  BOOST_TEST(program().run(paper({"-o", at("x"), "--device", "no such device"})).code == 3);
   BOOST_TEST(!fs::exists(at("x")));
 }
 
-BOOST_AUTO_TEST_CASE(the_case_explains_itself) {
-  const Ended r = run({"bench", "paper", "--help"});
+BOOST_AUTO_TEST_CASE(the_program_explains_itself) {
+  const Ended r = program().run({"--help"});
   BOOST_TEST(r.code == 0);
-  BOOST_TEST(r.out.rfind("usage: vdvr bench paper ", 0) == 0);
+  BOOST_TEST(r.out.rfind("usage: vdvr-paper ", 0) == 0);
   for (const char* option : {"--output", "--quick", "--head", "--force"})
     BOOST_TEST(r.out.find(option) != std::string::npos, option);
+}
+
+BOOST_AUTO_TEST_CASE(the_library_s_command_line_has_no_such_case_any_more) {
+  check_refused({"bench", "paper", "-o", at("x")}, "'paper' is not a case");
 }
 
 BOOST_AUTO_TEST_CASE(a_report_without_a_folder_is_refused) {
@@ -93,7 +110,8 @@ BOOST_AUTO_TEST_CASE(a_file_in_the_place_of_the_folder_is_refused_and_kept) {
 }
 
 BOOST_AUTO_TEST_CASE(no_file_of_an_earlier_report_is_overwritten_without_force) {
-  for (const std::string name : {"paper.json", "paper.html", "claims.csv", "figure-13.png", "figure-3.svg"}) {
+  for (const std::string name :
+       {"paper.json", "paper.html", "claims.csv", "figure-13-1.png", "figure-12-field.npy", "figure-3.svg"}) {
     const std::string place = "report of " + name;
     fs::create_directories(at(place));
     write(at(place) + "/" + name, "kept");
