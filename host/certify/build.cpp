@@ -63,9 +63,9 @@ class Builder {
     bricks_.granularity = plan.layout.granularity;
     bricks_.rate = plan.rates.gold;
     bricks_.coarsening = plan.layout.coarsening;
-    bricks_.sampled = plan.settings.coefficients == "sampled";
+    bricks_.sampled = plan.settings.comparison.coefficients == Coefficients::sampled;
     choose_storage(options.storage);
-    closing_ = options.closing;
+    closing_ = plan.settings.comparison.closing;
     selected_ = bricks_of(options.roi, bricks_.grid, bricks_.granularity);
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
@@ -84,9 +84,9 @@ class Builder {
                           plan.rates.upsampling,
                           plan.rates.interpolation,
                           options.window};
-    settings.midrange = plan.settings.coefficients == "midrange";
+    settings.midrange = !bricks_.sampled;
     settings.anisotropic = plan.layout.levels == Levels::anisotropic && closing_ != Closing::paper;
-    settings.grid_only = plan.settings.terms == "grid";
+    settings.grid_only = plan.settings.comparison.terms == Terms::grid;
     settings.coarsening = plan.layout.coarsening;
     settings.lattice = bricks_.lattice;
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
@@ -290,7 +290,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.budget.arithmetic = {builder.arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
-  c.comparison = is_comparison(plan.settings, options);
+  c.comparison = plan.settings.comparison.is_never_certified();
   // Of a volume without a tested node nothing is certified.
   const bool certified = !c.comparison && worst;
   c.holds_buffer = certified && c.total_buffer <= c.epsilon_abs;
@@ -320,7 +320,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
     if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
   if (c.comparison)
     c.notes.push_back(fmt::format("built for comparison with {}: nothing is certified",
-                                  plan.settings.terms == "grid"
+                                  plan.settings.comparison.terms == Terms::grid
                                       ? "terms grid, which test |V - gold| alone"
                                       : "closing none, whose field is not continuous"));
   c.notes.push_back(
@@ -370,7 +370,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
                                                plan.rates.gold, underflow);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || attempt >= 2 || is_comparison(plan.settings, options)) {
+    if (holds || attempt >= 2 || result.certificate.comparison) {
       result.seconds = builder.seconds();
       return result;
     }

@@ -234,7 +234,7 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   plan.epsilon = given;
   plan.epsilon_abs = given * plan.reference_range;
-  if (tolerance.absolute || tolerance.of_max) {
+  if (tolerance.absolute || plan.settings.comparison.epsilon_of_max) {
     plan.epsilon_abs = tolerance.absolute ? given : given * largest;
     plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   }
@@ -315,7 +315,7 @@ class Planner {
     reconstruct_reference();
     sups_ = field_sups(state_, *upsampler_, filtered_);
     set_epsilon(plan_, tolerance,
-                tolerance.of_max
+                plan_.settings.comparison.epsilon_of_max
                     ? largest_of_gold(state_, filtered_, *upsampler_, sups_, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
@@ -345,10 +345,10 @@ class Planner {
     plan_.reference_range = range.high - range.low;
   }
 
-  [[nodiscard]] bool grid_only() const { return plan_.settings.terms == "grid"; }
+  [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
   [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
     GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
-    s.midrange = plan_.settings.coefficients == "midrange";
+    s.midrange = plan_.settings.comparison.coefficients == Coefficients::midrange;
     s.grid_only = grid_only();
     s.anisotropic = plan_.layout.levels == Levels::anisotropic;
     s.coarsening = plan_.layout.coarsening;
@@ -420,7 +420,7 @@ class Planner {
   // How coarse the base is, and its samples.
   void lay_out_base(const Trial& t) {
     plan_.layout.coarsening = coarsening_of(plan_, *coverage_, settings_at(plan_.rates), t);
-    if (plan_.settings.coefficients != "midrange") return;
+    if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
     preparation_ += seconds_of([&] {
       plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
       fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {});

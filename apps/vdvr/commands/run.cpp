@@ -7,7 +7,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
@@ -144,7 +144,7 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
 int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
               const std::filesystem::path& output, OutputFolder& folder) {
   Device device = open_device(common);
-  ProgressLine line(args.command(), common.quiet);
+  ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
   out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress); });
@@ -176,7 +176,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
 
   const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
   print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
-  return certificate_exit_code(args.command(), certificate);
+  return certificate_exit_code(args.who(), certificate);
 }
 
 }  // namespace
@@ -193,7 +193,7 @@ int run_command(Arguments& args) {
   Wanted wanted = wanted_of(args);
   wanted.options.plan.foresee = false;
   wanted.compression = compression(args);
-  if (is_comparison(wanted.options.plan, wanted.options.build))
+  if (wanted.options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);
