@@ -48,9 +48,14 @@ std::string resolve_source(const std::string& name) {
   return out;
 }
 
-const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+std::string build_options(const Defines& defines) {
   std::string options = "-cl-std=CL1.2 -Werror -DVDVR_DIALECT_OPENCL";
   for (const auto& [key, value] : defines) options += fmt::format(" -D{}={}", key, value);
+  return options;
+}
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  const std::string options = build_options(defines);
   const std::string cache_key = name + ' ' + options;
   const std::lock_guard guard(state.programs_lock_);
   if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
