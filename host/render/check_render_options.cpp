@@ -17,20 +17,6 @@ bool is_finite(const Vec3& v) {
   return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
 }
 
-void check_camera(const Camera& c) {
-  if (!is_finite(c.position) || !is_finite(c.focal_point) || !is_finite(c.view_up))
-    throw InputError("the camera's position, focal point and view-up must be finite");
-  if (!(c.view_angle_deg > 0 && c.view_angle_deg < 180))
-    throw InputError(
-        fmt::format("`camera_view_angle` {} must lie between 0 and 180 degrees", c.view_angle_deg));
-  const glm::dvec3 view = to_glm(c.focal_point) - to_glm(c.position), up = to_glm(c.view_up);
-  if (!(glm::length(view) > 0))
-    throw InputError("`camera_position` and `camera_focal_point` are the same point");
-  if (!(glm::length(glm::cross(view, up)) > 1e-9 * glm::length(view) * glm::length(up)) ||
-      !(glm::length(up) > 0))
-    throw InputError("`camera_view_up` is parallel to the direction of view; choose another");
-}
-
 void check_transfer(const TransferFunction& f) {
   if (f.points.empty()) throw InputError(fmt::format("transfer function '{}' has no points", f.name));
   for (std::size_t i = 0; i < f.points.size(); ++i) {

@@ -48,7 +48,8 @@ std::vector<std::string> file_names() {
 void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, const Progress& progress) {
   const MixedVolume& volume = out.built.volume;
   const Brightness bright = brightness_of(volume);
-  ResidentVolume resident(device, volume);
+  const ResidentVolume resident(device, volume);
+  Renderer renderer(device, resident);
   RenderOptions o;
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
@@ -59,7 +60,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
     report(progress, "render", 0);
-    const RenderResult r = raycast(device, resident, o);
+    const RenderResult r = renderer.render(o);
     write_png(folder.file(name), r.image);
     out.files.emplace_back(name, what);
     out.outside[name] = outside_certificate(o);
@@ -76,9 +77,9 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     RenderOptions bound = o;
     bound.output = RenderOutput::error;
     bound.height -= kErrorCaption;
-    resident.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
+    renderer.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
     write_png(folder.file("bound.png"),
-              bound_picture(raycast(device, resident, bound).values, out.built.certificate.epsilon_abs));
+              bound_picture(renderer.render(bound).values, out.built.certificate.epsilon_abs));
     out.files.emplace_back("bound.png", "how far the samples behind each pixel of dvr.png can lie from F");
     o.mode = RenderMode::iso;
     draw("iso.png", fmt::format("iso-surface at {:.4g}", bright.threshold));
