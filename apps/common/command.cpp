@@ -7,6 +7,7 @@
 #include <new>
 
 #include "apps/common/arguments.hpp"
+#include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
@@ -16,8 +17,8 @@ namespace {
 
 /// Errors of usage and input are one line each; a build log or a list of devices may take more.
 std::string as_message(const Error& error) {
-  std::string text = error.what();
-  if (error.exit_code() > 2) return text;
+  std::string text = with_options(error.what());
+  if (exit_code_of(error) > 2) return text;
   for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, " ");
   return text;
 }
@@ -43,7 +44,7 @@ int run_guarded(const Command& command, std::vector<std::string> words) {
     if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);
     return code;
   } catch (const Error& e) {
-    return fail(who, as_message(e), e.exit_code());
+    return fail(who, as_message(e), exit_code_of(e));
   } catch (const std::bad_alloc&) {
     return fail(who, "out of memory; choose a smaller --size, or set --max-memory", 3);
   } catch (const std::exception& e) {

@@ -31,9 +31,9 @@ Json speed_json(const Speed& s) {
 }
 
 Json case_json(const Case& c) {
-  Json options = {{"u", c.certificate.upsampling_u},
-                  {"u_filter", c.certificate.u_filter},
-                  {"gold", c.certificate.gold_rate},
+  Json options = {{"u", c.certificate.rates.upsampling},
+                  {"u_filter", text_of(c.certificate.rates.interpolation)},
+                  {"gold", c.certificate.rates.gold},
                   {"granularity", c.volume.granularity}};
   return {{"settings", text_of(c.settings)},
           {"epsilon", c.epsilon},

@@ -81,7 +81,7 @@ int resumable(const Journal& journal, const std::function<int()>& work) {
     return work();
   } catch (const Interrupted& e) {
     if (journal.records() == 0) throw;
-    throw Interrupted(e.exit_code(), stays);
+    throw Interrupted(e.reason(), stays);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include <cstdio>
 
+#include "apps/common/messages.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;
@@ -102,7 +103,7 @@ std::string bytes_text(std::uint64_t bytes) {
 }
 
 void print_notes(const std::vector<std::string>& notes) {
-  for (const auto& note : notes) fmt::print("  note         {}\n", note);
+  for (const auto& note : notes) fmt::print("  note         {}\n", with_options(note));
 }
 
 void print_scan(const ProjectionSet& scan) {

@@ -16,7 +16,7 @@ struct Camera {
 };
 /// Throws InputError: not finite, position and focal point the same, a view_up that is 0 or, within 1e-6 of
 /// the sine between them, parallel to the view, an angle outside (0, 180). Whoever takes a camera asks it.
-void check_camera(const Camera& camera);
+VDVR_API void check_camera(const Camera& camera);
 /// Azimuth 0 looks along -y with +x to the right, view-up -z (docs/geometry.md); the azimuth turns about z.
 /// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits
 /// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError.

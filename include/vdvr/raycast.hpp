@@ -107,7 +107,7 @@ class VDVR_API Renderer {
   /// across x.
   ///
   /// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
-  /// Mode `error` throws InputError: error slices are not ray-cast (`run`, `render --mode error`). Output
+  /// Mode `error` throws InputError: error slices are not ray-cast (error_slice.hpp). Output
   /// `error` does without set_bounds(). Of scenes see d2vr.hpp.
   RenderResult render(const RenderOptions& options);
   /// [bz][by][bx] what the field errs by at most in each brick, infinite where nothing is known
