@@ -37,6 +37,7 @@ const ResidentVolume& volume(std::int64_t n) {
 void frames(benchmark::State& state, RenderMode mode, const char* preset, bool skip,
             Classification classification = Classification::post, StepMode step_mode = StepMode::fixed) {
   const ResidentVolume& v = volume(state.range(0));
+  Renderer renderer(device(), v);
   RenderOptions o;
   o.mode = mode;
   o.surfaces = {{0.6}};
@@ -47,7 +48,7 @@ void frames(benchmark::State& state, RenderMode mode, const char* preset, bool s
   double azimuth = 0, samples = 0;
   for (auto _ : state) {
     o.camera = orbit_camera(v.grid(), azimuth += 6, 20, 1.3);
-    samples += static_cast<double>(raycast(device(), v, o).samples);
+    samples += static_cast<double>(renderer.render(o).samples);
   }
   state.counters["fps"] =
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "apps/vdvr/inputs.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
 
@@ -60,7 +60,7 @@ std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions
   for (const auto& file : outputs) io::remove_leftovers(file);
   if (!common.quiet && resume != journal->found())
     say(fmt::format(
-        "vdvr {}: {} {}\n", args.command(), journal->path().string(),
+        "{}: {} {}\n", args.who(), journal->path().string(),
         resume ? "does not exist: nothing to resume, starting afresh"
                : "is of an unfinished build, which --resume would have continued: it will be replaced"));
   return journal;
@@ -81,21 +81,21 @@ int resumable(const Journal& journal, const std::function<int()>& work) {
     return work();
   } catch (const Interrupted& e) {
     if (journal.records() == 0) throw;
-    throw Interrupted(e.exit_code(), stays);
+    throw Interrupted(e.reason(), stays);
   }
 }
 
-int certificate_exit_code(const char* command, const Certificate& certificate) {
+int certificate_exit_code(const std::string& who, const Certificate& certificate) {
   if (certificate.comparison) {
-    say(fmt::format("vdvr {}: a volume for comparison: nothing is certified\n", command));
+    say(fmt::format("{}: a volume for comparison: nothing is certified\n", who));
     return 1;
   }
   if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
-  say(fmt::format(
-      "vdvr {}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
-      "render with "
-      "--sampler buffer, or ask for a larger epsilon\n",
-      command));
+  say(
+      fmt::format("{}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
+                  "render with "
+                  "--sampler buffer, or ask for a larger epsilon\n",
+                  who));
   return 1;
 }
 

@@ -49,6 +49,6 @@ int resumable(const Journal& journal, const std::function<int()>& work);
 
 /// 0 when the certificate holds for every sampler of the device it was built on, else 1 after a line on
 /// stderr.
-int certificate_exit_code(const char* command, const Certificate& certificate);
+int certificate_exit_code(const std::string& who, const Certificate& certificate);
 
 }  // namespace vdvr::cli

@@ -1,19 +1,12 @@
-// The table of commands. main.cpp looks a command up, hands it its arguments and turns exceptions into exit
-// codes; each command lives in the file of its name.
+// The table of commands. main.cpp looks a command up, and hands it its arguments; each command lives in the
+// file of its name.
 #pragma once
 
 #include <vector>
 
+#include "apps/common/command.hpp"
+
 namespace vdvr::cli {
-
-class Arguments;
-
-struct Command {
-  const char* name;
-  const char* usage;    ///< what follows the name on the usage line
-  const char* purpose;  ///< one line
-  int (*run)(Arguments& args);
-};
 
 const std::vector<Command>& commands();
 

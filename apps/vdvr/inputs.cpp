@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -57,9 +57,9 @@ VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unveri
   VdvrFile file = read_certified(path, common.max_memory);
   if (file.seal == Seal::none && !common.quiet)
     say(
-        fmt::format("vdvr {}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
+        fmt::format("{}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "
                     "its certificate with the projections\n",
-                    args.command(), path.string()));
+                    args.who(), path.string()));
   return file;
 }
 

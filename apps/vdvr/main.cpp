@@ -1,19 +1,10 @@
-// vdvr: the command line. Finds the command in the table, runs it, and maps exceptions to exit codes:
-// 0 done, 1 mismatch or tolerance out of reach, 2 bad usage or input, 3 device or resource, 130/143
-// interrupted.
+// vdvr: the command line. Finds the command in the table and runs it.
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <exception>
-#include <new>
 #include <string>
 #include <vector>
 
-#include "apps/vdvr/arguments.hpp"
 #include "apps/vdvr/command.hpp"
-#include "apps/vdvr/progress.hpp"
-#include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
 
@@ -45,41 +36,6 @@ void print_overview() {
   fmt::print(
       "usage: vdvr COMMAND [options]\n       vdvr COMMAND --help\n       vdvr --version\n\ncommands:\n");
   for (const Command& c : commands()) fmt::print("  {:<12} {}\n", c.name, c.purpose);
-}
-
-/// Errors of usage and input are one line each; a build log or a list of devices may take more.
-std::string as_message(const Error& error) {
-  std::string text = error.what();
-  if (error.exit_code() > 2) return text;
-  for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, " ");
-  return text;
-}
-
-/// What fails once a stop was requested fails for that: a compiler whose files its own handler removed.
-int fail(const std::string& who, std::string message, int code) {
-  if (const int stop = stop_requested(); stop != 0 && stop != code) {
-    message = "interrupted";
-    code = stop;
-  }
-  say(fmt::format("{}: {}\n", who, message));
-  return code;
-}
-
-int run_guarded(const Command& command, std::vector<std::string> tokens) {
-  const std::string who = fmt::format("vdvr {}", command.name);
-  try {
-    catch_signals(command.name);
-    Arguments args(command, std::move(tokens));
-    const int code = command.run(args);
-    if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);
-    return code;
-  } catch (const Error& e) {
-    return fail(who, as_message(e), e.exit_code());
-  } catch (const std::bad_alloc&) {
-    return fail(who, "out of memory; choose a smaller --size, or set --max-memory", 3);
-  } catch (const std::exception& e) {
-    return fail(who, e.what(), 3);
-  }
 }
 
 int dispatch(const std::vector<std::string>& words) {

@@ -47,8 +47,6 @@ const std::vector<Limited> kBuildLimits{
      "error terms that are charged (default all; grid is for comparison, never certified)"},
     {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of (default range)"}};
 
-const std::map<std::string, Closing> kClosings{
-    {"coarse", Closing::coarse}, {"paper", Closing::paper}, {"none", Closing::none}};
 const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::automatic},
                                                     {"f32", StorageChoice::f32},
                                                     {"u16", StorageChoice::u16},
@@ -65,26 +63,6 @@ std::optional<int> rate(const Arguments& args, const std::string& name, std::int
 }
 
 }  // namespace
-
-void add_common(Arguments& args) {
-  args.group("Common")
-      .value("device", "INDEX|cpu|gpu|NAME", "OpenCL device (default: a GPU if there is one)")
-      .value("max-memory", "2G", "limit of our host and device allocations together")
-      .flag("json", "one JSON object on standard output, nothing else")
-      .flag("quiet", "no progress and no summary")
-      .flag("force", "overwrite existing outputs")
-      .flag("help,h", "this text");
-}
-
-CommonOptions common_options(const Arguments& args) {
-  CommonOptions common;
-  common.device = args.text_or("device", "");
-  if (args.has("max-memory")) common.max_memory = parse_bytes("--max-memory", args.text("max-memory"));
-  common.json = args.has("json");
-  common.quiet = args.has("quiet");
-  common.force = args.has("force");
-  return common;
-}
 
 void add_scan(Arguments& args) {
   args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view");
@@ -179,7 +157,6 @@ Tolerance tolerance(const Arguments& args) {
   if (args.has("epsilon") == args.has("epsilon-abs"))
     throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
   Tolerance result;
-  result.of_max = args.choice("epsilon-of", {"range", "max"}, args.has("paper") ? "max" : "range") == "max";
   if (args.has("epsilon-abs")) {
     result.absolute = args.positive_or("epsilon-abs", 0);
     return result;
@@ -235,8 +212,6 @@ BuildOptions build_options(const Arguments& args) {
   for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
   const bool paper = args.has("paper");
   BuildOptions build;
-  build.closing =
-      kClosings.at(args.choice("closing", {"coarse", "paper", "none"}, paper ? "paper" : "coarse"));
   build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
   if (const auto w = args.numbers("window", 2)) {
     if (!((*w)[0] <= (*w)[1])) throw InputError(fmt::format("--window: {} lies above {}", (*w)[0], (*w)[1]));
@@ -269,16 +244,37 @@ std::optional<LevelTriple> coarsening(const Arguments& args) {
 
 }  // namespace
 
-PlanSettings plan_settings(const Arguments& args) {
+namespace {
+
+/// One of `values` by its name; `fallback` where the option is not given.
+template <class T>
+T choice_of(const Arguments& args, const std::string& name, const std::vector<T>& values, T fallback) {
+  std::vector<std::string> names;
+  for (const T value : values) names.emplace_back(text_of(value));
+  const std::string given = args.choice(name, names, text_of(fallback));
+  return values[static_cast<std::size_t>(std::find(names.begin(), names.end(), given) - names.begin())];
+}
+
+Comparison comparison(const Arguments& args) {
   const bool paper = args.has("paper");
+  Comparison c;
+  c.coefficients = choice_of(args, "coefficients", {Coefficients::midrange, Coefficients::sampled},
+                             paper ? Coefficients::sampled : Coefficients::midrange);
+  c.terms = choice_of(args, "terms", {Terms::all, Terms::grid}, paper ? Terms::grid : Terms::all);
+  c.closing = choice_of(args, "closing", {Closing::coarse, Closing::paper, Closing::none},
+                        paper ? Closing::paper : Closing::coarse);
+  c.epsilon_of_max = args.choice("epsilon-of", {"range", "max"}, paper ? "max" : "range") == "max";
+  return c;
+}
+
+}  // namespace
+
+PlanSettings plan_settings(const Arguments& args) {
   PlanSettings settings;
-  settings.coefficients =
-      args.choice("coefficients", {"midrange", "sampled"}, paper ? "sampled" : "midrange");
-  settings.terms = args.choice("terms", {"all", "grid"}, paper ? "grid" : "all");
-  const std::string levels =
-      args.choice("levels", {"isotropic", "anisotropic"},
-                  paper || build_options(args).closing == Closing::paper ? "isotropic" : "anisotropic");
-  settings.levels = levels == "isotropic" ? Levels::isotropic : Levels::anisotropic;
+  settings.comparison = comparison(args);
+  const bool paper = args.has("paper"), paper_closing = settings.comparison.closing == Closing::paper;
+  settings.levels = choice_of(args, "levels", {Levels::isotropic, Levels::anisotropic},
+                              paper || paper_closing ? Levels::isotropic : Levels::anisotropic);
   settings.granularity = static_cast<int>(args.integer_or("granularity", settings.granularity, 1, 8));
   if (!is_power_of_two(settings.granularity))
     throw InputError(fmt::format("--granularity: {} is not one of 1, 2, 4, 8", settings.granularity));
@@ -286,11 +282,11 @@ PlanSettings plan_settings(const Arguments& args) {
   if (settings.coarsening.value_or(LevelTriple{}) != LevelTriple{} && settings.levels == Levels::isotropic)
     throw InputError(
         "--base: isotropic levels have the grid itself as their base; take --levels anisotropic");
-  if (settings.coefficients == "midrange" && build_options(args).closing == Closing::paper)
+  if (settings.comparison.coefficients == Coefficients::midrange && paper_closing)
     throw InputError(
         "--closing paper feeds bricks with samples of F: take --coefficients sampled with it, or --closing "
         "coarse");
-  if (settings.levels == Levels::anisotropic && build_options(args).closing == Closing::paper)
+  if (settings.levels == Levels::anisotropic && paper_closing)
     throw InputError("--closing paper is defined for --levels isotropic only; or take --closing coarse");
   return settings;
 }

@@ -4,25 +4,14 @@
 
 #include <optional>
 
-#include "apps/vdvr/arguments.hpp"
+#include "apps/common/common_options.hpp"
 #include "vdvr/build.hpp"
 #include "vdvr/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/plan.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
-
-struct CommonOptions {
-  std::string device;
-  std::uint64_t max_memory = 0;
-  bool json = false, quiet = false, force = false;
-};
-
-void add_common(Arguments& args);
-CommonOptions common_options(const Arguments& args);
-inline Device open_device(const CommonOptions& common) { return Device(common.device, common.max_memory); }
 
 /// --angles-file, for stacks that carry no angles.
 void add_scan(Arguments& args);

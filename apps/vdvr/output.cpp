@@ -8,7 +8,7 @@
 
 #include <cstdio>
 
-#include "vdvr/output_file.hpp"
+#include "apps/common/messages.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;
@@ -28,44 +28,6 @@ void check_output(const fs::path& path, bool force, const std::vector<fs::path>&
   if (!fs::is_directory(folder, ignored))
     throw InputError(fmt::format("{}: folder '{}' does not exist", path.string(), folder.string()));
 }
-
-OutputFolder::OutputFolder(fs::path folder, std::vector<std::string> names, bool force)
-    : folder_(std::move(folder)), names_(std::move(names)) {
-  std::error_code error;
-  if (fs::exists(folder_, error) && !fs::is_directory(folder_, error))
-    throw InputError(fmt::format("{}: is a file, not a folder", folder_.string()));
-  for (const auto& name : names_)
-    if (fs::exists(folder_ / name, error) && !force)
-      throw InputError(fmt::format("{}: exists already; --force overwrites it", (folder_ / name).string()));
-  made_ = fs::create_directories(folder_, error);
-  if (error) throw InputError(fmt::format("{}: cannot be created: {}", folder_.string(), error.message()));
-  if (made_) io::note_temporary(folder_);
-}
-
-OutputFolder::~OutputFolder() {
-  std::error_code ignored;
-  if (made_) fs::remove(folder_, ignored);  // fails, as it should, unless empty
-  io::forget_temporary(folder_);
-}
-
-void OutputFolder::begin() {
-  std::error_code ignored;
-  for (const auto& name : names_) fs::remove(folder_ / name, ignored);
-}
-
-void OutputFolder::finish(const std::string& certificate) {
-  io::write_file(folder_ / "certificate.json", certificate + "\n");
-}
-
-void print_result(const CommonOptions& common, const Json& json, const std::function<void()>& as_text) {
-  if (common.json) {
-    fmt::print("{}\n", json.dump(2));
-  } else if (!common.quiet) {
-    as_text();
-  }
-}
-
-// --- JSON ---
 
 Json grid_json(const Grid& g) {
   return {{"cells", g.cells}, {"origin", g.origin}, {"spacing", g.spacing}, {"unit", g.unit}};
@@ -108,13 +70,6 @@ namespace {
 
 Json term_json(const ErrorTerm& t) { return {{"value", t.value}, {"method", t.method}}; }
 
-Json storage_part(const Storage& s, std::uint64_t file_bytes) {
-  return {{"samples_ratio", s.samples_ratio},
-          {"bytes_ratio", s.bytes_ratio},
-          {"device_bytes", s.device_bytes},
-          {"file_bytes", file_bytes}};
-}
-
 }  // namespace
 
 Json budget_json(const ErrorBudget& b) {
@@ -128,23 +83,11 @@ Json budget_json(const ErrorBudget& b) {
 }
 
 Json certificate_json(const Certificate& certificate) { return Json::parse(to_json(certificate)); }
-
-Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes) {
-  const Storage interior = storage_of(volume, true), whole = storage_of(volume, false);
-  Json j = storage_part(whole, file_bytes);
-  // The file does not hold the interior by itself: its bytes there are its share of those on the device.
-  const double share = static_cast<double>(interior.device_bytes) / static_cast<double>(whole.device_bytes);
-  j["interior"] = storage_part(interior, static_cast<std::uint64_t>(share * static_cast<double>(file_bytes)));
-  return j;
+std::string record_name(const Certificate& certificate) {
+  return certificate.comparison ? "comparison" : "certificate";
 }
 
 std::array<int, 3> cells_per_base_sample(const LevelTriple& c) { return {1 << c[2], 1 << c[1], 1 << c[0]}; }
-
-Json levels_json(const MixedVolume& volume) {
-  std::map<std::string, std::int64_t> counts;
-  for (const auto& l : volume.level) ++counts[fmt::format("{}{}{}", l[0], l[1], l[2])];
-  return counts;
-}
 
 Json seconds_json(const std::map<std::string, double>& seconds) { return Json(seconds); }
 
@@ -160,7 +103,7 @@ std::string bytes_text(std::uint64_t bytes) {
 }
 
 void print_notes(const std::vector<std::string>& notes) {
-  for (const auto& note : notes) fmt::print("  note         {}\n", note);
+  for (const auto& note : notes) fmt::print("  note         {}\n", with_options(note));
 }
 
 void print_scan(const ProjectionSet& scan) {

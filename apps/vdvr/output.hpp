@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/common/output_folder.hpp"
+#include "apps/common/volume_json.hpp"
 #include "apps/vdvr/options.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/grid.hpp"
@@ -19,37 +21,10 @@
 
 namespace vdvr::cli {
 
-using Json = nlohmann::ordered_json;
-
 /// InputError unless `path` may be written: its folder exists, it is none of `inputs`, and it does not exist
 /// or --force.
 void check_output(const std::filesystem::path& path, bool force,
                   const std::vector<std::filesystem::path>& inputs);
-
-/// A folder output. Made at once; taken away again when nothing came to lie in it.
-class OutputFolder {
- public:
-  /// `names`: every file that will be written; refused when one exists and not `force`.
-  OutputFolder(std::filesystem::path folder, std::vector<std::string> names, bool force);
-  ~OutputFolder();
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
-
-  /// Removes what an older run left of `names`: none of it belongs to the new certificate. Call it before the
-  /// first file.
-  void begin();
-  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
-  /// Writes certificate.json, the sign that the folder is complete. Call it last.
-  void finish(const std::string& certificate_json);
-
- private:
-  std::filesystem::path folder_;
-  std::vector<std::string> names_;
-  bool made_ = false;
-};
-
-/// The summary of a command: one JSON object with --json, else what `as_text` prints, nothing with --quiet.
-void print_result(const CommonOptions& common, const Json& json, const std::function<void()>& as_text);
 
 Json grid_json(const Grid& grid);
 Json geometry_json(const ParallelGeometry& geometry);
@@ -57,12 +32,10 @@ Json report_json(const InputReport& report);
 Json bounds_json(const std::vector<Bound>& bounds);
 Json budget_json(const ErrorBudget& budget);
 Json certificate_json(const Certificate& certificate);
-/// With `interior` inside. `file_bytes` 0: not stored in a file.
-Json storage_json(const MixedVolume& volume, std::uint64_t file_bytes);
-/// Bricks per level triple, in file order "zyx".
+/// "certificate", or "comparison" where it is the record of one.
+std::string record_name(const Certificate& certificate);
 /// Along x, y, z.
 std::array<int, 3> cells_per_base_sample(const LevelTriple& coarsening);
-Json levels_json(const MixedVolume& volume);
 Json seconds_json(const std::map<std::string, double>& seconds);
 
 std::string vec_text(const Vec3& v);

@@ -54,6 +54,7 @@ Source::Source(const Arguments& args, const CommonOptions& common, const std::st
   scene_ = open_scene(args.path("FILE"), args, method, unverified);
   device_.emplace(open_device(common));
   resident_.emplace(*device_, scene_->volume);
+  renderer_.emplace(*device_, *resident_);
 }
 
 void Source::open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress) {
@@ -68,6 +69,7 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
   device_.emplace(open_device(common));
   field_.emplace(*device_, scan, options, progress);
   projections_.emplace(*device_, *field_, grid, progress);
+  renderer_.emplace(*device_, *projections_);
   scene_ = Scene{as_mixed(projections_->samples()), std::nullopt, false};
 }
 
@@ -75,13 +77,11 @@ RenderResult Source::draw(const RenderOptions& options) {
   if (options.output == RenderOutput::error && !bounds_set_) {
     if (!scene_->certificate)
       throw InputError("--show error: the volume has no certificate to take bounds from");
-    const bool image3d = options.sampler == SamplerKind::image3d ||
-                         (options.sampler == SamplerKind::automatic && resident_->has_image3d() &&
-                          probe_sampler(*device_).chosen == "image3d");
-    resident_->set_bounds(brick_bounds(*scene_->certificate, image3d));
+    const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
+    renderer_->set_bounds(brick_bounds(*scene_->certificate, image3d));
     bounds_set_ = true;
   }
-  return projections_ ? raycast(*device_, *projections_, options) : raycast(*device_, *resident_, options);
+  return renderer_->render(options);
 }
 
 std::uint64_t Source::bytes() const { return field_ ? field_->bytes() : resident_->bytes(); }

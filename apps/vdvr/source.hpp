@@ -30,7 +30,7 @@ class Source {
   [[nodiscard]] const Scene& scene() const { return *scene_; }
   [[nodiscard]] Device& device() { return *device_; }
   [[nodiscard]] RenderResult draw(const RenderOptions& options);
-  /// On the device between frames: volume, or projections.
+  /// On the device beside what a frame needs: volume, or projections.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
@@ -39,9 +39,10 @@ class Source {
   std::optional<Scene> scene_;
   std::optional<Device> device_;
   std::optional<ResidentVolume> resident_;
-  bool bounds_set_ = false;
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
+  std::optional<Renderer> renderer_;
+  bool bounds_set_ = false;
 };
 
 }  // namespace vdvr::cli

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/round_up.hpp"
 

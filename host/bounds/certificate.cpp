@@ -172,17 +172,25 @@ void read_promise(const Member& m, Certificate& c) {
   c.epsilon = m.at("epsilon").number();
   c.epsilon_abs = m.at("epsilon_abs").number();
   c.reference_range = m.at("reference_range").number();
-  const Member holds = m.at("holds"), total = m.at("total");
-  c.holds_buffer = holds.at("buffer").flag();
   if (m.has("sealed")) c.sealed = m.at("sealed").flag();
   if (m.has("comparison")) c.comparison = m.at("comparison").flag();
-  if (holds.has("image3d")) c.holds_image3d = holds.at("image3d").flag();
-  c.total_buffer = total.at("buffer").number();
-  if (total.has("image3d")) c.total_image3d = total.at("image3d").number();
+  // A record of a comparison promises nothing; those of earlier versions said so in these two.
+  if (!c.comparison || m.has("holds") || m.has("total")) {
+    const Member holds = m.at("holds"), total = m.at("total");
+    c.holds_buffer = holds.at("buffer").flag();
+    if (holds.has("image3d")) c.holds_image3d = holds.at("image3d").flag();
+    c.total_buffer = total.at("buffer").number();
+    if (total.has("image3d")) c.total_image3d = total.at("image3d").number();
+  }
   read_budget(m.at("budget"), c.budget);
   c.measured_max = m.at("measured_max").number();
   c.measured_total = m.at("measured_total").number();
   c.worst_at = m.at("worst_at").numbers<3>();
+  if (c.comparison && !m.has("total")) {  // what a certificate would say, for those who look at it
+    const double sum = c.measured_total + c.budget.arithmetic.value;
+    c.total_buffer = sum + c.budget.sampler.buffer.value;
+    if (c.budget.sampler.image3d) c.total_image3d = sum + c.budget.sampler.image3d->value;
+  }
 }
 
 void read_method(const Member& m, Certificate& c) {
@@ -261,10 +269,12 @@ std::string to_json(const Certificate& c) {
   j["reference_range"] = finite("reference_range", c.reference_range);
   if (c.sealed) j["sealed"] = true;
   if (c.comparison) j["comparison"] = true;
-  j["holds"] = {{"buffer", c.holds_buffer}};
-  if (c.holds_image3d) j["holds"]["image3d"] = *c.holds_image3d;
-  j["total"] = {{"buffer", finite("total.buffer", c.total_buffer)}};
-  if (c.total_image3d) j["total"]["image3d"] = finite("total.image3d", *c.total_image3d);
+  if (!c.comparison) {
+    j["holds"] = {{"buffer", c.holds_buffer}};
+    if (c.holds_image3d) j["holds"]["image3d"] = *c.holds_image3d;
+    j["total"] = {{"buffer", finite("total.buffer", c.total_buffer)}};
+    if (c.total_image3d) j["total"]["image3d"] = finite("total.image3d", *c.total_image3d);
+  }
   j["budget"] = budget(c.budget);
   j["measured_max"] = finite("measured_max", c.measured_max);
   j["measured_total"] = finite("measured_total", c.measured_total);
@@ -317,7 +327,7 @@ std::vector<float> brick_bounds(const Certificate& c, bool image3d) {
         "the file has no bounds by brick: an earlier version wrote it, or nothing is certified; build it "
         "again");
   if (image3d && !c.budget.sampler.image3d)
-    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+    throw InputError("the certificate says nothing of the image3d sampler; take `sampler` buffer");
   const double rest =
       c.budget.arithmetic.value + (image3d ? *c.budget.sampler.image3d : c.budget.sampler.buffer).value;
   std::vector<float> bounds(c.brick_totals.size());

@@ -1,4 +1,4 @@
-#include "host/bounds/spectral_error.hpp"
+#include "vdvr/spectral_error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -15,7 +15,7 @@
 #include "host/certify/close_boundaries.hpp"
 #include "host/certify/raise_levels.hpp"
 #include "host/certify/result_units.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/gold/worst_node.hpp"
 #include "host/opencl/host_memory.hpp"
@@ -63,15 +63,15 @@ class Builder {
     bricks_.granularity = plan.layout.granularity;
     bricks_.rate = plan.rates.gold;
     bricks_.coarsening = plan.layout.coarsening;
-    bricks_.sampled = plan.settings.coefficients == "sampled";
+    bricks_.sampled = plan.settings.comparison.coefficients == Coefficients::sampled;
     choose_storage(options.storage);
-    closing_ = options.closing;
+    closing_ = plan.settings.comparison.closing;
     selected_ = bricks_of(options.roi, bricks_.grid, bricks_.granularity);
     bricks_.level.assign(selected_.size(), LevelTriple{0, 0, 0});
     bricks_.involved.assign(selected_.size(), 0);
     bricks_.samples.resize(selected_.size());
     if (std::find(selected_.begin(), selected_.end(), 1) == selected_.end())
-      throw InputError("--roi meets no brick of the grid");
+      throw InputError("`roi` meets no brick of the grid");
 
     filtered_ = filter_projections(state_, scan, plan.field, progress, FilterMethod::automatic,
                                    Precision::fp64, units);
@@ -84,9 +84,9 @@ class Builder {
                           plan.rates.upsampling,
                           plan.rates.interpolation,
                           options.window};
-    settings.midrange = plan.settings.coefficients == "midrange";
+    settings.midrange = !bricks_.sampled;
     settings.anisotropic = plan.layout.levels == Levels::anisotropic && closing_ != Closing::paper;
-    settings.grid_only = plan.settings.terms == "grid";
+    settings.grid_only = plan.settings.comparison.terms == Terms::grid;
     settings.coarsening = plan.layout.coarsening;
     settings.lattice = bricks_.lattice;
     gold_.emplace(state_, filtered_, *upsampler_, sups_, settings);
@@ -205,7 +205,7 @@ class Builder {
                     "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
                     to_world(plan_.epsilon_abs, units_), projection ? "the projections" : "gold",
                     to_world(static_cast<double>(slack), units_), to_world(strict, units_),
-                    projection ? "--upsampling, or take --u-filter cubic," : "--gold",
+                    projection ? "`upsampling`, or take `u_filter` cubic," : "`gold`",
                     to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(slack) - strict), units_)));
   }
 
@@ -218,12 +218,12 @@ class Builder {
         to_world(tolerance, units_));
     if (rounds())
       throw ToleranceError(found +
-                           fmt::format("where integer samples round by up to {:.4g}; --storage auto or "
+                           fmt::format("where integer samples round by up to {:.4g}; `storage` auto or "
                                        "f32 may do",
                                        to_world(0.5 * bricks_.lattice.step, units_)));
     throw ToleranceError(
         found +
-        fmt::format("where rounding in fp32 moved gold; raise --gold or allow at least "
+        fmt::format("where rounding in fp32 moved gold; raise `gold` or allow at least "
                     "{:.4g}",
                     to_world(plan_.epsilon_abs + 1.1 * (static_cast<double>(total) - tolerance), units_)));
   }
@@ -290,7 +290,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
   c.budget.arithmetic = {builder.arithmetic(), "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
-  c.comparison = is_comparison(plan.settings, options);
+  c.comparison = plan.settings.comparison.is_never_certified();
   // Of a volume without a tested node nothing is certified.
   const bool certified = !c.comparison && worst;
   c.holds_buffer = certified && c.total_buffer <= c.epsilon_abs;
@@ -320,7 +320,7 @@ Certificate certify(Builder& builder, Device& device, const ProjectionSet& scan,
     if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
   if (c.comparison)
     c.notes.push_back(fmt::format("built for comparison with {}: nothing is certified",
-                                  plan.settings.terms == "grid"
+                                  plan.settings.comparison.terms == Terms::grid
                                       ? "terms grid, which test |V - gold| alone"
                                       : "closing none, whose field is not continuous"));
   c.notes.push_back(
@@ -370,7 +370,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
                                                plan.rates.gold, underflow);
     result.certificate = certify(builder, device, scan, plan, options, result.volume, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || attempt >= 2 || is_comparison(plan.settings, options)) {
+    if (holds || attempt >= 2 || result.certificate.comparison) {
       result.seconds = builder.seconds();
       return result;
     }

@@ -33,10 +33,6 @@ std::string digest(const ProjectionSet& scan, const Plan& plan) {
   return sha.hex();
 }
 
-const char* name(Closing closing) {
-  return closing == Closing::coarse ? "coarse" : closing == Closing::paper ? "paper" : "none";
-}
-
 const char* name(StorageChoice storage) {
   switch (storage) {
     case StorageChoice::f32:
@@ -72,17 +68,17 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"epsilon", exact(plan.epsilon_abs)},
       {"rates", fmt::format("u {}x {}, gold {}x", plan.rates.upsampling, text_of(plan.rates.interpolation),
                             plan.rates.gold)},
-      {"coefficients", plan.settings.coefficients},
+      {"coefficients", text_of(plan.settings.comparison.coefficients)},
       {"levels", text_of(plan.layout.levels)},
-      {"terms", plan.settings.terms},
+      {"terms", text_of(plan.settings.comparison.terms)},
       {"base", fmt::format("{}", fmt::join(plan.layout.coarsening, ","))},
       {"granularity", std::to_string(stream.settings().granularity)},
-      {"closing", name(options.closing)},
+      {"closing", text_of(plan.settings.comparison.closing)},
       {"storage", name(options.storage)},
       {"window",
        options.window ? exact_list(std::array{options.window->first, options.window->second}) : "none"},
       {"roi", options.roi ? exact_list(*options.roi) : "none"},
-      {"bricks per block, by --max-memory", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
+      {"bricks per block, by `max_memory`", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
       {"tolerance of a node", exact(tolerance)},
       {"plan", digest(scan, plan)}};
   return head;

@@ -13,10 +13,6 @@
 namespace vdvr {
 namespace {
 
-const char* text_of(Closing closing) {
-  return closing == Closing::coarse ? "coarse" : closing == Closing::paper ? "paper" : "none";
-}
-
 const char* text_of(StorageChoice storage) {
   switch (storage) {
     case StorageChoice::f32:
@@ -35,35 +31,35 @@ const char* text_of(StorageChoice storage) {
 void check_options(const CertifyOptions& options) {
   const BuildOptions& build = options.build;
   if (build.window && !(build.window->first <= build.window->second))
-    throw InputError(fmt::format("window: {} lies above {}", build.window->first, build.window->second));
+    throw InputError(fmt::format("`window`: {} lies above {}", build.window->first, build.window->second));
   if (build.roi)
     for (std::size_t a = 0; a < 3; ++a)
       if (!((*build.roi)[a] < (*build.roi)[a + 3]))
-        throw InputError(fmt::format("roi: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
+        throw InputError(fmt::format("`roi`: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
   const PlanSettings& plan = options.plan;
   if (plan.levels == Levels::isotropic && plan.coarsening.value_or(LevelTriple{}) != LevelTriple{})
     throw InputError("coarsening: isotropic levels have the grid itself as their base");
-  if (build.closing != Closing::paper) return;
-  if (plan.coefficients != "sampled")
-    throw InputError("closing 'paper' feeds bricks with samples of F: take coefficients 'sampled' with it");
+  if (plan.comparison.closing != Closing::paper) return;
+  if (plan.comparison.coefficients != Coefficients::sampled)
+    throw InputError("`closing` paper feeds bricks with samples of F: take `coefficients` sampled with it");
   if (plan.levels != Levels::isotropic)
-    throw InputError("closing 'paper' is defined for isotropic levels only");
+    throw InputError("`closing` paper is defined for isotropic levels only");
 }
 
 // What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
 // covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, const Tolerance& tolerance,
-                         const ParallelGeometry& geometry) {
+std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry) {
+  const Comparison& comparison = plan.settings.comparison;
   const LevelTriple& c = plan.layout.coarsening;
   nlohmann::ordered_json j;
   j["granularity"] = plan.layout.granularity;
   j["base"] = std::array{1 << c[2], 1 << c[1], 1 << c[0]};  // cells per base sample, x, y, z
-  j["closing"] = text_of(build.closing);
-  j["coefficients"] = plan.settings.coefficients;
+  j["closing"] = vdvr::text_of(comparison.closing);
+  j["coefficients"] = vdvr::text_of(comparison.coefficients);
   j["levels"] = vdvr::text_of(plan.layout.levels);
   j["storage"] = text_of(build.storage);
-  j["terms"] = plan.settings.terms;
-  j["epsilon_of"] = tolerance.of_max ? "max" : "range";
+  j["terms"] = vdvr::text_of(comparison.terms);
+  j["epsilon_of"] = comparison.epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.rates.upsampling;
   j["u_filter"] = vdvr::text_of(plan.rates.interpolation);
   j["gold"] = plan.rates.gold;
@@ -91,7 +87,7 @@ void refuse_empty_promise(const Certificate& c) {
   // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
   // (but in a scan of nothing but zeros, whose range is 0).
   if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
-    throw InputError("window or roi leaves no covered gold node to test: nothing would be certified");
+    throw InputError("`window` or `roi` leaves no covered gold node to test: nothing would be certified");
   if (!c.holds_buffer && !c.comparison)
     throw ToleranceError(fmt::format(
         "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",
@@ -114,16 +110,16 @@ BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& 
   CertifyOptions used = options;
   used.plan.foresee = false;
   const Plan plan = make_plan(device, scan, tolerance, used, progress);
-  return certify(device, scan, plan, tolerance, used, progress);
+  return certify(device, scan, plan, used, progress);
 }
 
-BuildResult certify(Device& device, const ProjectionSet& scan, const Plan& plan, const Tolerance& tolerance,
+BuildResult certify(Device& device, const ProjectionSet& scan, const Plan& plan,
                     const CertifyOptions& options, const Progress& progress) {
   check_options(options);
   BuildResult result = build_or_give_up(device, scan, plan, options.build, progress);
   Certificate& c = result.certificate;
   refuse_empty_promise(c);
-  c.options_json = options_json(plan, options.build, tolerance, scan.geometry);
+  c.options_json = options_json(plan, options.build, scan.geometry);
   c.content_sha256 = content_sha256(result.volume);
   return result;
 }

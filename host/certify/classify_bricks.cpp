@@ -82,12 +82,13 @@ Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
 ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
                                Journal* journal, Progress progress, Refuse refuse)
     : state_(state),
-      gold_(gold),
       bricks_(bricks),
       host_(host),
-      journal_(journal),
+      fine_(gold.fine(), journal),
       progress_(std::move(progress)),
-      refuse_(std::move(refuse)) {}
+      refuse_(std::move(refuse)) {
+  if (GoldStream* coarse = gold.coarse()) coarse_.emplace(*coarse, journal);
+}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
   return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
@@ -106,9 +107,9 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
   along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);
   std::vector<std::uint8_t> refined = near;
-  if (GoldStream* coarse = gold_.coarse()) {
+  if (coarse_) {
     std::vector<std::uint8_t> undecided(near.size(), 0);
-    test(*coarse, base, tolerance, near, "screen", [&](const Levels& l) {
+    test(*coarse_, base, tolerance, near, "screen", [&](const Levels& l) {
       const std::size_t id = at(l.base.brick);
       coarse_slack_[id] = l.base.slack;
       const Verdict verdict = coarse_verdict(l.base, tolerance);
@@ -116,21 +117,21 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
       if (verdict == Verdict::undecided) undecided[id] = 1;
       if (verdict == Verdict::within) take(l);
     });
-    test(gold_.fine(), base, tolerance, undecided, "screen", [&](const Levels& l) {
+    test(fine_, base, tolerance, undecided, "screen", [&](const Levels& l) {
       if (passes(l.base, tolerance)) take(l);
       else refined[at(l.base.brick)] = 1;
     });
     std::vector<std::uint8_t> easy = refined;
     for (std::size_t i = 0; i < easy.size(); ++i) easy[i] = easy[i] && is_easy(i, tolerance);
-    refine(*coarse, base, tolerance, easy);
+    refine(*coarse_, base, tolerance, easy);
     for (std::size_t i = 0; i < easy.size(); ++i)
       if (is_above_base(bricks_.level[i])) refined[i] = 0;
   }
-  refine(gold_.fine(), base, tolerance, refined);
+  refine(fine_, base, tolerance, refined);
 }
 
 // Level 0 only.
-void ClassifyBricks::test(GoldStream& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double tolerance,
                           const std::vector<std::uint8_t>& selected, const std::string& stage,
                           const std::function<void(const Levels&)>& visit) {
   if (!any(selected)) return;
@@ -144,14 +145,14 @@ void ClassifyBricks::test(GoldStream& gold, const DeviceField& base, double tole
               return record(batch, std::move(levels), {}, {});
             },
             [&](ByteReader in) { read(in, visit); }},
-           journal_, progress_, stage);
+           progress_, stage);
 }
 
 // Levels above 0, with their tiles. On coarse gold only levels that it can test are taken.
-void ClassifyBricks::refine(GoldStream& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, double tolerance,
                             const std::vector<std::uint8_t>& selected) {
   if (!any(selected)) return;
-  const bool fine = &gold == &gold_.fine();
+  const bool fine = &gold == &fine_;
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
                                                     "bricks to classify");
   const auto taken = [&](const Levels& l) {
@@ -180,7 +181,7 @@ void ClassifyBricks::refine(GoldStream& gold, const DeviceField& base, double to
          });
          take_tiles(in);
        }},
-      journal_, progress_, "classify", GoldStream::For::samples);
+      progress_, "classify", GoldStream::For::samples);
 }
 
 void ClassifyBricks::take(const Levels& l) {
@@ -249,7 +250,7 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const std::int64_t size = shape.tile_size(levels.at(i));
     if (size > samples.end() - next)
-      throw FileError("a journal record lacks samples; start without --resume");
+      throw FileError("a journal record lacks samples; start without `resume`");
     const auto end = next + size;
     std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
     const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();
@@ -263,23 +264,22 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
 }
 
 void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
-  gold_.fine().run(raised,
-                   {[&](GoldStream::Batch& batch) {
-                      Tiles tiles;
-                      for (const std::int64_t id : batch.bricks())
-                        tiles.emplace_back(id, bricks_.level[at(id)]);
-                      ByteWriter out;
-                      put_tiles(out, tiles, batch.extract(tiles));
-                      for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
-                      return out.take();
-                    },
-                    [&](ByteReader in) {
-                      for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
-                    }},
-                   journal_, progress_, "repair", GoldStream::For::samples);
+  fine_.run(raised,
+            {[&](GoldStream::Batch& batch) {
+               Tiles tiles;
+               for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
+               ByteWriter out;
+               put_tiles(out, tiles, batch.extract(tiles));
+               for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
+               return out.take();
+             },
+             [&](ByteReader in) {
+               for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
+             }},
+            progress_, "repair", GoldStream::For::samples);
 }
 
-void ClassifyBricks::measure_at(GoldStream& gold, const DeviceField& field, double tolerance,
+void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                                 const std::vector<std::uint8_t>& selected, const std::string& stage,
                                 const std::function<void(const BrickMeasure&)>& visit) {
   if (!any(selected)) return;
@@ -295,31 +295,31 @@ void ClassifyBricks::measure_at(GoldStream& gold, const DeviceField& field, doub
             [&](ByteReader in) {
               while (!in.empty()) visit(get_measure(in));
             }},
-           journal_, progress_, stage);
+           progress_, stage);
 }
 
 void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
                              double tolerance, const std::vector<std::uint8_t>& pending,
                              const std::string& stage) {
   std::vector<std::uint8_t> rest = pending;
-  if (GoldStream* coarse = gold_.coarse()) {
+  if (coarse_) {
     // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && resolves(*coarse, stored.at(i)) && is_easy(i, tolerance);
-    measure_at(*coarse, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
+      easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance);
+    measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
       if (coarse_verdict(m, tolerance) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
       rest[at(m.brick)] = 0;
     });
   }
-  measure_at(gold_.fine(), field, tolerance, rest, stage,
+  measure_at(fine_, field, tolerance, rest, stage,
              [&](const BrickMeasure& m) { measures_.at(at(m.brick)) = m; });
 }
 
 void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {
-  if (!gold_.coarse()) return;
-  const int rate = gold_.fine().settings().rate;
+  if (!coarse_) return;
+  const int rate = fine_.gold().settings().rate;
   for (;;) {
     float error = 0;
     std::vector<std::size_t> loose;
@@ -334,7 +334,7 @@ void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {
                       [&](std::size_t a, std::size_t b) { return measures_[a].total > measures_[b].total; });
     std::vector<std::uint8_t> selected(measures_.size(), 0);
     for (std::size_t i = 0; i < most; ++i) selected[loose[i]] = 1;
-    measure_at(gold_.fine(), field, tolerance, selected, "verify", [&](const BrickMeasure& m) {
+    measure_at(fine_, field, tolerance, selected, "verify", [&](const BrickMeasure& m) {
       // Either test bounds |V - F|.
       BrickMeasure& known = measures_.at(at(m.brick));
       const float total = std::min(known.total, m.total < 0 ? known.total : m.total);

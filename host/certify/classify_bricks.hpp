@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "host/certify/open_bricks.hpp"
+#include "host/certify/journalled_gold.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/host_memory.hpp"
 
@@ -89,12 +90,12 @@ class ClassifyBricks {
     AxisErrors along{};
     float largest_p = 0, smallest_p = 0;
   };
-  void test(GoldStream& gold, const DeviceField& base, double tolerance,
+  void test(JournalledGold& gold, const DeviceField& base, double tolerance,
             const std::vector<std::uint8_t>& selected, const std::string& stage,
             const std::function<void(const Levels&)>& visit);
-  void refine(GoldStream& gold, const DeviceField& base, double tolerance,
+  void refine(JournalledGold& gold, const DeviceField& base, double tolerance,
               const std::vector<std::uint8_t>& selected);
-  void measure_at(GoldStream& gold, const DeviceField& field, double tolerance,
+  void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
   Bytes record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
@@ -106,10 +107,10 @@ class ClassifyBricks {
   [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
   opencl::State& state_;
-  GoldRates& gold_;
   OpenBricks& bricks_;
   HostMemory& host_;
-  Journal* journal_;
+  JournalledGold fine_;
+  std::optional<JournalledGold> coarse_;
   Progress progress_;
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;

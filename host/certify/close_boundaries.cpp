@@ -170,10 +170,10 @@ class Packer {
 
 MixedVolume close_boundaries(const OpenBricks& b, Closing closing) {
   if (closing == Closing::paper) {
-    if (!b.sampled) throw InputError("--closing paper is defined for --coefficients sampled only");
+    if (!b.sampled) throw InputError("`closing` paper is defined for `coefficients` sampled only");
     for (const LevelTriple& l : b.level)
       if (l[0] != l[1] || l[1] != l[2])
-        throw InputError("--closing paper is defined for --levels isotropic only");
+        throw InputError("`closing` paper is defined for `levels` isotropic only");
   }
   return Packer(b, closing).volume();
 }

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <random>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/scan/units.hpp"
 

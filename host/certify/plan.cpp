@@ -17,7 +17,7 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/certify/result_units.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
@@ -64,10 +64,10 @@ void check_rates(const RateOptions& rates) {
     return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n));
   };
   if (rates.upsampling && !power(*rates.upsampling, 2))
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 2 to 64 (rate 1 has no bound)",
+    throw InputError(fmt::format("`upsampling` {} must be a power of two, 2 to 64 (rate 1 has no bound)",
                                  *rates.upsampling));
   if (rates.gold && !power(*rates.gold, 2))
-    throw InputError(fmt::format("--gold {} must be a power of two, 2 to 64", *rates.gold));
+    throw InputError(fmt::format("`gold` {} must be a power of two, 2 to 64", *rates.gold));
 }
 
 void check_granularity(int granularity) {
@@ -224,7 +224,7 @@ void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t
 
 void check_tolerance(const Tolerance& tolerance) {
   if (tolerance.relative.has_value() == tolerance.absolute.has_value())
-    throw InputError("give one of --epsilon and --epsilon-abs");
+    throw InputError("give one of `epsilon` and `epsilon_abs`");
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   if (!(given > 0) || !std::isfinite(given))
     throw InputError(fmt::format("a tolerance of {} must be positive and finite", given));
@@ -234,14 +234,14 @@ void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
   const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
   plan.epsilon = given;
   plan.epsilon_abs = given * plan.reference_range;
-  if (tolerance.absolute || tolerance.of_max) {
+  if (tolerance.absolute || plan.settings.comparison.epsilon_of_max) {
     plan.epsilon_abs = tolerance.absolute ? given : given * largest;
     plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   }
   if (!(plan.epsilon_abs > 0))
     throw InputError(
         "the field is constant over the covered samples, so a relative tolerance means nothing; give "
-        "--epsilon-abs");
+        "`epsilon_abs`");
 }
 
 // How much coarser than the grid the base will be.
@@ -249,8 +249,8 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
   if (const auto& wanted = plan.settings.coarsening) {
     if (is_possible(*wanted, plan.grid, s.granularity, s.rate)) return *wanted;
     throw InputError(fmt::format(
-        "--base {}x{}x{} must divide the granularity {} and the grid's {} x {} x {} cells, and "
-        "with --gold {} be at most {}",
+        "`base` {}x{}x{} must divide the granularity {} and the grid's {} x {} x {} cells, and "
+        "with `gold` {} be at most {}",
         1 << (*wanted)[2], 1 << (*wanted)[1], 1 << (*wanted)[0], s.granularity, plan.grid.cells[0],
         plan.grid.cells[1], plan.grid.cells[2], s.rate, (1 << largest_level) / s.rate));
   }
@@ -315,7 +315,7 @@ class Planner {
     reconstruct_reference();
     sups_ = field_sups(state_, *upsampler_, filtered_);
     set_epsilon(plan_, tolerance,
-                tolerance.of_max
+                plan_.settings.comparison.epsilon_of_max
                     ? largest_of_gold(state_, filtered_, *upsampler_, sups_, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
@@ -341,14 +341,14 @@ class Planner {
         static_cast<double>(range.not_covered) / static_cast<double>(plan_.grid.sample_count());
     // One plane of covered samples suffices; none does not.
     if (range.not_covered == plan_.grid.sample_count() && plan_.grid.cells[2] > 1)
-      throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+      throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
     plan_.reference_range = range.high - range.low;
   }
 
-  [[nodiscard]] bool grid_only() const { return plan_.settings.terms == "grid"; }
+  [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
   [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
     GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
-    s.midrange = plan_.settings.coefficients == "midrange";
+    s.midrange = plan_.settings.comparison.coefficients == Coefficients::midrange;
     s.grid_only = grid_only();
     s.anisotropic = plan_.layout.levels == Levels::anisotropic;
     s.coarsening = plan_.layout.coarsening;
@@ -420,7 +420,7 @@ class Planner {
   // How coarse the base is, and its samples.
   void lay_out_base(const Trial& t) {
     plan_.layout.coarsening = coarsening_of(plan_, *coverage_, settings_at(plan_.rates), t);
-    if (plan_.settings.coefficients != "midrange") return;
+    if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
     preparation_ += seconds_of([&] {
       plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
       fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {});
@@ -467,7 +467,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   if (tolerance.relative && largest_magnitude(scan.data) == 0)
     throw InputError(
         "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
-        "--epsilon-abs");
+        "`epsilon_abs`");
   const Units units = units_of(scan);
   Tolerance wanted = tolerance;
   if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);

@@ -22,7 +22,7 @@ Coverage::Coverage(const ParallelGeometry& g)
       slack_(1e-9 * g.pitch_u),
       slack_z_(1e-9 * g.pitch_v) {
   if (!(inner_ > 0))
-    throw InputError(fmt::format("the centre {} does not fall on the detector's {} columns; correct --center",
+    throw InputError(fmt::format("the centre {} does not fall on the detector's {} columns; correct `center`",
                                  g.center, g.columns));
   for (const double theta : g.theta_rad) {
     cosine_.push_back(std::cos(theta));
@@ -60,15 +60,15 @@ std::int64_t cells_around(double length, double spacing) {
 void check_grid(const Grid& grid) {
   std::int64_t product = 1;
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!std::isfinite(grid.origin[a])) throw InputError("--origin must be finite");
+    if (!std::isfinite(grid.origin[a])) throw InputError("`origin` must be finite");
     if (!(grid.spacing[a] > 0) || !std::isfinite(grid.spacing[a]))
-      throw InputError("--spacing must be positive and finite");
+      throw InputError("`spacing` must be positive and finite");
     if (grid.cells[a] < 1 || grid.cells[a] > (1 << 20))
-      throw InputError(fmt::format("--size: {} cells along axis {}, but 1 to {} are possible", grid.cells[a],
+      throw InputError(fmt::format("`size`: {} cells along axis {}, but 1 to {} are possible", grid.cells[a],
                                    "xyz"[a], 1 << 20));
     if (product > (std::int64_t{1} << 40) / (grid.cells[a] + 1))
       throw InputError(
-          fmt::format("--size {}x{}x{} passes 2^40 samples", grid.cells[0], grid.cells[1], grid.cells[2]));
+          fmt::format("`size` {}x{}x{} passes 2^40 samples", grid.cells[0], grid.cells[1], grid.cells[2]));
     product *= grid.cells[a] + 1;
   }
 }
@@ -82,7 +82,7 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
   const double d = options.spacing.value_or(geometry.pitch_u);
   grid.spacing = {d, d, options.spacing_z.value_or(options.spacing.value_or(geometry.pitch_v))};
   if (!(grid.spacing[0] > 0) || !(grid.spacing[2] > 0))
-    throw InputError("--spacing must be positive and finite");
+    throw InputError("`spacing` must be positive and finite");
   const double radius = coverage.inner_radius(), height = coverage.half_height();
   grid.cells = options.size.value_or(Index3{cells_around(2 * radius, d), cells_around(2 * radius, d),
                                             cells_around(2 * height, grid.spacing[2])});
@@ -109,7 +109,7 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
     throw InputError(fmt::format(
         "the axis projects onto column {:.2f} of {} in a scan over {:.0f} degrees: half acquisition, "
         "which needs weights in u that this version does not have; use 180 degrees of it, or correct "
-        "--center",
+        "`center`",
         g.center, g.columns, arc * 180 / std::numbers::pi));
   }
   const ViewWeights weights = view_weights(g.theta_rad);

@@ -61,7 +61,7 @@ double windowed(std::int64_t n, double cutoff, const std::function<double(double
 std::vector<double> ramp_kernel(const FieldOptions& field, double pitch, std::int64_t n) {
   const auto w = window(field.filter);
   if (!(field.cutoff > 0 && field.cutoff <= 1))
-    throw InputError(fmt::format("filter cutoff {} must be above 0 and at most 1 (Nyquist)", field.cutoff));
+    throw InputError(fmt::format("`filter_cutoff` {} must be above 0 and at most 1 (Nyquist)", field.cutoff));
   const bool closed_form = field.filter == RampWindow::ram_lak && field.cutoff == 1.0;
   std::vector<double> g(static_cast<std::size_t>(n));
   for (std::int64_t i = 0; i < n; ++i) {

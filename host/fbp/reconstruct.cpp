@@ -14,7 +14,7 @@
 
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/huge_pages.hpp"
@@ -75,8 +75,8 @@ std::int64_t slab_rows(const opencl::State& state, const ParallelGeometry& g, co
   while (rows > 16 && bytes(rows) > budget) rows = (rows + 1) / 2;
   if (bytes(rows) > std::min(budget, state.info.max_allocation)) {
     throw ResourceError(fmt::format(
-        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise --max-memory "
-        "or lower --upsampling",
+        "{} views of {} upsampled columns need {:.1f} MiB per slab of {} rows; raise `max_memory` "
+        "or lower `upsampling`",
         g.views(), columns.count, static_cast<double>(bytes(rows)) / (1 << 20), rows));
   }
   return rows;
@@ -137,7 +137,7 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
   });
   const auto kept = kept_columns(g, grid);
   if (std::none_of(kept.begin(), kept.end(), [](const auto& k) { return k[0] <= k[1]; }))
-    throw InputError("no sample of the grid is covered by the scan; change --origin, --size or --center");
+    throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
   Volume volume{grid, {}};
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
     const std::int64_t nz = std::min(rows, n[2] - z0), stride = column_stride(nz);
@@ -194,7 +194,7 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   StageWatch watch(seconds);
   if (options.upsampling < 1 || options.upsampling > 64 ||
       (options.upsampling & (options.upsampling - 1)) != 0)
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", options.upsampling));
+    throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", options.upsampling));
   opencl::State& state = device.state();
   check_line_integrals(scan);
   const Units units = units_of(scan);

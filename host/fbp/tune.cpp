@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "host/fbp/back_project.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
 #include "vdvr/error.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -5,11 +5,14 @@
 #include <cmath>
 #include <utility>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/kernel.hpp"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrGoldShape) == 48 && sizeof(VdvrLattice) == 36);
+
 namespace {
 
 cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
@@ -115,6 +118,21 @@ GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, co
   return r;
 }
 
+VdvrGoldShape GoldStream::Batch::shape_on_device() const {
+  return {to_int(shape_.nx),
+          to_int(shape_.ny),
+          to_int(shape_.nz),
+          to_int(shape_.halo),
+          to_int(shape_.gold_stride),
+          to_int(stride_),
+          settings_.rate,
+          to_int(bricks_x_),
+          to_int(bricks_y_),
+          to_int(bricks_z_),
+          to_int(static_cast<std::int64_t>(blocks())),
+          shape_.lowest};
+}
+
 opencl::Defines GoldStream::Batch::brick_nodes() const {
   return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
 }
@@ -139,17 +157,13 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
   const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
-                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float>
+                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_float>
       kernel(state_, "gold/measure", "measure_nodes", field.defines);
   const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
   kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
          r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),
          field.bricks.buffer(), field.grid, gold_.buffer(), above_.buffer(), below_.buffer(),
-         margin_.buffer(), first.buffer(), selected.buffer(), shape_.lowest, to_int(shape_.nx),
-         to_int(shape_.ny), to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), settings_.rate,
-         to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(static_cast<std::int64_t>(n)),
-         tolerance);
+         margin_.buffer(), first.buffer(), selected.buffer(), shape_on_device(), tolerance);
   return r;
 }
 
@@ -189,14 +203,12 @@ std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::in
   opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(std::int64_t{6} * most),
                                      "errors along axes");
   errors.fill(0);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_int, cl_int, cl_int,
+                 cl_int>
       kernel(state_, "gold/classify", "axis_errors", brick_nodes());
   kernel({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, errors.buffer(),
-         on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_.lowest, to_int(shape_.nx),
-         to_int(shape_.ny), to_int(shape_.nz), to_int(shape_.halo), to_int(shape_.gold_stride),
-         to_int(levels[0]), to_int(levels[1]), to_int(levels[2]), most, to_int(bricks_x_), to_int(bricks_y_),
-         to_int(bricks_z_), to_int(n));
+         on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_on_device(), to_int(levels[0]),
+         to_int(levels[1]), to_int(levels[2]), most);
   const auto bits = errors.to_host();
   std::vector<AxisErrors> out(bricks.size());
   for (std::size_t i = 0; i < bricks.size(); ++i)
@@ -218,14 +230,12 @@ std::vector<float> GoldStream::Batch::errors_at(const LevelTriple& level,
   const LevelSamples& samples = lattice(level, bricks);
   opencl::DeviceArray<cl_int> error(state_, wanted.size(), "brick errors");
   error.fill(-1);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, VdvrLattice, cl_int, cl_int, cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
+                 VdvrGoldShape, VdvrLattice>
       level_error(state_, "gold/classify", "level_error", brick_nodes());
   level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
               on_device.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
-              margin_.buffer(), shape_.lowest, to_int(shape_.nx), to_int(shape_.ny), to_int(shape_.nz),
-              to_int(shape_.halo), to_int(shape_.gold_stride), to_int(stride_), samples.shape,
-              to_int(bricks_x_), to_int(bricks_y_), to_int(bricks_z_), to_int(n));
+              margin_.buffer(), shape_on_device(), samples.shape);
   const auto bits = error.to_host();
   std::vector<float> out;
   for (const std::int64_t brick : bricks) {

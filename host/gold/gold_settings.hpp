@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/volume/quantise.hpp"
 #include "vdvr/mixed_volume.hpp"
 

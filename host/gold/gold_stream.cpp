@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_blocks.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -75,8 +75,8 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
     throw ResourceError(fmt::format(
         "gold at rate {} from {} views of {} upsampled columns needs {:.1f} MiB for its thinnest slab; raise "
-        "--max-memory, "
-        "or choose a smaller --granularity, --upsampling or --gold",
+        "`max_memory`, "
+        "or choose a smaller `granularity`, `upsampling` or `gold`",
         settings.rate, scan.geometry.views(), columns_.count,
         static_cast<double>(slab_bytes(slab_bricks_ * g)) / (1 << 20)));
   }
@@ -174,31 +174,14 @@ GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
-  begin(purpose);
   run_unknown(
-      selected, on_batch, [](const Work&, std::size_t) { return 0; }, progress, stage);
-}
-
-void GoldStream::run(const std::vector<std::uint8_t>& selected, const Pass& pass, Journal* journal,
-                     const Progress& progress, const std::string& stage, For purpose) {
-  begin(purpose);
-  const std::int64_t number = passes_++;
-  run_unknown(
-      selected,
-      [&](Batch& batch) {
-        const Bytes payload = pass.compute(batch);
-        if (journal) journal->append(record(number, batch, payload));
-        pass.apply(ByteReader(payload));
-      },
-      [&](const Work& work, std::size_t from) -> std::size_t {
-        const auto kept = journal ? journal->next() : std::nullopt;
-        return kept ? replay(number, work, from, *kept, pass.apply) : 0;
-      },
-      progress, stage);
+      selected, on_batch, [](const Work&, std::size_t) { return 0; }, progress, stage, purpose);
 }
 
 void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                             const Known& known, const Progress& progress, const std::string& stage) {
+                             const Known& known, const Progress& progress, const std::string& stage,
+                             For purpose) {
+  begin(purpose);
   const std::vector<Work> all = partition(selected);
   upsampled_ = {};  // an earlier run may have ended early
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
@@ -221,42 +204,6 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
   upsampled_ = {};
   projections_ = {};
   if (cells_) cells_->end();
-}
-
-// A record says which blocks of which pass it is of: how many share a batch depends on the memory left, which
-// a resumed process need not have alike.
-Bytes GoldStream::record(std::int64_t pass, const Batch& batch, const Bytes& payload) const {
-  ByteWriter out;
-  for (const std::int64_t n :
-       {std::int64_t{settings_.rate}, pass, batch.first_brick_.front()[2], batch.bricks_x_, batch.bricks_y_,
-        batch.bricks_z_, batch.first_brick_.front()[0], batch.first_brick_.front()[1],
-        static_cast<std::int64_t>(batch.blocks())})
-    out.put(n);
-  out.put(cells_ ? cells_->new_cells(batch.slab_, batch.first_brick_) : std::vector<float>{});
-  Bytes bytes = out.take();
-  bytes.insert(bytes.end(), payload.begin(), payload.end());
-  return bytes;
-}
-
-std::size_t GoldStream::replay(std::int64_t pass, const Work& work, std::size_t from, const Bytes& record,
-                               const std::function<void(ByteReader)>& apply) {
-  ByteReader in(record);
-  bool same = true;
-  for (const std::int64_t n : {std::int64_t{settings_.rate}, pass, work.z, work.width_x, work.width_y,
-                               work.height, work.first[from][0], work.first[from][1]})
-    same = in.get<std::int64_t>() == n && same;
-  const auto n = in.get<std::int64_t>();
-  if (!same || n < 1 || count(n) > work.first.size() - from)
-    throw InputError(
-        "the journal's next record is of other blocks than this build asks for; start again without "
-        "--resume");
-  std::vector<std::array<std::int64_t, 3>> first;
-  for (std::size_t i = from; i < from + at(n); ++i)
-    first.push_back({work.first[i][0], work.first[i][1], work.z});
-  const auto cells = in.get_vector<float>();
-  if (cells_) cells_->restore(slab_of(work), first, cells);
-  apply(in);
-  return at(n);
 }
 
 std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {

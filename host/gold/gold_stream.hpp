@@ -26,9 +26,8 @@
 #include "host/gold/search_triples.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/sampler/device_field.hpp"
-#include "host/system/bytes.hpp"
+#include "shared/gold_shape.h"
 #include "shared/untested.h"
-#include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 
@@ -101,16 +100,24 @@ class GoldStream {
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
            const std::string& stage, For purpose = For::measuring);
 
-  /// A pass in two steps: `compute` reads from a batch all that `apply` needs, which may be called in a later
-  /// process instead, with what the journal kept.
-  struct Pass {
-    std::function<Bytes(Batch&)> compute;
-    std::function<void(ByteReader)> apply;
+  /// A run of brick layers whose rows are upsampled together.
+  struct Slab {
+    std::int64_t z = 0, height = 0;  ///< bricks
+    bool operator==(const Slab&) const = default;
   };
-  /// The same by way of a journal (none: nullptr): batches that it holds are applied and not computed, the
-  /// others are added to it. Passes must come in the same order in every process.
-  void run(const std::vector<std::uint8_t>& selected, const Pass& pass, Journal* journal,
-           const Progress& progress, const std::string& stage, For purpose = For::measuring);
+  /// Equal blocks in one slab, by their first bricks.
+  struct Work {
+    std::int64_t z, height, width_x, width_y;  ///< bricks
+    std::vector<std::array<std::int64_t, 2>> first;
+    Slab slab;
+    [[nodiscard]] Index3 size() const { return {width_x, width_y, height}; }
+  };
+  /// How many blocks of a work, from the given one on, somebody has the results of already.
+  using Known = std::function<std::size_t(const Work&, std::size_t)>;
+  /// The same without the blocks that are known.
+  void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
+                   const Progress& progress, const std::string& stage, For purpose);
+  [[nodiscard]] SlabShape slab_of(const Work& work) const;
 
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
@@ -132,18 +139,6 @@ class GoldStream {
   [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
-  // A run of brick layers whose rows are upsampled together.
-  struct Slab {
-    std::int64_t z = 0, height = 0;  // bricks
-    bool operator==(const Slab&) const = default;
-  };
-  // Equal blocks in one slab, by their first bricks.
-  struct Work {
-    std::int64_t z, height, width_x, width_y;  // bricks
-    std::vector<std::array<std::int64_t, 2>> first;
-    Slab slab;
-    [[nodiscard]] Index3 size() const { return {width_x, width_y, height}; }
-  };
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] std::vector<float> margins(const ColumnBlocks& columns) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const std::vector<float>& margins,
@@ -152,18 +147,10 @@ class GoldStream {
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] std::int64_t padded_rows(std::int64_t height) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
-  // How many blocks of a work, from the given one on, need not be computed.
-  using Known = std::function<std::size_t(const Work&, std::size_t)>;
-  void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
-                   const Progress& progress, const std::string& stage);
   void begin(For purpose);
   void upsample(const Slab& slab);
   void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
-  [[nodiscard]] SlabShape slab_of(const Work& work) const;
-  [[nodiscard]] Bytes record(std::int64_t pass, const Batch& batch, const Bytes& payload) const;
-  std::size_t replay(std::int64_t pass, const Work& work, std::size_t from, const Bytes& record,
-                     const std::function<void(ByteReader)>& apply);
 
   opencl::State& state_;
   const FilteredScan& scan_;
@@ -177,7 +164,6 @@ class GoldStream {
   UpsampledSlab projections_;
   For purpose_ = For::measuring;    // of this run
   std::array<GoldSpent, 2> spent_;  // by purpose
-  std::int64_t passes_ = 0;         // begun with a journal
   double arithmetic_ = 0;
   std::shared_ptr<CellBounds> cells_;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
@@ -194,6 +180,10 @@ class GoldStream::Batch {
  public:
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
+  /// The first brick of each block, x, y, z, and bricks per block.
+  [[nodiscard]] const std::vector<std::array<std::int64_t, 3>>& first_brick() const { return first_brick_; }
+  [[nodiscard]] Index3 block_bricks() const { return {bricks_x_, bricks_y_, bricks_z_}; }
+  [[nodiscard]] const SlabShape& slab() const { return slab_; }
 
   /// In a run for samples: the node test at levels 0 .. log2(rate), of all axes together or (anisotropic) of
   /// each, per brick of bricks(): |interpolant - F| may be at most the tolerance. Level 0 is measured on the
@@ -252,6 +242,7 @@ class GoldStream::Batch {
   std::vector<float> copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
                                 const LevelSamples* lattice);
   [[nodiscard]] opencl::Defines brick_nodes() const;
+  [[nodiscard]] VdvrGoldShape shape_on_device() const;
   Results run_measure(const DeviceField& field, float tolerance,
                       const opencl::DeviceArray<std::uint8_t>& selected);
   Batch(opencl::State& state, const GoldSettings& settings)

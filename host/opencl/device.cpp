@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cctype>
 #include <stdexcept>
+#include <utility>
 
 #include "host/opencl/device_end.hpp"
 #include "host/opencl/state.hpp"
@@ -35,16 +36,37 @@ void before_device_ends(Forget forget) {
   throw std::logic_error("before_device_ends: no room for another cache");
 }
 
+void MemoryAccount::set_limit(std::uint64_t bytes) {
+  const std::lock_guard guard(lock_);
+  limit_ = bytes;
+}
+
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
+  const std::lock_guard guard(lock_);
   if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
     throw ResourceError(
-        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise --max-memory, or "
-                    "choose a smaller --size",
-                    what, static_cast<double>(bytes) / (1 << 20), static_cast<double>(left()) / (1 << 20),
+        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise `max_memory`, or "
+                    "choose a smaller `size`",
+                    what, static_cast<double>(bytes) / (1 << 20), static_cast<double>(room()) / (1 << 20),
                     static_cast<double>(limit_) / (1 << 20)));
   }
   used_ += bytes;
   peak_ = std::max(peak_, used_ + kept);
+}
+
+void MemoryAccount::give(std::uint64_t bytes) noexcept {
+  const std::lock_guard guard(lock_);
+  used_ -= bytes;
+}
+
+std::uint64_t MemoryAccount::peak() const {
+  const std::lock_guard guard(lock_);
+  return peak_;
+}
+
+std::uint64_t MemoryAccount::left() const {
+  const std::lock_guard guard(lock_);
+  return room();
 }
 
 cl::Buffer BufferPool::take(std::uint64_t bytes) {
@@ -72,13 +94,14 @@ void BufferPool::clear() {
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
     throw ResourceError(fmt::format(
-        "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller --size or another --device", what,
+        "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller `size` or another `device`", what,
         bytes, info.name, info.max_allocation));
   }
-  cl::Buffer buffer = pool.take(bytes);
+  const std::lock_guard guard(pool_lock_);
+  cl::Buffer buffer = pool_.take(bytes);
   // What the pool keeps is in use as well: it goes first when room is short.
-  if (memory.left() < bytes + pool.bytes()) pool.clear();
-  memory.take(bytes, what, pool.bytes());
+  if (memory.left() < bytes + pool_.bytes()) pool_.clear();
+  memory.take(bytes, what, pool_.bytes());
   if (buffer() != nullptr) return buffer;
   try {
     return cl::Buffer(context, CL_MEM_READ_WRITE, bytes);
@@ -92,9 +115,27 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
 void State::release(std::uint64_t bytes, cl::Buffer buffer) noexcept {
   memory.give(bytes);
   try {
-    pool.keep(bytes, std::move(buffer));
+    const std::lock_guard guard(pool_lock_);
+    pool_.keep(bytes, std::move(buffer));
   } catch (...) {  // no memory for the pool's own entry: the buffer is simply freed
   }
+}
+
+void State::take_host(std::uint64_t bytes, const std::string& what) {
+  const std::lock_guard guard(pool_lock_);
+  if (memory.left() < bytes + pool_.bytes()) pool_.clear();
+  memory.take(bytes, what, pool_.bytes());
+}
+
+void State::keep_pace(cl::Event latest) {
+  if (!info.is_cpu) return;
+  cl::Event before;
+  {
+    const std::lock_guard guard(pace_lock_);
+    before = std::exchange(before_, std::exchange(last_, std::move(latest)));
+  }
+  // Outside the lock: another thread's launch need not wait for this one's.
+  if (before() != nullptr) before.wait();
 }
 
 }  // namespace opencl
@@ -211,7 +252,7 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
     std::string names;
     for (const auto& [device, info] : found)
       names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
-    throw DeviceError(fmt::format("no device matches --device '{}'; there are:{}", selector, names));
+    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
   }
   try {
     state_->device = chosen->first;

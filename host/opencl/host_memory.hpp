@@ -19,9 +19,7 @@ class HostMemory {
 
   /// Before they are allocated. Throws ResourceError naming `what` when they pass the limit.
   void count(std::uint64_t bytes, const std::string& what) {
-    // What the pool keeps is in use as well: it goes first when room is short.
-    if (state_.memory.left() < bytes + state_.pool.bytes()) state_.pool.clear();
-    state_.memory.take(bytes, what, state_.pool.bytes());
+    state_.take_host(bytes, what);
     bytes_ += bytes;
   }
   void uncount(std::uint64_t bytes) {

@@ -48,11 +48,18 @@ std::string resolve_source(const std::string& name) {
   return out;
 }
 
-const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+std::string build_options(const Defines& defines) {
   std::string options = "-cl-std=CL1.2 -Werror -DVDVR_DIALECT_OPENCL";
   for (const auto& [key, value] : defines) options += fmt::format(" -D{}={}", key, value);
+  return options;
+}
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  const std::string options = build_options(defines);
   const std::string cache_key = name + ' ' + options;
-  if (const auto found = state.programs.find(cache_key); found != state.programs.end()) return found->second;
+  const std::lock_guard guard(state.programs_lock_);
+  if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
+    return found->second;
 
   cl::Program built(state.context, resolve_source(name + ".cl"));
   try {
@@ -69,7 +76,7 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
     throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
                                  name, state.info.name, options, e.what(), code_name(e.err()), log));
   }
-  return state.programs.emplace(cache_key, std::move(built)).first->second;
+  return state.programs_.emplace(cache_key, std::move(built)).first->second;
 }
 
 }  // namespace vdvr::opencl

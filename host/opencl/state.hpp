@@ -1,8 +1,11 @@
-// What a Device holds: context, in-order queue, program cache, and the account of our allocations.
+// What a Device holds: context, in-order queue, program cache, and the account of our allocations. Threads
+// may share it: OpenCL's own calls are safe, whatever else changes stands behind locks. A cl::Kernel is not,
+// so that each launcher has its own.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,22 +18,23 @@ namespace vdvr::opencl {
 /// Host and device allocations of ours, counted together against --max-memory.
 class MemoryAccount {
  public:
-  void set_limit(std::uint64_t bytes) { limit_ = bytes; }
-  [[nodiscard]] std::uint64_t limit() const { return limit_; }
+  void set_limit(std::uint64_t bytes);
   /// Throws ResourceError naming `what` and the remedy when the limit would be passed.
   /// `kept`: bytes of the pool, for the peak.
   void take(std::uint64_t bytes, const std::string& what, std::uint64_t kept = 0);
-  void give(std::uint64_t bytes) noexcept { used_ -= bytes; }
-  [[nodiscard]] std::uint64_t used() const { return used_; }
-  [[nodiscard]] std::uint64_t peak() const { return peak_; }
-  [[nodiscard]] std::uint64_t left() const { return limit_ > used_ ? limit_ - used_ : 0; }
+  void give(std::uint64_t bytes) noexcept;
+  [[nodiscard]] std::uint64_t peak() const;
+  [[nodiscard]] std::uint64_t left() const;
 
  private:
+  [[nodiscard]] std::uint64_t room() const { return limit_ > used_ ? limit_ - used_ : 0; }
+
+  mutable std::mutex lock_;
   std::uint64_t limit_ = 0, used_ = 0, peak_ = 0;
 };
 
 /// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that
-/// fill them.
+/// fill them. Without a lock of its own: a State has it under its.
 class BufferPool {
  public:
   /// A kept buffer of exactly this size, or an empty one.
@@ -44,38 +48,43 @@ class BufferPool {
   std::uint64_t bytes_ = 0;
 };
 
+/// A define passed to the kernel compiler: meaning (no default in the kernel) or tuning (default in the
+/// kernel).
+using Defines = std::vector<std::pair<std::string, std::string>>;
+
 struct State {
   DeviceInfo info;
   cl::Device device;
   cl::Context context;
   cl::CommandQueue queue;
-  std::map<std::string, cl::Program> programs;  ///< by name and defines
   MemoryAccount memory;
-  BufferPool pool;
 
   /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is
   /// allocated.
   cl::Buffer allocate(std::uint64_t bytes, const std::string& what);
-  /// On a CPU: waits until at most two kernels are unfinished, the latest included.
-  void keep_pace(cl::Event latest) {
-    if (!info.is_cpu) return;
-    if (before_() != nullptr) before_.wait();
-    before_ = std::exchange(last_, std::move(latest));
-  }
   void release(std::uint64_t bytes, cl::Buffer buffer) noexcept;
+  /// Counts memory of the host, for which the pool makes room. Throws ResourceError. memory.give() returns
+  /// it.
+  void take_host(std::uint64_t bytes, const std::string& what);
+  /// On a CPU: waits until at most two kernels are unfinished, the latest included.
+  void keep_pace(cl::Event latest);
 
  private:
+  friend const cl::Program& program(State&, const std::string&, const Defines&);
+
+  std::mutex pool_lock_;  // the account's own may be taken under it
+  BufferPool pool_;
+  std::mutex pace_lock_;
   cl::Event before_, last_;
+  std::mutex programs_lock_;
+  std::map<std::string, cl::Program> programs_;  // by name and defines
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".
 std::string code_name(int code);
 
-/// A define passed to the kernel compiler: meaning (no default in the kernel) or tuning (default in the
-/// kernel).
-using Defines = std::vector<std::pair<std::string, std::string>>;
-
-/// Builds kernels/<name>.cl for the state's device, or returns the cached program. `#include "shared/x.h"` is
+/// Builds kernels/<name>.cl for the state's device, or returns the cached program, which lives as long as the
+/// state. One program is built at a time. `#include "shared/x.h"` is
 /// resolved from the embedded sources with #line directives. Throws BuildError with device, options and the
 /// compiler's log.
 const cl::Program& program(State& state, const std::string& name, const Defines& defines = {});

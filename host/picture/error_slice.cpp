@@ -176,7 +176,7 @@ namespace {
 /// By brick, or of all bricks alike; infinite where nothing is known.
 std::vector<float> bounds_of(const MixedVolume& volume, const Certificate& c, bool image3d) {
   if (image3d && !c.total_image3d)
-    throw InputError("the certificate says nothing of the image3d sampler; take --sampler buffer");
+    throw InputError("the certificate says nothing of the image3d sampler; take `sampler` buffer");
   if (!c.brick_totals.empty()) return brick_bounds(c, image3d);
   return std::vector<float>(volume.level.size(),
                             static_cast<float>(image3d ? *c.total_image3d : c.total_buffer));

@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host/bounds/spectral_error.hpp"
-#include "host/fbp/cosine_spectrum.hpp"
 #include "host/picture/figure.hpp"
+#include "vdvr/cosine_spectrum.hpp"
+#include "vdvr/spectral_error.hpp"
 #include "vdvr/error_map.hpp"
 
 namespace vdvr {

@@ -32,7 +32,7 @@ std::string encode_png(const std::filesystem::path& path, const Image& image) {
   constexpr std::int64_t most = std::numeric_limits<int>::max() / 4;
   if (image.width < 1 || image.height < 1 || image.width > most / image.height)
     throw InputError(
-        fmt::format("{}: a picture of {} x {} pixels cannot be written as PNG; choose a smaller --size",
+        fmt::format("{}: a picture of {} x {} pixels cannot be written as PNG; choose a smaller `size`",
                     path.string(), image.width, image.height));
   if (image.rgb.size() != static_cast<std::size_t>(3 * image.width * image.height))
     throw InputError(fmt::format("{}: {} bytes of colour for {} x {} pixels", path.string(), image.rgb.size(),

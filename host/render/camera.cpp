@@ -1,20 +1,50 @@
-// Cameras. Called by the render, run and bench commands.
+// Cameras, and the one check of them. Called by check_render_options.cpp and the render, run and bench
+// commands.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
+#include "host/render/glm_vectors.hpp"
 #include "vdvr/camera.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
+namespace {
+
+bool is_finite(const Vec3& v) {
+  return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
+}
+
+// Of vectors that are not 0.
+bool are_parallel(const glm::dvec3& a, const glm::dvec3& b) {
+  constexpr double least = 1e-6;  // of the sine between them: fp32 rays turn by less
+  return !(glm::length(glm::cross(a, b)) > least * glm::length(a) * glm::length(b));
+}
+
+}  // namespace
+
+void check_camera(const Camera& c) {
+  if (!is_finite(c.position) || !is_finite(c.focal_point) || !is_finite(c.view_up))
+    throw InputError("the camera's position, focal point and view-up must be finite");
+  if (!(c.view_angle_deg > 0 && c.view_angle_deg < 180))
+    throw InputError(
+        fmt::format("`camera_view_angle` {} must lie between 0 and 180 degrees", c.view_angle_deg));
+  const glm::dvec3 view = to_glm(c.focal_point) - to_glm(c.position), up = to_glm(c.view_up);
+  if (!(glm::length(view) > 0))
+    throw InputError("`camera_position` and `camera_focal_point` are the same point");
+  if (!(glm::length(up) > 0)) throw InputError("`camera_view_up` is 0,0,0; it must have a direction");
+  if (are_parallel(view, up))
+    throw InputError("`camera_view_up` is parallel to the direction of view; choose another");
+}
 
 Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom) {
   if (!std::isfinite(azimuth_deg) || !std::isfinite(elevation_deg))
     throw InputError(
-        fmt::format("--azimuth {} and --elevation {} must be finite", azimuth_deg, elevation_deg));
-  if (!(zoom > 0) || !std::isfinite(zoom)) throw InputError(fmt::format("--zoom {} must be positive", zoom));
+        fmt::format("`azimuth` {} and `elevation` {} must be finite", azimuth_deg, elevation_deg));
+  if (!(zoom > 0) || !std::isfinite(zoom)) throw InputError(fmt::format("`zoom` {} must be positive", zoom));
   double diagonal2 = 0;
   Camera camera;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -39,33 +69,18 @@ Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, 
   // The derivative of towards_eye by elevation: -z at elevation 0, and defined at the poles too.
   camera.view_up = {-se * sa, -se * ca, -ce};
   camera.view_angle_deg = 2 * std::atan(std::tan(half_angle) / zoom) / degree;
+  check_camera(camera);
   return camera;
 }
 
 Camera look_at(const Vec3& position, const Vec3& focal_point, const std::optional<Vec3>& view_up,
                double view_angle_deg) {
   Camera camera{position, focal_point, view_up.value_or(Vec3{0, 0, -1}), view_angle_deg};
-  const auto finite = [](const Vec3& v) {
-    return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
-  };
-  if (!finite(position) || !finite(focal_point) || !finite(camera.view_up))
-    throw InputError("the camera's position, focal point and view-up must be finite");
-  if (!(view_angle_deg > 0 && view_angle_deg < 180))
-    throw InputError(
-        fmt::format("--camera-view-angle {} must lie between 0 and 180 degrees", view_angle_deg));
-  const Vec3 view{focal_point[0] - position[0], focal_point[1] - position[1], focal_point[2] - position[2]};
-  const Vec3& up = camera.view_up;
-  const double length = std::hypot(view[0], view[1], view[2]), up_length = std::hypot(up[0], up[1], up[2]);
-  if (!(length > 0)) throw InputError("--camera-position and --camera-focal-point are the same point");
-  const double across = std::hypot(view[1] * up[2] - view[2] * up[1], view[2] * up[0] - view[0] * up[2],
-                                   view[0] * up[1] - view[1] * up[0]);
-  constexpr double parallel = 1e-6;  // of the sine between them: fp32 rays turn by less
-  if (across > parallel * length * up_length) return camera;
-  if (view_up)
-    throw InputError(up_length > 0 ? "--camera-view-up is parallel to the direction of view; choose another"
-                                   : "--camera-view-up is 0,0,0; it must have a direction");
+  const glm::dvec3 view = to_glm(focal_point) - to_glm(position);
   // As a slice across z shows it: seen from -z, x to the right and y down.
-  camera.view_up = {0, view[2] > 0 ? -1.0 : 1.0, 0};
+  if (!view_up && are_parallel(view, to_glm(camera.view_up)))
+    camera.view_up = {0, view.z > 0 ? -1.0 : 1.0, 0};
+  check_camera(camera);
   return camera;
 }
 

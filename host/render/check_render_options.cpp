@@ -17,20 +17,6 @@ bool is_finite(const Vec3& v) {
   return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
 }
 
-void check_camera(const Camera& c) {
-  if (!is_finite(c.position) || !is_finite(c.focal_point) || !is_finite(c.view_up))
-    throw InputError("the camera's position, focal point and view-up must be finite");
-  if (!(c.view_angle_deg > 0 && c.view_angle_deg < 180))
-    throw InputError(
-        fmt::format("--camera-view-angle {} must lie between 0 and 180 degrees", c.view_angle_deg));
-  const glm::dvec3 view = to_glm(c.focal_point) - to_glm(c.position), up = to_glm(c.view_up);
-  if (!(glm::length(view) > 0))
-    throw InputError("--camera-position and --camera-focal-point are the same point");
-  if (!(glm::length(glm::cross(view, up)) > 1e-9 * glm::length(view) * glm::length(up)) ||
-      !(glm::length(up) > 0))
-    throw InputError("--camera-view-up is parallel to the direction of view; choose another");
-}
-
 void check_transfer(const TransferFunction& f) {
   if (f.points.empty()) throw InputError(fmt::format("transfer function '{}' has no points", f.name));
   for (std::size_t i = 0; i < f.points.size(); ++i) {
@@ -47,20 +33,20 @@ void check_transfer(const TransferFunction& f) {
 void check_surfaces(const std::vector<IsoSurface>& surfaces) {
   if (surfaces.empty() || surfaces.size() > VDVR_SURFACES)
     throw InputError(
-        fmt::format("--iso names {} surfaces; 1 to {} can be drawn", surfaces.size(), VDVR_SURFACES));
+        fmt::format("`iso` names {} surfaces; 1 to {} can be drawn", surfaces.size(), VDVR_SURFACES));
   for (const IsoSurface& s : surfaces)
     if (!std::isfinite(s.value) || !(s.opacity >= 0 && s.opacity <= 1) || !is_finite(s.rgb))
       throw InputError(
-          fmt::format("--iso {} must be finite, and its opacity {} within [0, 1]", s.value, s.opacity));
+          fmt::format("`iso` {} must be finite, and its opacity {} within [0, 1]", s.value, s.opacity));
 }
 
 void check_lights(const std::vector<Vec3>& lights) {
   if (lights.size() > VDVR_LIGHTS)
     throw InputError(
-        fmt::format("--light names {} lights that stand still; at most {} do", lights.size(), VDVR_LIGHTS));
+        fmt::format("`light` names {} lights that stand still; at most {} do", lights.size(), VDVR_LIGHTS));
   for (const Vec3& l : lights)
     if (!is_finite(l) || !(glm::length(to_glm(l)) > 0))
-      throw InputError(fmt::format("--light {},{},{} has no direction", l[0], l[1], l[2]));
+      throw InputError(fmt::format("`light` {},{},{} has no direction", l[0], l[1], l[2]));
 }
 
 }  // namespace
@@ -68,12 +54,12 @@ void check_lights(const std::vector<Vec3>& lights) {
 void check_options(const RenderOptions& o) {
   // Pixels are counted in int on the device; 16384 x 16384 already needs 4 GiB there.
   if (o.width < 1 || o.height < 1 || o.width > 16384 || o.height > 16384)
-    throw InputError(fmt::format("--size {}x{}: each side must be 1 to 16384 pixels", o.width, o.height));
+    throw InputError(fmt::format("`size` {}x{}: each side must be 1 to 16384 pixels", o.width, o.height));
   if (o.mode == RenderMode::error)
-    throw InputError("an error slice is not ray-cast: use `run` or `render --mode error`");
+    throw InputError("an error slice is not ray-cast: it is drawn by error_slice");
   if (o.mode == RenderMode::slice) {
     if (o.output != RenderOutput::colour)
-      throw InputError("--show depth, normal and error do not apply to a slice, which has no camera");
+      throw InputError("`show` depth, normal and error do not apply to a slice, which has no camera");
     if (o.slice_axis < 0 || o.slice_axis > 2)
       throw InputError(fmt::format("slice axis {} is not 0 (x), 1 (y) or 2 (z)", o.slice_axis));
     if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
@@ -84,19 +70,19 @@ void check_options(const RenderOptions& o) {
   }
   check_camera(o.camera);
   if (!(o.step >= 0x1p-10 && o.step <= 1024))
-    throw InputError(fmt::format("--step {} must lie between 1/1024 and 1024 base cells", o.step));
+    throw InputError(fmt::format("`step` {} must lie between 1/1024 and 1024 base cells", o.step));
   if (!(o.termination > 0 && o.termination <= 1))
     throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
   if (o.mode == RenderMode::iso) check_surfaces(o.surfaces);
   check_lights(o.lights);
   if (o.mode != RenderMode::dvr &&
       (o.classification != Classification::post || o.step_mode != StepMode::fixed))
-    throw InputError("--classification and --step-mode apply to --mode dvr");
+    throw InputError("`classification` and `step_mode` apply to `mode` dvr");
   if (o.classification == Classification::preintegrated && o.step_mode == StepMode::level)
     throw InputError(
-        "--step-mode level does not apply to --classification preintegrated, whose table is of one step");
+        "`step_mode` level does not apply to `classification` preintegrated, whose table is of one step");
   if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
-    throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");
+    throw InputError("`show` normal does not apply to `mode` mip: a maximum has no surface");
   if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
 }
 

@@ -6,14 +6,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/render/check_render_options.hpp"
+#include "host/render/raycast_params.hpp"
 #include "host/sampler/resident_volume.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -37,14 +37,14 @@ std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 void check_options(const ParallelGeometry& g, const D2vrOptions& options) {
   const int n = options.upsampling;
   if (n < 1 || n > 64 || (n & (n - 1)) != 0)
-    throw InputError(fmt::format("--upsampling {} must be a power of two, 1 to 64", n));
+    throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", n));
   if (g.columns < 2)
     throw InputError(fmt::format("a detector of {} columns has nothing to interpolate between", g.columns));
   // Kernels address one view by 32 bits.
   const double most = std::numeric_limits<std::int32_t>::max();
   if (!(static_cast<double>(n * g.columns + 16) * static_cast<double>(n * g.rows + 1) < most))
     throw InputError(
-        fmt::format("{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower --upsampling",
+        fmt::format("{} columns and {} rows upsampled {} times pass 2^31 samples a view; lower `upsampling`",
                     g.columns, g.rows, n));
 }
 
@@ -256,16 +256,28 @@ std::vector<cl_float2> occupied_ranges(const Volume& v, int granularity) {
   return ranges;
 }
 
+namespace {
+
+VdvrGrid bricks_of(const Grid& grid) {
+  MixedVolume v;
+  v.grid = grid;
+  v.granularity = kGranularity;
+  return sampler_grid(v);
+}
+
+}  // namespace
+
 struct D2vrScene::Impl {
   const D2vrField* field;
   Volume samples;
-  std::optional<ResidentVolume>
-      bricks;  ///< the grid, ranges and frames of a volume; its samples are given back
+  std::vector<cl_float2> ranges;
+  DrawnField drawn;
   DeviceArray<cl_float4> views;
 };
 
 D2vrScene::D2vrScene(Device& device, const D2vrField& field, const Grid& grid, const Progress& progress)
     : impl_(std::make_unique<Impl>()) {
+  check_drawn_grid(grid);
   impl_->field = &field;
   const Index3 n = grid.samples();
   {
@@ -275,11 +287,9 @@ D2vrScene::D2vrScene(Device& device, const D2vrField& field, const Grid& grid, c
                                     static_cast<double>(i / (n[0] * n[1]))};
                       })};
   }
-  impl_->bricks.emplace(device, as_mixed(impl_->samples, kGranularity));
-  ResidentVolume::Impl& v = impl_->bricks->impl();
-  v.field->samples = {};
-  v.field->bricks = {};
-  v.host_ranges = occupied_ranges(impl_->samples, kGranularity);
+  impl_->ranges = occupied_ranges(impl_->samples, kGranularity);
+  const auto [lo, hi] = std::minmax_element(impl_->samples.samples.begin(), impl_->samples.samples.end());
+  impl_->drawn = {&device.state(), grid, bricks_of(grid), impl_->ranges, {*lo, *hi}, 0};
   const std::vector<cl_float4> views = field.impl().views(grid);
   impl_->views = DeviceArray<cl_float4>(device.state(), std::span<const cl_float4>(views), "views");
 }
@@ -288,53 +298,56 @@ D2vrScene::D2vrScene(D2vrScene&&) noexcept = default;
 D2vrScene& D2vrScene::operator=(D2vrScene&&) noexcept = default;
 const Volume& D2vrScene::samples() const { return impl_->samples; }
 const D2vrField& D2vrScene::field() const { return *impl_->field; }
+DrawnField drawn_field(const D2vrScene& scene) { return scene.impl().drawn; }
 
 namespace {
 
 void check_dvr(const RenderOptions& o) {
   const auto refuse = [](const char* what) {
     throw InputError(
-        fmt::format("{}; D2VR, which has projections instead of a volume, draws --mode dvr with "
-                    "--classification post and --step-mode fixed: build the "
-                    "volume first, or render with --method vdvr or dvr",
+        fmt::format("{}; D2VR, which has projections instead of a volume, draws `mode` dvr with "
+                    "`classification` post and `step_mode` fixed: build the "
+                    "volume first, or render with `method` vdvr or dvr",
                     what));
   };
-  if (o.mode != RenderMode::dvr) refuse("--method d2vr does not draw this --mode");
+  if (o.mode != RenderMode::dvr) refuse("`method` d2vr does not draw this `mode`");
   if (o.classification != Classification::post)
-    refuse("--classification preintegrated does not apply to --method d2vr");
-  if (o.step_mode != StepMode::fixed) refuse("--step-mode level does not apply to --method d2vr");
+    refuse("`classification` preintegrated does not apply to `method` d2vr");
+  if (o.step_mode != StepMode::fixed) refuse("`step_mode` level does not apply to `method` d2vr");
   if (o.gradient == GradientKind::stored)
-    refuse("--gradient stored does not apply to --method d2vr, which has no stored samples");
-  if (o.sampler == SamplerKind::image3d) refuse("--sampler image3d does not apply to --method d2vr");
+    refuse("`gradient` stored does not apply to `method` d2vr, which has no stored samples");
+  if (o.sampler == SamplerKind::image3d) refuse("`sampler` image3d does not apply to `method` d2vr");
+  if (o.output == RenderOutput::error) refuse("`show` error: `method` d2vr has no certificate");
 }
 
 }  // namespace
 
-FloatPicture raycast_float(Device& device, const D2vrScene& scene, const RenderOptions& o,
-                           const RaycastTuning& tuning) {
+Enqueued enqueue_frame(Frame& frame, const D2vrScene& scene, const RenderOptions& o,
+                       const RaycastTuning& tuning) {
   check_dvr(o);
-  D2vrScene::Impl& s = scene.impl();
+  check_options(o);
+  const D2vrScene::Impl& s = scene.impl();
   const Projections& p = s.field->impl();
-  ResidentVolume::Impl& v = s.bricks->impl();
+  const DrawnField& drawn = frame.field();
   const int lanes = lanes_for(*p.state, tuning);
-  FloatPicture result;
-  result.sampler = SamplerKind::buffer;
-  result.sampler_reason = "D2VR: projections, bilinear";
-  const DvrFrame frame = prepare_dvr(v, o, tuning, lanes);
+  const BakedTransfer& table = frame.prepare(o, 0);
   opencl::Kernel<cl::Buffer, VdvrDetector, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast,
                  cl::Buffer, cl::Buffer>
       kernel(*p.state, "render/d2vr", "raycast_dvr", defines_for("VDVR_KERNEL_DVR", o, tuning, lanes));
-  opencl::finish(device.state(), "preparing a frame");
-  const auto start = std::chrono::steady_clock::now();
-  kernel(frame.range, p.samples.buffer(), p.detector(v.grid), s.views.buffer(), v.field->grid,
-         v.frame.distance.buffer(), v.frame.table.buffer(), frame.params, v.frame.picture.buffer(),
-         v.frame.row_samples.buffer());
-  read_frame(v, start, result);
+  opencl::finish(*p.state, "preparing a frame");
+  const GradientKind gradient =
+      o.gradient == GradientKind::analytic ? GradientKind::analytic : GradientKind::central;
+  const Enqueued result{SamplerKind::buffer, "D2VR: projections, bilinear", gradient,
+                        std::chrono::steady_clock::now()};
+  kernel(packet_range(o, tuning, lanes), p.samples.buffer(), p.detector(drawn.grid), s.views.buffer(),
+         drawn.bricks, frame.distance(), frame.table(), make_params(drawn, o, table, 0),
+         frame.picture().buffer(), frame.row_samples());
   return result;
 }
 
-RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options) {
-  return to_result(raycast_float(device, scene, options), options);
+FloatPicture raycast_float(const D2vrScene& scene, const RenderOptions& o, const RaycastTuning& tuning) {
+  Frame frame(drawn_field(scene));
+  return read_frame(frame, enqueue_frame(frame, scene, o, tuning));
 }
 
 }  // namespace vdvr

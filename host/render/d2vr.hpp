@@ -1,5 +1,5 @@
-// The float picture behind raycast() of a D2vrScene, and what the classes hold on the device; tests use it.
-// Called by: raycast() in d2vr.cpp, tests/device/d2vr_test.cpp.
+// Frames of a D2vrScene, and what the classes hold on the device. Called by: renderer.cpp,
+// tests/device/d2vr_test.cpp.
 #pragma once
 
 #include <utility>
@@ -12,7 +12,12 @@
 
 namespace vdvr {
 
-FloatPicture raycast_float(Device& device, const D2vrScene& scene, const RenderOptions& options,
+/// Its ranges are the scene's.
+DrawnField drawn_field(const D2vrScene& scene);
+/// `frame` is of the scene's drawn_field().
+Enqueued enqueue_frame(Frame& frame, const D2vrScene& scene, const RenderOptions& options,
+                       const RaycastTuning& tuning = {});
+FloatPicture raycast_float(const D2vrScene& scene, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
 
 /// [bz][by][bx] least and greatest value that a brick of `granularity` cells is taken to have (d2vr.hpp).

@@ -1,5 +1,5 @@
-// The float picture behind raycast(), and its tuning; tests and benches use it, the public call converts it
-// to 8 bits. Called by: raycast() in raycast.cpp, tests/device/raycast_test.cpp.
+// Launches frames of resident volumes, and the float picture behind Renderer::render(), which converts it to
+// 8 bits; tests and benches use it. Called by: renderer.cpp, d2vr.cpp, tests/device/raycast_test.cpp.
 #pragma once
 
 #include <array>
@@ -7,11 +7,12 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/opencl/kernel.hpp"
+#include "host/render/frame.hpp"
 #include "host/sampler/resident_volume.hpp"
-#include "shared/raycast_params.h"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {
@@ -24,6 +25,35 @@ struct RaycastTuning {
   std::optional<int> lanes;
 };
 
+/// A frame that the device works on: what its picture will be, without pixels.
+struct Enqueued {
+  SamplerKind sampler = SamplerKind::buffer;
+  std::string sampler_reason;
+  GradientKind gradient = GradientKind::central;
+  std::chrono::steady_clock::time_point start;
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+};
+
+DrawnField drawn_field(const ResidentVolume& volume);
+/// What a frame takes for `asked`, and why. Throws ResourceError when `image3d` is asked for and cannot be
+/// had.
+std::pair<SamplerKind, std::string> choose_sampler(Device& device, const ResidentVolume& volume,
+                                                   SamplerKind asked);
+/// `frame` is of the volume's drawn_field(). Throws as Renderer::render.
+Enqueued enqueue_frame(Frame& frame, Device& device, const ResidentVolume& volume,
+                       const RenderOptions& options, const RaycastTuning& tuning = {});
+/// Pixels that work-items take.
+opencl::Range packet_range(const RenderOptions& options, const RaycastTuning& tuning, int lanes);
+/// How many rays a work-item takes.
+int lanes_for(const ResidentVolume::Impl& volume, SamplerKind sampler, GradientKind gradient,
+              const RaycastTuning& tuning);
+/// What the program of kernels/render/raycast.cl is built with.
+opencl::Defines raycast_defines(const ResidentVolume::Impl& volume, const RenderOptions& options,
+                                SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning,
+                                int lanes);
+
 struct FloatPicture {
   /// [y][x]: r, g, b display values, or of output depth and normal the unit normal; then the value of
   /// RenderResult, but of iso -1 and of mip -infinity where it is NaN there, and of normal the depth.
@@ -34,20 +64,9 @@ struct FloatPicture {
   std::int64_t samples = 0;
   double seconds = 0;
 };
+/// Waits for the picture.
+FloatPicture read_frame(const Frame& frame, const Enqueued& enqueued);
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
-
-// --- for a field that takes the place of the volume's (d2vr.cpp) ---
-
-struct DvrFrame {
-  opencl::Range range;
-  VdvrRaycast params;
-};
-/// Checks options of mode dvr; brings table, distances and picture of `v`'s frame up to date.
-DvrFrame prepare_dvr(ResidentVolume::Impl& v, const RenderOptions& options, const RaycastTuning& tuning,
-                     int lanes);
-/// Waits for the picture: fills pixels, samples and seconds since `start`.
-void read_frame(ResidentVolume::Impl& v, std::chrono::steady_clock::time_point start, FloatPicture& picture);
-RenderResult to_result(FloatPicture picture, const RenderOptions& options);
 
 }  // namespace vdvr

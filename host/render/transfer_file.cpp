@@ -250,7 +250,7 @@ TransferFunction read_transfer_function(const std::filesystem::path& path) {
   std::ifstream in(path);
   if (!in || !std::filesystem::is_regular_file(path, error))
     throw FileError(
-        fmt::format("{}: cannot be opened; --tf takes a JSON file or the name of a preset", path.string()));
+        fmt::format("{}: cannot be opened; `tf` takes a JSON file or the name of a preset", path.string()));
   if (const auto bytes = std::filesystem::file_size(path, error); bytes > kMostBytes)
     throw FileError(
         fmt::format("{}: has {} bytes; no transfer function is above {}", path.string(), bytes, kMostBytes));

@@ -72,7 +72,9 @@ const std::vector<Preset>& presets() {
         {0.48, {0.30, 0.55, 0.85}, 0.0},
         {0.52, {0.85, 0.88, 0.90}, 0.95},
         {1.00, {0.98, 0.80, 0.45}, 0.95}}},
-      {"mip", "grey ramp, opaque: for --mode mip", {{0.0, {0, 0, 0}, 1.0}, {1.0, {1, 1, 1}, 1.0}}},
+      {"mip",
+       "grey ramp, opaque: for maximum-intensity projection",
+       {{0.0, {0, 0, 0}, 1.0}, {1.0, {1, 1, 1}, 1.0}}},
   };
   return table;
 }

@@ -1,5 +1,4 @@
-// Uploads a mixed volume once for many frames; packs and builds the image atlas. Called by raycast() and the
-// verifier.
+// Uploads a mixed volume once for many frames; packs and builds the image atlas. Called by the renderer.
 #include "host/sampler/resident_volume.hpp"
 
 #include <fmt/format.h>
@@ -109,15 +108,7 @@ void mark_base_around(const MixedVolume& v, PackedRecords& records) {
 std::size_t count_of(const Index3& n) { return static_cast<std::size_t>(n[0] * n[1] * n[2]); }
 
 void check_sizes(const MixedVolume& v) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    // Cell coordinates are fp32, and the kernels' leaps rely on rounding below 2^-8 cell.
-    if (v.grid.cells[a] < 1 || v.grid.cells[a] > 8192)
-      throw InputError(
-          fmt::format("a volume of {} x {} x {} cells cannot be rendered; each axis needs 1 to 8192",
-                      v.grid.cells[0], v.grid.cells[1], v.grid.cells[2]));
-    if (!(v.grid.spacing[a] > 0))
-      throw InputError(fmt::format("a grid spacing of {} cannot be rendered", v.grid.spacing[a]));
-  }
+  check_drawn_grid(v.grid);
   const auto bricks = static_cast<std::size_t>(v.brick_count());
   if (v.base.size() != count_of(v.base_samples()) || v.level.size() != bricks || v.tile.size() != bricks)
     throw InputError(fmt::format(
@@ -125,7 +116,26 @@ void check_sizes(const MixedVolume& v) {
         v.base.size(), v.level.size(), v.tile.size(), count_of(v.base_samples()), bricks));
 }
 
+// Records that say where rays find the base all around.
+PackedRecords marked_records(const MixedVolume& v) {
+  PackedRecords records(v, tile_offsets(v), record_kind(v));
+  mark_base_around(v, records);
+  return records;
+}
+
 }  // namespace
+
+void check_drawn_grid(const Grid& grid) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    // Cell coordinates are fp32, and the kernels' leaps rely on rounding below 2^-8 cell.
+    if (grid.cells[a] < 1 || grid.cells[a] > 8192)
+      throw InputError(
+          fmt::format("a volume of {} x {} x {} cells cannot be rendered; each axis needs 1 to 8192",
+                      grid.cells[0], grid.cells[1], grid.cells[2]));
+    if (!(grid.spacing[a] > 0))
+      throw InputError(fmt::format("a grid spacing of {} cannot be rendered", grid.spacing[a]));
+  }
+}
 
 ImageLimits image_limits(const DeviceInfo& info, std::uint64_t memory_left) {
   return {{info.linear_float_image, info.linear_u16_image, info.linear_u8_image},
@@ -249,15 +259,15 @@ std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& cla
 }
 
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
-    : state(&device.state()), grid(v.grid), lit_layout((check_sizes(v), v)) {
-  is_uniform = v.base.type == SampleType::f32 && v.tiles.empty() && v.coarsening == LevelTriple{0, 0, 0};
-  base_samples_ = v.base_samples();
-  offsets_ = tile_offsets(v);
+    : state(&device.state()),
+      grid(v.grid),
+      is_uniform(v.base.type == SampleType::f32 && v.tiles.empty() && v.coarsening == LevelTriple{0, 0, 0}),
+      lit_layout((check_sizes(v), v)),
+      field(*state, v, marked_records(v)),
+      base_samples_(v.base_samples()),
+      offsets_(tile_offsets(v)) {
   types_[{}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
-  PackedRecords records(v, offsets_, record_kind(v));
-  mark_base_around(v, records);
-  field.emplace(*state, v, records);
   ImageLimits left = limits;
   left.bytes = std::min(left.bytes, state->memory.left());
   layout = pack_atlas(v, left);
@@ -270,6 +280,12 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
   for (const auto& [triple, block] : v.tiles)
     for (std::size_t a = 0; a < 3; ++a)
       highest_level = std::max(highest_level, triple.level[a] - v.coarsening[a]);
+  find_ranges(v);
+  // Last, because a constructor that throws runs no destructor to give it back.
+  state->memory.take(host_ranges.size() * sizeof(cl_float2), "ranges of bricks");
+}
+
+void ResidentVolume::Impl::find_ranges(const MixedVolume& v) {
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const BrickSamples stored(v, position_of(v, i));
     host_ranges.push_back(range_of(stored));
@@ -285,8 +301,6 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     value_range.second = std::max(value_range.second, r.s[1]);
   }
   largest = std::max({largest, std::abs(value_range.first), std::abs(value_range.second)});
-  // Last, because a constructor that throws runs no destructor to give it back.
-  state->memory.take(host_ranges.size() * sizeof(cl_float2), "ranges of bricks");
 }
 
 ResidentVolume::Impl::~Impl() {
@@ -310,12 +324,12 @@ void ResidentVolume::Impl::set_texels(const MixedVolume& v, PackedRecords& recor
   }
 }
 
-void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type) {
+void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type) const {
   const auto region = [](const Size3& s) {
     return cl::array<cl::size_type, 3>{static_cast<cl::size_type>(s[0]), static_cast<cl::size_type>(s[1]),
                                        static_cast<cl::size_type>(s[2])};
   };
-  const cl::Buffer& samples = field->samples.buffer();
+  const cl::Buffer& samples = field.samples.buffer();
   // Texels beside a tile weigh 0, but 0 times NaN would be NaN.
   state->queue.enqueueFillImage(image, cl_float4{{0, 0, 0, 0}}, region({0, 0, 0}),
                                 region(layout.size[static_cast<std::size_t>(type)]));
@@ -337,48 +351,55 @@ void ResidentVolume::Impl::fill_image(const cl::Image3D& image, SampleType type)
   }
 }
 
-const std::array<cl::Image3D, 3>& ResidentVolume::Impl::atlas() {
+std::array<cl::Image3D, 3> ResidentVolume::Impl::make_images() const {
+  constexpr std::array<cl_channel_type, 3> formats{CL_FLOAT, CL_UNORM_INT16, CL_UNORM_INT8};
+  std::array<cl::Image3D, 3> images;
+  cl::Image3D any;
+  for (std::size_t t = 0; t < 3; ++t) {
+    const Size3& size = layout.size[t];
+    if (size[0] == 0) continue;
+    images[t] = cl::Image3D(state->context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, formats[t]), size[0],
+                            size[1], size[2]);
+    fill_image(images[t], static_cast<SampleType>(t));
+    any = images[t];
+  }
+  for (std::size_t t = 0; t < 3; ++t)
+    if (layout.size[t][0] == 0) images[t] = any;
+  return images;
+}
+
+const Atlas& ResidentVolume::Impl::atlas() const {
+  const std::lock_guard guard(lock_);
   if (atlas_) return *atlas_;
   if (!layout.fits)
-    throw ResourceError("the image3d sampler cannot be used: " + layout.reason + "; use --sampler buffer");
-  atlas_bricks_ = opencl::DeviceArray<std::uint32_t>(*state, std::span<const std::uint32_t>(texel_records_),
-                                                     "brick records of the atlas");
+    throw ResourceError("the image3d sampler cannot be used: " + layout.reason + "; use `sampler` buffer");
+  opencl::DeviceArray<std::uint32_t> records(*state, std::span<const std::uint32_t>(texel_records_),
+                                             "brick records of the atlas");
   state->memory.take(layout.bytes(), "image3d atlas");
   try {
-    constexpr std::array<cl_channel_type, 3> formats{CL_FLOAT, CL_UNORM_INT16, CL_UNORM_INT8};
-    std::array<cl::Image3D, 3> images;
-    cl::Image3D any;
-    for (std::size_t t = 0; t < 3; ++t) {
-      const Size3& size = layout.size[t];
-      if (size[0] == 0) continue;
-      images[t] = cl::Image3D(state->context, CL_MEM_READ_ONLY, cl::ImageFormat(CL_R, formats[t]), size[0],
-                              size[1], size[2]);
-      fill_image(images[t], static_cast<SampleType>(t));
-      any = images[t];
-    }
-    for (std::size_t t = 0; t < 3; ++t)
-      if (layout.size[t][0] == 0) images[t] = any;
-    atlas_ = std::move(images);
+    return atlas_.emplace(Atlas{make_images(), std::move(records)});
   } catch (const cl::Error& e) {
     state->memory.give(layout.bytes());
-    throw ResourceError(fmt::format("image3d atlas, {}: {} on '{}': {}; use --sampler buffer", layout.reason,
+    throw ResourceError(fmt::format("image3d atlas, {}: {} on '{}': {}; use `sampler` buffer", layout.reason,
                                     e.what(), state->info.name, opencl::code_name(e.err())));
   }
-  return *atlas_;
 }
 
 bool ResidentVolume::Impl::lit_fits() const {
+  const std::lock_guard guard(lock_);
   return lit_ || (lit_layout.samples() <= std::numeric_limits<std::int32_t>::max() &&
                   lit_layout.samples() * sizeof(cl_uint2) <= state->info.max_allocation &&
                   lit_layout.bytes() <= state->memory.left());
 }
 
-const LitSamples& ResidentVolume::Impl::lit() {
-  if (!lit_) lit_.emplace(*state, *field, lit_layout, grid, value_range.second - value_range.first);
+const LitSamples& ResidentVolume::Impl::lit() const {
+  const std::lock_guard guard(lock_);
+  if (!lit_) lit_.emplace(*state, field, lit_layout, grid, value_range.second - value_range.first);
   return *lit_;
 }
 
-const cl::Buffer& ResidentVolume::Impl::ranges() {
+const cl::Buffer& ResidentVolume::Impl::ranges() const {
+  const std::lock_guard guard(lock_);
   if (ranges_.size() == 0)
     ranges_ =
         opencl::DeviceArray<cl_float2>(*state, std::span<const cl_float2>(host_ranges), "ranges of bricks");
@@ -386,9 +407,10 @@ const cl::Buffer& ResidentVolume::Impl::ranges() {
 }
 
 std::uint64_t ResidentVolume::Impl::bytes() const {
-  return field->samples.size() + (field->bricks.size() + atlas_bricks_.size()) * sizeof(std::uint32_t) +
-         ranges_.size() * sizeof(cl_float2) + frame.distance.size() + (atlas_ ? layout.bytes() : 0) +
-         (lit_ ? lit_->bytes() : 0);
+  const std::lock_guard guard(lock_);
+  return field.samples.size() + field.bricks.size() * sizeof(std::uint32_t) +
+         (atlas_ ? layout.bytes() + atlas_->bricks.size() * sizeof(std::uint32_t) : 0) +
+         ranges_.size() * sizeof(cl_float2) + (lit_ ? lit_->bytes() : 0);
 }
 
 ResidentVolume::ResidentVolume(Device& device, const MixedVolume& volume)
@@ -404,12 +426,5 @@ std::string ResidentVolume::image3d_reason() const { return impl_->layout.reason
 std::pair<float, float> ResidentVolume::value_range() const { return impl_->value_range; }
 const Grid& ResidentVolume::grid() const { return impl_->grid; }
 std::uint64_t ResidentVolume::bytes() const { return impl_->bytes(); }
-
-void ResidentVolume::set_bounds(const std::vector<float>& bounds) {
-  if (bounds.size() != impl_->host_ranges.size())
-    throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), impl_->host_ranges.size()));
-  impl_->bounds =
-      opencl::DeviceArray<float>(*impl_->state, std::span<const float>(bounds), "bounds of bricks");
-}
 
 }  // namespace vdvr

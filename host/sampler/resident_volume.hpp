@@ -4,17 +4,18 @@
 // base volume lies at (0, 0, 0) of its type's. The tiles of a triple stand on one another along z in columns
 // of sx x sy texels; because a triple's tiles are contiguous in the sample buffer, one buffer-to-image copy
 // fills a column. Columns of one triple fill shelves along x; shelves follow one another along y, below the
-// base. So tiles of any size fit any device's limits on each axis. Called by: raycast.cpp, sampler_terms.cpp.
+// base. So tiles of any size fit any device's limits on each axis. Called by: raycast.cpp, d2vr.cpp,
+// sampler_terms.cpp.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "host/render/bake.hpp"
 #include "host/sampler/device_field.hpp"
 #include "host/sampler/lit_samples.hpp"
 #include "vdvr/resident_volume.hpp"
@@ -61,26 +62,33 @@ AtlasLayout pack_atlas(const MixedVolume& volume, const ImageLimits& limits);
 /// bricks of class 0. [bz][by][bx].
 std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& classes, const Index3& bricks);
 
+/// Throws InputError for grids that cannot be drawn: 1 to 8192 cells an axis, spacings above 0.
+void check_drawn_grid(const Grid& grid);
+
+/// The atlas by SampleType; types that do not occur share another's image.
+struct Atlas {
+  std::array<cl::Image3D, 3> images;
+  opencl::DeviceArray<std::uint32_t> bricks;  ///< records whose places are texels
+};
+
+/// Whatever is const may be called from several threads: what is made on first use is made under a lock.
 struct ResidentVolume::Impl {
   Impl(Device& device, const MixedVolume& volume, const ImageLimits& limits);
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  /// The atlas by SampleType, built on first use; types that do not occur share another's image. Throws
-  /// ResourceError when the device has no room for it any more.
-  const std::array<cl::Image3D, 3>& atlas();
+  /// Made on first use. Throws ResourceError when the device has no room for it any more.
+  const Atlas& atlas() const;
   /// As DeviceField::defines, for kernels that read the atlas.
   [[nodiscard]] const opencl::Defines& atlas_defines() const { return atlas_defines_; }
-  /// Brick records whose places are texels; after atlas().
-  const cl::Buffer& atlas_bricks() const { return atlas_bricks_.buffer(); }
   /// Samples with gradients, made on first use. Throws ResourceError when the device has no room for them.
-  const LitSamples& lit();
+  const LitSamples& lit() const;
   /// Whether they were made or would fit what is left.
   [[nodiscard]] bool lit_fits() const;
   /// [bz][by][bx] min, max over the samples of the closed brick; on the device from the first call on.
-  const cl::Buffer& ranges();
-  [[nodiscard]] std::uint64_t bytes() const;  ///< on the device, between frames
+  const cl::Buffer& ranges() const;
+  [[nodiscard]] std::uint64_t bytes() const;  ///< on the device
 
   opencl::State* state;
   Grid grid;
@@ -91,33 +99,24 @@ struct ResidentVolume::Impl {
   bool is_uniform = false;  ///< every brick reads a float32 base as fine as the grid
   AtlasLayout layout;
   LitLayout lit_layout;
-
-  /// Kept between frames so that a frame allocates nothing but its picture.
-  struct FrameCache {
-    opencl::DeviceArray<cl_float4> picture, table;
-    opencl::DeviceArray<cl_uint> row_samples;
-    opencl::DeviceArray<cl_uchar> distance;
-    std::vector<float> distance_key;  ///< what `distance` was computed for
-    BakedTransfer baked;              ///< what `table` holds
-    std::vector<double> table_key;    ///< what `baked` was made from
-  } frame;
-
-  std::optional<DeviceField> field;
-  opencl::DeviceArray<float> bounds;  ///< ResidentVolume::set_bounds
+  DeviceField field;
 
  private:
+  void find_ranges(const MixedVolume& volume);
   void set_texels(const MixedVolume& volume, PackedRecords& records) const;
-  void fill_image(const cl::Image3D& image, SampleType type);
+  void fill_image(const cl::Image3D& image, SampleType type) const;
+  [[nodiscard]] std::array<cl::Image3D, 3> make_images() const;
 
   Index3 base_samples_{};
   std::map<TileKind, std::uint64_t> offsets_;
   std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
   std::vector<std::uint32_t> texel_records_;
   opencl::Defines atlas_defines_;
-  std::optional<std::array<cl::Image3D, 3>> atlas_;
-  opencl::DeviceArray<std::uint32_t> atlas_bricks_;
-  opencl::DeviceArray<cl_float2> ranges_;
-  std::optional<LitSamples> lit_;
+
+  mutable std::mutex lock_;  ///< of what follows
+  mutable std::optional<Atlas> atlas_;
+  mutable opencl::DeviceArray<cl_float2> ranges_;
+  mutable std::optional<LitSamples> lit_;
 };
 
 }  // namespace vdvr

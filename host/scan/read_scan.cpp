@@ -70,7 +70,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
   if (is_hdf5(path)) return io::open_hdf5_scan(path);
   if (raster) {
     if (!options.angles_file)
-      throw InputError(path.string() + ": a stack needs its angles; give them with --angles-file");
+      throw InputError(path.string() + ": a stack needs its angles; give them with `angles_file`");
     return io::open_raster_scan(path, *options.angles_file);
   }
   if (is_json(path)) {
@@ -235,7 +235,7 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
     r.center_source = "default";
     r.notes.push_back(fmt::format(
         "centre of rotation assumed in the detector's middle, column {}: the views do not tell; give "
-        "--center where it is elsewhere",
+        "`center` where it is elsewhere",
         g.center));
   }
   const double last = static_cast<double>(g.columns) - 0.5;

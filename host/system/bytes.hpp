@@ -68,7 +68,7 @@ class ByteReader {
 
  private:
   [[noreturn]] static void fail() {
-    throw FileError("a journal record is shorter than it says; start again without --resume");
+    throw FileError("a journal record is shorter than it says; start again without `resume`");
   }
   void copy(void* to, std::size_t n) {
     if (n > rest_.size()) fail();

@@ -180,7 +180,7 @@ void Journal::begin(const JournalHead& head) {
   if (resumes()) {
     if (*head_ != head)
       throw InputError(
-          fmt::format("{}: belongs to another build ({}); start again without --resume, which "
+          fmt::format("{}: belongs to another build ({}); start again without `resume`, which "
                       "replaces it, or with the same input and options",
                       path_.string(), differences(*head_, head)));
     begun_ = reading_ = true;
@@ -247,7 +247,7 @@ void Journal::write_record(const std::vector<std::byte>& record) {
     [[maybe_unused]] const int cut = ::ftruncate(file_, static_cast<off_t>(end_));
     throw ResourceError(
         fmt::format("{}: {} bytes cannot be added to the journal at {}: {}; free some space, "
-                    "and continue with --resume",
+                    "and continue with `resume`",
                     path_.string(), prefix_bytes + record.size(), end_, std::strerror(error)));
   }
   end_ += prefix_bytes + length;

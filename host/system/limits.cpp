@@ -33,7 +33,7 @@ void require_memory(std::uint64_t bytes, std::uint64_t limit, const std::string&
   constexpr double mebi = 1024.0 * 1024.0;
   if (limit != 0 && bytes > limit)
     throw ResourceError(
-        fmt::format("{}: needs {:.1f} MiB, the memory limit is {:.1f} MiB; raise --max-memory", what,
+        fmt::format("{}: needs {:.1f} MiB, the memory limit is {:.1f} MiB; raise `max_memory`", what,
                     static_cast<double>(bytes) / mebi, static_cast<double>(limit) / mebi));
   const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
   const auto physical = pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));

@@ -1,5 +1,5 @@
-// A reading in a child process; see rehearsal.hpp. The child answers through a pipe: one letter, the exit
-// code of what it threw, and the message.
+// A reading in a child process; see rehearsal.hpp. The child answers through a pipe: one letter, by
+// which it says how it ended, and the message.
 #include "host/system/rehearsal.hpp"
 
 #include <fcntl.h>
@@ -23,7 +23,8 @@
 namespace vdvr::io {
 namespace {
 
-constexpr char done = '0', no_memory = 'm', foreign = 'x';
+constexpr char done = 'd', no_memory = 'm', foreign = 'x';
+constexpr char letter_of(ErrorKind kind) { return static_cast<char>('0' + static_cast<int>(kind)); }
 
 // Reading at a hundredth of a disk's speed still ends in time; a loop in the library does not.
 constexpr std::uint64_t least_cpu_s = 4, slowest_bytes_per_s = 1u << 20;
@@ -77,7 +78,7 @@ void play(int to, const std::function<void()>& work) {
     work();
     tell(to, done, "");
   } catch (const Error& e) {
-    tell(to, static_cast<char>('0' + e.exit_code()), e.what());
+    tell(to, letter_of(e.kind()), e.what());
   } catch (const std::bad_alloc&) {
     tell(to, no_memory, "");
   } catch (const std::exception& e) {
@@ -97,15 +98,12 @@ std::string hear(int from) {
 }
 
 [[noreturn]] void throw_again(const std::string& path, char how, const std::string& message) {
+  if (how == letter_of(ErrorKind::mismatch)) throw MismatchError(message);
+  if (how == letter_of(ErrorKind::input) || how == letter_of(ErrorKind::file)) throw FileError(message);
+  if (how == letter_of(ErrorKind::resource)) throw ResourceError(message);
   switch (how) {
-    case '1':
-      throw MismatchError(message);
-    case '2':
-      throw FileError(message);
-    case '3':
-      throw ResourceError(message);
     case no_memory:
-      throw ResourceError(path + ": not enough memory to read it within the limit; raise --max-memory");
+      throw ResourceError(path + ": not enough memory to read it within the limit; raise `max_memory`");
     default:
       throw FileError(fmt::format("{}: cannot be read: {}", path, message));
   }

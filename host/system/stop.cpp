@@ -12,7 +12,7 @@ static_assert(std::atomic<int>::is_always_lock_free, "a signal handler writes it
 
 }  // namespace
 
-void request_stop(int exit_code) noexcept { wanted.store(exit_code, std::memory_order_relaxed); }
+void request_stop(int reason) noexcept { wanted.store(reason, std::memory_order_relaxed); }
 
 int stop_requested() noexcept { return wanted.load(std::memory_order_relaxed); }
 

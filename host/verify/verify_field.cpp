@@ -13,9 +13,12 @@
 #include "host/opencl/kernel.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_cosines.hpp"
+#include "shared/verify_pieces.h"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrPieces) == 56);
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -366,6 +369,18 @@ std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::in
 
 }  // namespace
 
+// The first and the last layer of cells along z that meet the covered heights.
+std::pair<std::int64_t, std::int64_t> VerifyField::covered_cells(const Shape& s) const {
+  const double first_z = s.begin(volume_.grid, 2, s.slab_z);
+  std::pair<std::int64_t, std::int64_t> range{s.nz, -1};
+  for (std::int64_t k = 0; k < s.nz - 1 - 2 * halo; ++k)
+    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * s.h[2]) >= -0.5 * s.h[2] * (1 + 1e-9)) {
+      range.first = std::min(range.first, k);
+      range.second = k;
+    }
+  return range;
+}
+
 void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
                           const std::function<void(const Piece&)>& on_piece) {
   const std::int64_t n = static_cast<std::int64_t>(batch.items.size()), side = s.cells + 1;
@@ -378,20 +393,30 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   opencl::DeviceArray<cl_float8> fourth(state_, count(n * side), "fourth differences");
   opencl::DeviceArray<cl_int4> columns(state_, count(n * s.cells * s.cells), "columns of gold cells");
   opencl::DeviceArray<cl_uint> bits(state_, count(n * s.cells * s.cells * s.words), "tested gold cells");
-  const cl_int rate = to_int(s.rate), cells_of_piece = to_int(s.cells), nx = to_int(s.nx),
-               z_padded = to_int(s.z_padded);
+  const auto [z_first, z_last] = covered_cells(s);
+  const VdvrPieces pieces{to_int(n),
+                          to_int(s.rate),
+                          to_int(s.cells),
+                          to_int(s.nx),
+                          to_int(s.nx),
+                          to_int(s.z_padded),
+                          to_int(s.error_padded),
+                          to_int(s.words),
+                          to_int(z_first),
+                          to_int(z_last),
+                          window_ ? 1 : 0,
+                          window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
+                          window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f,
+                          s.bounds.correction};
 
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces>
       errors(state_, "verify/verify_field", "verify_errors", stored_.defines);
   errors({{count(side), count(side), count(n)}, {count(side), 1, 1}}, error.buffer(), values.buffer(),
-         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), rate,
-         cells_of_piece, nx, nx, z_padded, to_int(s.error_padded), to_int(n));
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int>
-      fourths(state_, "verify/verify_field", "verify_fourth", stored_.defines);
+         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), pieces);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces> fourths(
+      state_, "verify/verify_field", "verify_fourth", stored_.defines);
   fourths({{count(side), count(n), 1}, {1, 1, 1}}, fourth.buffer(), values.buffer(), tested.buffer(), grid,
-          items.buffer(), first.buffer(), rate, cells_of_piece, nx, nx, z_padded, to_int(n));
+          items.buffer(), first.buffer(), pieces);
 
   const std::vector<cl_float8> rows = fourth.to_host();
   std::vector<double> constants(at(n));
@@ -407,25 +432,12 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
                                                    "constants of pieces");
 
-  // Cells along z that meet the covered heights.
-  const double first_z = s.begin(volume_.grid, 2, s.slab_z);
-  std::int64_t z_first = s.nz, z_last = -1;
-  for (std::int64_t k = 0; k < s.nz - 1 - 2 * halo; ++k)
-    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * s.h[2]) >= -0.5 * s.h[2] * (1 + 1e-9)) {
-      z_first = std::min(z_first, k);
-      z_last = k;
-    }
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer,
-                 cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_float, cl_float, cl_float, cl_int>
+                 cl::Buffer, VdvrPieces>
       cells(state_, "verify/verify_field", "verify_cells", stored_.defines);
   cells({{count(s.cells), count(s.cells), count(n)}, {count(s.cells), 1, 1}}, columns.buffer(), bits.buffer(),
         error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
-        device_widening.buffer(), rate, cells_of_piece, nx, nx, z_padded, to_int(s.error_padded),
-        to_int(s.words), to_int(z_first), to_int(z_last), window_ ? 1 : 0,
-        window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
-        window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f, s.bounds.correction,
-        to_int(n));
+        device_widening.buffer(), pieces);
 
   std::vector<Column> host(at(n * s.cells * s.cells));
   {

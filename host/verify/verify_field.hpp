@@ -69,6 +69,7 @@ class VerifyField {
                    const std::vector<std::uint8_t>& selected) const;
   void fill(Table& table, const Shape& shape, std::int64_t first_view);
   void field_of(const Batch& batch, const Shape& shape, Table& table, opencl::DeviceArray<float>& values);
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> covered_cells(const Shape& shape) const;
   void measure(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values,
                const std::function<void(const Piece&)>& on_piece);
 

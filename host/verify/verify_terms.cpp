@@ -12,7 +12,7 @@
 #include "host/bounds/covered_range.hpp"
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/result_units.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/opencl/host_memory.hpp"
 
 namespace vdvr {

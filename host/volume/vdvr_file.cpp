@@ -257,7 +257,7 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
         "/", fmt::format("datasets claim {} bytes in a file of {}: they overlap", stored, file.file_bytes()));
   if (max_memory_bytes != 0 && needed > max_memory_bytes)
     throw ResourceError(
-        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise --max-memory", path, needed,
+        fmt::format("{}: reading needs {} bytes of memory, {} are allowed: raise `max_memory`", path, needed,
                     max_memory_bytes));
   io::require_memory(needed, 0, path);  // deflated, a small file may hold a large volume
 }
@@ -274,6 +274,9 @@ void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) 
 }
 
 constexpr const char* kTotals = "/brick_total";
+constexpr const char* kCertificate = "/certificate";
+/// In its place where nothing is certified, so that nobody takes the one for the other.
+constexpr const char* kComparison = "/comparison";
 
 void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
   const Index3 b = v.bricks();
@@ -345,13 +348,20 @@ void read_step(const h5::Reader& file, const Contents& c, MixedVolume& v) {
   if (const auto p = step_problem(v)) file.refuse(p->where, p->what);
 }
 
-Certificate read_certificate(const std::string& path, const std::string& json) {
+/// The certificate, or the record of a comparison; earlier versions kept that as a certificate which says so.
+Certificate read_certificate(const h5::Reader& file, const std::string& path, std::string& json) {
+  const bool record = file.has(kComparison) && !file.has(kCertificate);
+  const char* name = record ? kComparison : kCertificate;
+  json = file.text(name, std::min(longest_certificate, file.file_bytes()));
+  Certificate c;
   try {
-    return certificate_from_json(json);
+    c = certificate_from_json(json);
   } catch (Error& e) {
-    e.add_context(path + ": /certificate");
+    e.add_context(path + ": " + name);
     throw;
   }
+  if (record && !c.comparison) file.refuse(kComparison, "does not say that it is a comparison");
+  return c;
 }
 
 // --- seal ---
@@ -359,7 +369,7 @@ Certificate read_certificate(const std::string& path, const std::string& json) {
 /// Of all objects that a reader looks at. Paths of /tiles come after "/tiles" itself.
 std::vector<h5::Attribute> all_attributes(const h5::Reader& file) {
   std::vector<std::string> objects{"/"};
-  for (const char* path : {"/base", kTotals, "/certificate", "/grid", "/level", "/tile", "/tiles"})
+  for (const char* path : {"/base", kTotals, kCertificate, kComparison, "/grid", "/level", "/tile", "/tiles"})
     if (file.has(path)) objects.emplace_back(path);
   if (file.has("/tiles"))
     for (const std::string& name : file.members("/tiles")) objects.push_back("/tiles/" + name);
@@ -434,8 +444,7 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
   const Contents contents = open_contents(file, result.volume);
   read_step(file, contents, result.volume);
   check_memory(file, path.string(), contents, max_memory_bytes);
-  result.certificate_json = file.text("/certificate", std::min(longest_certificate, file.file_bytes()));
-  result.certificate = read_certificate(path.string(), result.certificate_json);
+  result.certificate = read_certificate(file, path.string(), result.certificate_json);
   try {
     read_volume_data(file, contents, result.volume);
     read_totals(file, result.volume, result.certificate);
@@ -502,9 +511,10 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
       const auto count = static_cast<std::int64_t>(samples.size()) / v.tile_size(triple);
       write_block(file, path_of(triple), shape_of({count, side[0], side[1], side[2]}), samples);
     }
-    file.text("/certificate", json);
-    if (!certificate.brick_totals.empty()) write_totals(file, v, certificate.brick_totals);
-    file.attribute("/", kSeal, seal_of(json, certificate.brick_totals, file.attributes()));
+    if (stored.comparison) stored.brick_totals.clear();
+    file.text(stored.comparison ? kComparison : kCertificate, json);
+    if (!stored.brick_totals.empty()) write_totals(file, v, stored.brick_totals);
+    file.attribute("/", kSeal, seal_of(json, stored.brick_totals, file.attributes()));
     file.close();
   }
   target.commit();

@@ -14,28 +14,19 @@
 
 namespace vdvr {
 
-/// How bricks of different levels meet (docs/error-bounds.md, sections on closing). `none` leaves the field
-/// discontinuous: for comparison, never certified.
-enum class Closing { coarse, paper, none };
-
 struct BuildOptions {
   std::optional<std::array<double, 6>>
       roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box only
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
-  Closing closing = Closing::coarse;
   StorageChoice storage = StorageChoice::automatic;
   /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()
   /// calls begin() and leaves it to the caller to remove() it once the result is stored.
   Journal* journal = nullptr;
 };
 
-/// Whether these options make a volume to compare with, which no certificate goes with.
-inline bool is_comparison(const PlanSettings& settings, const BuildOptions& options) {
-  return settings.terms != "all" || options.closing == Closing::none;
-}
-
 struct BuildResult {
   MixedVolume volume;
+  /// Of a plan whose comparison is never certified: the record of one, which promises nothing.
   Certificate certificate;
   std::map<std::string, double> seconds;  ///< per stage
 };

@@ -48,7 +48,8 @@ struct Certificate {
   double reference_range = 0;  ///< max - min of F over covered 1x samples
   /// Stored in a file that holds a seal over it (docs/file-format.md).
   bool sealed = false;
-  /// Built by settings that leave terms or the closing out, to compare with: it promises nothing.
+  /// No certificate, but the record of a volume that nothing certifies (Comparison): what was measured and
+  /// with what it was built. It promises nothing, and a file keeps it under another name.
   bool comparison = false;
   bool holds_buffer = false;
   std::optional<bool> holds_image3d;
@@ -87,7 +88,8 @@ VDVR_API std::vector<float> brick_bounds(const Certificate& certificate, bool im
 /// One line where the certificate's own numbers do not follow from each other; empty where they do.
 VDVR_API std::string contradiction(const Certificate& certificate);
 
-/// The JSON of docs/file-format.md; finite numbers only.
+/// The JSON of docs/file-format.md; finite numbers only. A record of a comparison has neither 'holds' nor
+/// 'total'.
 VDVR_API std::string to_json(const Certificate& certificate);
 /// Throws FileError naming the missing or ill-typed member.
 VDVR_API Certificate certificate_from_json(const std::string& text);

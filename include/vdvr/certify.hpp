@@ -33,17 +33,16 @@ VDVR_API Plan make_plan(Device& device, const ProjectionSet& scan, const Toleran
 /// other, a scan that check_scan refuses, and a window or region of interest without a covered gold node;
 /// ToleranceError where the tolerance is out of reach, with a way out, or where the volume does not hold it
 /// for the sampler `buffer`, which every device has. For image3d the certificate itself says whether it holds
-/// (holds_image3d). Settings for comparison (is_comparison) give a volume that certifies nothing.
+/// (holds_image3d). Settings that are never certified (comparison.hpp) give a volume that certifies nothing.
 ///
 /// A journal in `options.build` is removed where going on would end at the same ToleranceError, and is
 /// otherwise left to the caller. Cost: as make_plan and build.
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                              const CertifyOptions& options = {}, const Progress& progress = {});
 
-/// The same, of a plan made before from the same scan, tolerance and options.
+/// The same, of a plan made before from the same scan and options.
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const Plan& plan,
-                             const Tolerance& tolerance, const CertifyOptions& options = {},
-                             const Progress& progress = {});
+                             const CertifyOptions& options = {}, const Progress& progress = {});
 
 /// The scan's geometry as certify() noted it in the certificate, with which is_covered tells the points that
 /// the certificate speaks of; none where another program wrote the file without. Throws FileError where it is

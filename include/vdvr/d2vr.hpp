@@ -47,7 +47,7 @@ class VDVR_API D2vrField {
   [[nodiscard]] std::uint64_t bytes() const;
 
   struct Impl;
-  [[nodiscard]] Impl& impl() const { return *impl_; }
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;
@@ -72,17 +72,17 @@ class VDVR_API D2vrScene {
   [[nodiscard]] const D2vrField& field() const;
 
   struct Impl;
-  [[nodiscard]] Impl& impl() const { return *impl_; }
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;
 };
 
-/// One picture, as `raycast` draws it of a volume on the scene's grid: mode dvr, every sample and six more
-/// where it is lit taken from the projections; with GradientKind::analytic one more, the derivative of the
-/// bilinear sum instead of central differences. Throws InputError for another mode, pre-integration, steps by
-/// level and the image3d sampler, which need a stored volume. RenderResult::sampler is
-/// `buffer`.
+/// One picture by a Renderer of its own, as `raycast` draws it of a volume on the scene's grid: mode dvr,
+/// every sample and six more where it is lit taken from the projections; with GradientKind::analytic one
+/// more, the derivative of the bilinear sum instead of central differences. Throws InputError for another
+/// mode, pre-integration, steps by level, stored gradients, the image3d sampler and bounds, which need a
+/// stored volume. RenderResult::sampler is `buffer`.
 VDVR_API RenderResult raycast(Device& device, const D2vrScene& scene, const RenderOptions& options);
 
 }  // namespace vdvr

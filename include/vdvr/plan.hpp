@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vdvr/certificate.hpp"
+#include "vdvr/comparison.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
 #include "vdvr/mixed_volume.hpp"
@@ -14,9 +15,8 @@
 namespace vdvr {
 
 struct Tolerance {
-  std::optional<double> relative;  ///< fraction of the reference range
+  std::optional<double> relative;  ///< fraction of the reference range, or as the settings' comparison says
   std::optional<double> absolute;  ///< density units; one of the two is set
-  bool of_max = false;             ///< relative to max |F| over covered samples, as in the paper
 };
 
 /// What is not given is chosen by trial.
@@ -26,11 +26,9 @@ struct RateOptions {
   std::optional<int> gold;
 };
 
-/// What is stored, and which error terms the tolerance must cover.
+/// What is stored, and what is foreseen.
 struct PlanSettings {
-  std::string coefficients = "midrange";  ///< midrange: samples fitted to the trilinear filter | sampled
-  std::string terms =
-      "all";  ///< all | grid: only |V - gold|, as in the paper, for comparison: no certificate
+  Comparison comparison{};
   Levels levels = Levels::anisotropic;
   int granularity = 4;  ///< 1, 2, 4 or 8; less on grids thinner than a brick
   /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to

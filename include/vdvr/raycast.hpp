@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,7 +19,7 @@ namespace vdvr {
 
 enum class RenderMode { dvr, iso, mip, slice, error };
 /// What a picture shows of modes dvr and iso (depth and error also of mip): colours, where and how what is
-/// seen stands, or the largest bound of the samples that it was made of (ResidentVolume::set_bounds).
+/// seen stands, or the largest bound of the samples that it was made of (Renderer::set_bounds).
 enum class RenderOutput { colour, depth, normal, error };
 
 /// An iso-surface; several may be translucent. At most 8 a picture.
@@ -81,11 +82,46 @@ struct RenderResult {
   double seconds = 0;                             ///< kernel and read-back
 };
 
-/// One picture and its values. Colours are display values (sRGB), composited as such. A depth is shown bright
-/// where near; a normal's components as colours, 0 as middle grey. Cost: 16 bytes per pixel on the device and
-/// on the host. Slices: x right, y down across z; x right, z down across y; y right, z down across x. Throws
-/// InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had. Mode
-/// `error` throws InputError: error slices are not ray-cast (`run`, `render --mode error`).
+class D2vrScene;
+
+/// Draws pictures of one volume, or of one scene of projections (d2vr.hpp), and keeps what the next picture
+/// can use: the picture's memory, the transfer function's tables, which bricks can be leapt over.
+///
+/// Threads: one Renderer belongs to one thread at a time. Any number of them draw one const volume at once,
+/// each in a thread of its own, and give the pictures that one thread gives; the device takes their frames in
+/// turn, so that RenderResult::seconds counts what others had enqueued. Where memory is short,
+/// GradientKind::automatic may find that others have taken the room for stored gradients.
+///
+/// Must not outlive the device, nor the volume or the scene.
+class VDVR_API Renderer {
+ public:
+  Renderer(Device& device, const ResidentVolume& volume);
+  Renderer(Device& device, const D2vrScene& scene);
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+
+  /// One picture and its values. Colours are display values (sRGB), composited as such. A depth is shown
+  /// bright where near; a normal's components as colours, 0 as middle grey. Cost: 16 bytes per pixel on the
+  /// device and on the host. Slices: x right, y down across z; x right, z down across y; y right, z down
+  /// across x.
+  ///
+  /// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
+  /// Mode `error` throws InputError: error slices are not ray-cast (error_slice.hpp). Output
+  /// `error` does without set_bounds(). Of scenes see d2vr.hpp.
+  RenderResult render(const RenderOptions& options);
+  /// [bz][by][bx] what the field errs by at most in each brick, infinite where nothing is known
+  /// (certificate.hpp, brick_bounds): what RenderOutput::error looks up. Throws InputError for another count.
+  void set_bounds(const std::vector<float>& bounds);
+  /// The sampler that a picture with this choice takes: bounds are of one sampler. Throws as render().
+  [[nodiscard]] SamplerKind sampler(SamplerKind asked) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// One picture by a renderer of its own; a Renderer is faster for several.
 VDVR_API RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);
 
 }  // namespace vdvr

@@ -15,9 +15,15 @@ namespace vdvr {
 
 struct ImageLimits;  // host/sampler/resident_volume.hpp
 
-/// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max, and the
-/// image3d atlas where the device has one that fits (built when a frame first needs it). Must not outlive the
-/// device. Throws ResourceError (memory) and InputError (sizes that do not match, an axis beyond 8192 cells).
+/// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max. What
+/// only some frames need is made when one first does: the image3d atlas where the device has one that fits,
+/// samples with stored gradients (GradientKind::stored).
+///
+/// Threads: after its constructor it never changes what it says, and any number of threads may draw it at
+/// once, each with a Renderer of its own (raycast.hpp); what is made on first use is made under a lock.
+///
+/// Must not outlive the device. Throws ResourceError (memory) and InputError (sizes that do not match, an
+/// axis beyond 8192 cells).
 class VDVR_API ResidentVolume {
  public:
   ResidentVolume(Device& device, const MixedVolume& volume);
@@ -29,15 +35,12 @@ class VDVR_API ResidentVolume {
 
   [[nodiscard]] bool has_image3d() const;
   [[nodiscard]] std::string image3d_reason() const;  ///< why not, or the atlas' size
-  [[nodiscard]] std::uint64_t bytes() const;
+  [[nodiscard]] std::uint64_t bytes() const;         ///< on the device by now
   [[nodiscard]] std::pair<float, float> value_range() const;
   [[nodiscard]] const Grid& grid() const;
-  /// [bz][by][bx] what the field errs by at most in each brick, infinite where nothing is known
-  /// (certificate.hpp, brick_bounds): what RenderOutput::error looks up. Throws InputError for another count.
-  void set_bounds(const std::vector<float>& bounds);
 
   struct Impl;
-  [[nodiscard]] Impl& impl() const { return *impl_; }
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

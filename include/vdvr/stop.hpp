@@ -6,11 +6,11 @@
 
 namespace vdvr {
 
-/// All long work of this process throws Interrupted(exit_code) at its next look; 0 takes the wish back. May
-/// be called from signal handlers and from any thread.
-VDVR_API void request_stop(int exit_code) noexcept;
+/// All long work of this process throws Interrupted(reason) at its next look; `reason` is any number of the
+/// caller's but 0, which takes the wish back. May be called from signal handlers and from any thread.
+VDVR_API void request_stop(int reason) noexcept;
 
-/// The exit code asked for, or 0.
+/// The reason given, or 0.
 VDVR_API int stop_requested() noexcept;
 
 /// Throws Interrupted if a stop was requested.

@@ -23,7 +23,7 @@ VDVR_API const char* text_of(Seal seal);
 
 struct VdvrFile {
   MixedVolume volume;
-  Certificate certificate;
+  Certificate certificate;       ///< or, where it says so, the record of a comparison
   std::string certificate_json;  ///< as stored
   std::string generator;
   int format_version = 1;

@@ -1,6 +1,7 @@
 // The field of mixed_sampler.h (VDVR_SAMPLER_BUFFER) or mixed_image.h (VDVR_SAMPLER_IMAGE3D) at the points of
-// a packet, and its gradient. Lane by lane the bits of vdvr_sample: the same operations on the same operands;
-// what is shared between lanes is only which brick records are open. Included by raycast.cl.
+// a packet, and its gradient. Lane by lane the bits of sample_at, to which
+// tests/device/one_sampler_test.cpp holds it: the same operations on the same operands; what is shared
+// between lanes is only which brick records are open. Included by raycast.cl.
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
 //
@@ -340,7 +341,7 @@ RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
 #endif
 }
 
-// As vdvr_trilinear: x first, then y, then z.
+// As vdvr_sample_in_brick: x first, then y, then z.
 RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   Sampled k;
   k.cell = cell_at(grid, b, c);
@@ -467,7 +468,7 @@ RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
 
 #endif
 
-// The field anywhere: vdvr_sample, or its image form.
+// The field anywhere: sample_at, or its image form.
 RAY_INLINE Sampled sample_anywhere(FIELD, BRICKS, VdvrGrid grid, V3 c) {
   const OpenBrick b = open_brick(bricks, grid, brick_at(grid, c));
   return sample_open(THE_FIELD, &b, grid, c);

@@ -2,15 +2,16 @@
 // chosen tiles. Layouts as in node_slack.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
 // samples every (rate * 2^coarsening >> l)-th gold node. Called by host/gold/gold_batch.cpp.
 #include "device/largest.h"
+#include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
 // The level's interpolant less gold at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                             \
-  ((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + gold_stride + (z))) + \
-   fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + gold_stride + (z))) -          \
+#define ERROR_AT(z)                                                                               \
+  ((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + s.gold_stride + (z))) + \
+   fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + s.gold_stride + (z))) -          \
    vload16(0, gold_column + (z)))
 
 // The bricks whose closed boxes a column meets: on a border those on both sides.
@@ -36,29 +37,29 @@ inline bool is_any_wanted(__global const uchar* wanted, size_t layer, int bricks
 __kernel void level_error(volatile __global int* error, __global const uchar* wanted,
                           __global const float* along, __global const float* gold,
                           __global const float* above, __global const float* below,
-                          __global const float* margin, float lowest, int nx, int ny, int nz, int halo,
-                          int gold_stride, int stride, VdvrLattice l, int bricks_x, int bricks_y,
-                          int bricks_z, int blocks) {
+                          __global const float* margin, VdvrGoldShape s, VdvrLattice l) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
-  if (x >= nx || y >= ny || block >= blocks) return;
-  const size_t column = ((size_t)block * ny + y) * nx + x;
-  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
-  if (margin[gold_at] < lowest) return;
-  const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
-  const Around m = bricks_around(x, y, bricks_x, bricks_y);
-  if (!is_any_wanted(wanted, layer, bricks_x, m)) return;
-  const int ix = min(x / l.spacing_x, (nx - 1) / l.spacing_x - 1),
-            iy = min(y / l.spacing_y, (ny - 1) / l.spacing_y - 1);
+  const int block = (int)get_global_id(2) / s.bricks_z, bz = (int)get_global_id(2) - block * s.bricks_z;
+  if (x >= s.nx || y >= s.ny || block >= s.blocks) return;
+  const size_t column = ((size_t)block * s.ny + y) * s.nx + x;
+  const size_t gold_at =
+      ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo;
+  if (margin[gold_at] < s.lowest) return;
+  const size_t layer = ((size_t)block * s.bricks_z + bz) * s.bricks_y;
+  const Around m = bricks_around(x, y, s.bricks_x, s.bricks_y);
+  if (!is_any_wanted(wanted, layer, s.bricks_x, m)) return;
+  const int ix = min(x / l.spacing_x, (s.nx - 1) / l.spacing_x - 1),
+            iy = min(y / l.spacing_y, (s.ny - 1) / l.spacing_y - 1);
   const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
               fy = (float)(y - iy * l.spacing_y) / (float)l.spacing_y;
-  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
+  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
   __global const float* a =
-      along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * gold_stride + halo + first;
-  __global const float* b = a + (size_t)l.cx * gold_stride;
-  __global const float* gold_column = gold + gold_at * gold_stride + halo + first;
-  __global const float *above_column = above + column * stride + first,
-                       *below_column = below + column * stride + first;
+      along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * s.gold_stride + s.halo +
+      first;
+  __global const float* b = a + (size_t)l.cx * s.gold_stride;
+  __global const float* gold_column = gold + gold_at * s.gold_stride + s.halo + first;
+  __global const float *above_column = above + column * s.stride + first,
+                       *below_column = below + column * s.stride + first;
 
   // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
   float largest = -1.0f;
@@ -69,14 +70,14 @@ __kernel void level_error(volatile __global int* error, __global const uchar* wa
                    largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
   }
   for (; z <= last - first; ++z) {
-    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[gold_stride + z]) +
-                    fy * ((1.0f - fx) * b[z] + fx * b[gold_stride + z]);
+    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[s.gold_stride + z]) +
+                    fy * ((1.0f - fx) * b[z] + fx * b[s.gold_stride + z]);
     const float e = v - gold_column[z];
     largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
   }
   if (largest < 0.0f) return;
   for (int by = m.y0; by <= m.y1; ++by)
-    for (int bx = m.x0; bx <= m.x1; ++bx) atomic_max(error + (layer + by) * bricks_x + bx, as_int(largest));
+    for (int bx = m.x0; bx <= m.x1; ++bx) atomic_max(error + (layer + by) * s.bricks_x + bx, as_int(largest));
 }
 
 // How far linear interpolation along one axis alone errs in the middles of its cells, for every level below
@@ -100,23 +101,22 @@ inline int level_of_middle(int i, int levels) {
 // Half the spacing of that level, in nodes; at a base sample that of the finest, which is read and not used.
 inline int half_of(int level, int levels) { return 1 << max(levels - 1 - level, 0); }
 __kernel void axis_errors(volatile __global int* errors, __global const uchar* wanted,
-                          __global const float* gold, __global const float* margin, float lowest, int nx,
-                          int ny, int nz, int halo, int gold_stride, int levels_x, int levels_y, int levels_z,
-                          int most_levels, int bricks_x, int bricks_y, int bricks_z, int blocks) {
+                          __global const float* gold, __global const float* margin, VdvrGoldShape s,
+                          int levels_x, int levels_y, int levels_z, int most_levels) {
   const int x = (int)get_global_id(0), y = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / bricks_z, bz = (int)get_global_id(2) - block * bricks_z;
-  if (x >= nx || y >= ny || block >= blocks) return;
-  const int row = nx + 2 * halo;
-  const size_t gold_at = ((size_t)block * (ny + 2 * halo) + y + halo) * row + x + halo;
-  if (margin[gold_at] < lowest) return;
-  const size_t layer = ((size_t)block * bricks_z + bz) * bricks_y;
-  const Around m = bricks_around(x, y, bricks_x, bricks_y);
-  if (!is_any_wanted(wanted, layer, bricks_x, m)) return;
-  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, nz - 1);
-  __global const float* column = gold + gold_at * gold_stride + halo;
+  const int block = (int)get_global_id(2) / s.bricks_z, bz = (int)get_global_id(2) - block * s.bricks_z;
+  if (x >= s.nx || y >= s.ny || block >= s.blocks) return;
+  const int row = s.nx + 2 * s.halo;
+  const size_t gold_at = ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * row + x + s.halo;
+  if (margin[gold_at] < s.lowest) return;
+  const size_t layer = ((size_t)block * s.bricks_z + bz) * s.bricks_y;
+  const Around m = bricks_around(x, y, s.bricks_x, s.bricks_y);
+  if (!is_any_wanted(wanted, layer, s.bricks_x, m)) return;
+  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
+  __global const float* column = gold + gold_at * s.gold_stride + s.halo;
   const int level_x = level_of_middle(x, levels_x), level_y = level_of_middle(y, levels_y);
   const int half_x = half_of(level_x, levels_x), half_y = half_of(level_y, levels_y);
-  const long step_x = (long)half_x * gold_stride, step_y = (long)half_y * row * gold_stride;
+  const long step_x = (long)half_x * s.gold_stride, step_y = (long)half_y * row * s.gold_stride;
   const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const float16 none = (float16)(0.0f);
   float16 plus_x = none, minus_x = none, plus_y = none, minus_y = none, plus_z[6], minus_z[6];
@@ -143,7 +143,7 @@ __kernel void axis_errors(volatile __global int* errors, __global const uchar* w
   }
   for (int by = m.y0; by <= m.y1; ++by)
     for (int bx = m.x0; bx <= m.x1; ++bx) {
-      volatile __global int* out = errors + ((layer + by) * bricks_x + bx) * 6 * most_levels;
+      volatile __global int* out = errors + ((layer + by) * s.bricks_x + bx) * 6 * most_levels;
       if (level_x < levels_x) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
       if (level_y < levels_y)
         raise_pair(out + 2 * (most_levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));

@@ -4,6 +4,7 @@
 // and which of its 27 parts (corners, edges, faces, inside) hold a node above the tolerance. Layouts as in
 // node_slack.cl; results [block][brick z][brick y][brick x]. Called by host/gold/gold_batch.cpp.
 #include "device/largest.h"
+#include "shared/gold_shape.h"
 #include "shared/mixed_sampler.h"
 #include "shared/untested.h"
 
@@ -17,45 +18,45 @@ inline void raise(volatile __global int* target, float v) {
 }
 
 __kernel void measure_nodes(volatile __global int* total, volatile __global int* error,
-                           volatile __global int* slack_max, volatile __global int* violated,
-                           __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
-                           __global const float* gold, __global const float* above,
-                           __global const float* below, __global const float* margin,
-                           __global const int4* first_brick, __global const uchar* selected, float lowest,
-                           int nx, int ny, int halo, int gold_stride, int stride, int rate, int bricks_x,
-                           int bricks_y, int bricks_z, int blocks, float tolerance) {
-  const int g = grid.granularity, side = g * rate + 1;
+                            volatile __global int* slack_max, volatile __global int* violated,
+                            __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
+                            __global const float* gold, __global const float* above,
+                            __global const float* below, __global const float* margin,
+                            __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
+                            float tolerance) {
+  const int g = grid.granularity, side = g * s.rate + 1;
   const int ix = (int)get_global_id(0) % side, brick_x = (int)get_global_id(0) / side;
   const int iy = (int)get_global_id(1) % side, brick_y = (int)get_global_id(1) / side;
   const int block = (int)get_global_id(2);
-  if (brick_x >= bricks_x || brick_y >= bricks_y || block >= blocks) return;
+  if (brick_x >= s.bricks_x || brick_y >= s.bricks_y || block >= s.blocks) return;
   const int4 first = first_brick[block];
   const int bx = first.x + brick_x, by = first.y + brick_y;
   if (bx >= grid.bricks_x || by >= grid.bricks_y) return;
-  const int last_x = min(g, grid.cells_x - bx * g) * rate, last_y = min(g, grid.cells_y - by * g) * rate;
+  const int last_x = min(g, grid.cells_x - bx * g) * s.rate, last_y = min(g, grid.cells_y - by * g) * s.rate;
   if (ix > last_x || iy > last_y) return;
-  const size_t column = ((size_t)block * ny + brick_y * g * rate + iy) * nx + brick_x * g * rate + ix;
+  const size_t column = ((size_t)block * s.ny + brick_y * g * s.rate + iy) * s.nx + brick_x * g * s.rate + ix;
   const size_t gold_at =
-      ((size_t)block * (ny + 2 * halo) + brick_y * g * rate + iy + halo) * (nx + 2 * halo) +
-      brick_x * g * rate + ix + halo;
-  if (margin[gold_at] < lowest) return;
+      ((size_t)block * (s.ny + 2 * s.halo) + brick_y * g * s.rate + iy + s.halo) * (s.nx + 2 * s.halo) +
+      brick_x * g * s.rate + ix + s.halo;
+  if (margin[gold_at] < s.lowest) return;
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
-  const float cx = (float)(bx * g) + (float)ix / (float)rate, cy = (float)(by * g) + (float)iy / (float)rate;
-  __global const float* gold_start = gold + gold_at * gold_stride + halo;
-  __global const float *above_start = above + column * stride, *below_start = below + column * stride;
+  const float cx = (float)(bx * g) + (float)ix / (float)s.rate,
+              cy = (float)(by * g) + (float)iy / (float)s.rate;
+  __global const float* gold_start = gold + gold_at * s.gold_stride + s.halo;
+  __global const float *above_start = above + column * s.stride, *below_start = below + column * s.stride;
 
-  for (int brick_z = 0; brick_z < bricks_z; ++brick_z) {
+  for (int brick_z = 0; brick_z < s.bricks_z; ++brick_z) {
     const int bz = first.z + brick_z;
     const size_t brick = ((size_t)bz * grid.bricks_y + by) * grid.bricks_x + bx;
     if (bz >= grid.bricks_z || !selected[brick]) continue;
-    const int last_z = min(g, grid.cells_z - bz * g) * rate;
+    const int last_z = min(g, grid.cells_z - bz * g) * s.rate;
     const VdvrBrick b = vdvr_brick(bricks, grid, brick);
     const VdvrLocal x = vdvr_local(cx, bx, b.level_x, g, grid.cells_x, grid.coarse_x),
                     y = vdvr_local(cy, by, b.level_y, g, grid.cells_y, grid.coarse_y);
-    __global const float* gold_column = gold_start + brick_z * g * rate;
-    __global const float *above_column = above_start + brick_z * g * rate,
-                         *below_column = below_start + brick_z * g * rate;
-    const int per_interval = (rate << grid.coarse_z) >> b.level_z;
+    __global const float* gold_column = gold_start + brick_z * g * s.rate;
+    __global const float *above_column = above_start + brick_z * g * s.rate,
+                         *below_column = below_start + brick_z * g * s.rate;
+    const int per_interval = (s.rate << grid.coarse_z) >> b.level_z;
     const float interval = 1.0f / (float)per_interval;
     float largest_total = -1.0f, largest_error = 0.0f, largest_slack = -1.0f;
     int parts = 0;
@@ -99,7 +100,7 @@ __kernel void measure_nodes(volatile __global int* total, volatile __global int*
       }
     }
     if (largest_slack < 0.0f) continue;
-    const size_t out = (((size_t)block * bricks_z + brick_z) * bricks_y + brick_y) * bricks_x + brick_x;
+    const size_t out = (((size_t)block * s.bricks_z + brick_z) * s.bricks_y + brick_y) * s.bricks_x + brick_x;
     raise(total + out, fmax(largest_total, 0.0f));
     raise(error + out, largest_error);
     raise(slack_max + out, largest_slack);

@@ -1,6 +1,7 @@
 // The definition of the mixed-resolution field, compiled by the OpenCL compiler and by the host compiler
-// alike: what the verifier certifies, the ray-caster renders and sample_at returns is this text (contract:
-// docs/file-format.md).
+// alike: what is certified, verified and returned by sample_at is this text, and what the ray-caster renders
+// its transcript for packets of rays (device/packet_sampler.h), held to it to the bit by
+// tests/device/one_sampler_test.cpp (contract: docs/file-format.md).
 //
 // The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, conversion
 // to int and comparisons only, contraction off on both sides, so that both give the same bits.
@@ -208,21 +209,6 @@ VDVR_INLINE float vdvr_sample_in_brick(VDVR_GLOBAL const void* samples, VdvrBric
                               b.bias, x.fraction, y.fraction, z.fraction);
   return vdvr_trilinear_u8((VDVR_GLOBAL const vdvr_u8*)samples + i, b.stride_y, b.stride_z, b.scale, b.bias,
                            x.fraction, y.fraction, z.fraction);
-}
-
-// The field at a cell coordinate: finds the brick, then samples it.
-VDVR_INLINE float vdvr_sample(VDVR_GLOBAL const void* samples, VDVR_GLOBAL const vdvr_u32* records,
-                              VdvrGrid grid, float cx, float cy, float cz) {
-  const vdvr_i32 bx = vdvr_brick_of(cx, grid.granularity, grid.bricks_x);
-  const vdvr_i32 by = vdvr_brick_of(cy, grid.granularity, grid.bricks_y);
-  const vdvr_i32 bz = vdvr_brick_of(cz, grid.granularity, grid.bricks_z);
-  const VdvrBrick b = vdvr_brick(
-      records, grid,
-      ((vdvr_u64)bz * (vdvr_u64)grid.bricks_y + (vdvr_u64)by) * (vdvr_u64)grid.bricks_x + (vdvr_u64)bx);
-  return vdvr_sample_in_brick(samples, b,
-                              vdvr_local(cx, bx, b.level_x, grid.granularity, grid.cells_x, grid.coarse_x),
-                              vdvr_local(cy, by, b.level_y, grid.granularity, grid.cells_y, grid.coarse_y),
-                              vdvr_local(cz, bz, b.level_z, grid.granularity, grid.cells_z, grid.coarse_z));
 }
 
 #endif

@@ -10,6 +10,7 @@
 // Called by host/verify/verify_field.cpp.
 #include "device/largest.h"
 #include "shared/mixed_sampler.h"
+#include "shared/verify_pieces.h"
 
 #define RADIUS 2
 
@@ -81,29 +82,30 @@ inline int last_node(int piece, int cells, int all) { return min(cells, all - pi
 
 __kernel void verify_errors(__global float* error, __global const float* field, __global const uchar* samples,
                             __global const uint* bricks, VdvrGrid grid, __global const int4* items,
-                            __global const int4* first, int rate, int cells, int nx, int ny, int z_padded,
-                            int error_padded, int count) {
-  const int g = grid.granularity, per_brick = g * rate, side = cells + 1;
+                            __global const int4* first, VdvrPieces s) {
+  const int g = grid.granularity, per_brick = g * s.rate, side = s.cells + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
-  if (x >= side || y >= side || i >= count) return;
+  if (x >= side || y >= side || i >= s.count) return;
   const int4 item = items[i];
-  if (x > last_node(item.x, cells, grid.cells_x * rate) || y > last_node(item.y, cells, grid.cells_y * rate))
+  if (x > last_node(item.x, s.cells, grid.cells_x * s.rate) ||
+      y > last_node(item.y, s.cells, grid.cells_y * s.rate))
     return;
-  const int last_z = last_node(item.z, cells, grid.cells_z * rate);
-  const int bx = item.x * cells / per_brick, by = item.y * cells / per_brick, bz = item.z * cells / per_brick;
-  const int from_x = item.x * cells - bx * per_brick, from_y = item.y * cells - by * per_brick,
-            from_z = item.z * cells - bz * per_brick;
+  const int last_z = last_node(item.z, s.cells, grid.cells_z * s.rate);
+  const int bx = item.x * s.cells / per_brick, by = item.y * s.cells / per_brick,
+            bz = item.z * s.cells / per_brick;
+  const int from_x = item.x * s.cells - bx * per_brick, from_y = item.y * s.cells - by * per_brick,
+            from_z = item.z * s.cells - bz * per_brick;
   const VdvrBrick b = vdvr_brick(bricks, grid, ((ulong)bz * grid.bricks_y + by) * grid.bricks_x + bx);
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
-  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) / (float)rate, bx, b.level_x, g,
+  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) / (float)s.rate, bx, b.level_x, g,
                                   grid.cells_x, grid.coarse_x),
-                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) / (float)rate, by, b.level_y, g,
+                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) / (float)s.rate, by, b.level_y, g,
                                   grid.cells_y, grid.coarse_y);
-  __global const float* f = field_column(field, item, first[item.w], x, y, cells, nx, ny, z_padded);
-  __global float* out = error + (((size_t)i * side + y) * side + x) * error_padded;
+  __global const float* f = field_column(field, item, first[item.w], x, y, s.cells, s.nx, s.ny, s.z_padded);
+  __global float* out = error + (((size_t)i * side + y) * side + x) * s.error_padded;
   // vdvr_trilinear, its two faces kept for all nodes between them.
-  const int per_interval = (rate << grid.coarse_z) >> b.level_z;
-  const int intervals = min(g, grid.cells_z - bz * g) * rate / per_interval;
+  const int per_interval = (s.rate << grid.coarse_z) >> b.level_z;
+  const int intervals = min(g, grid.cells_z - bz * g) * s.rate / per_interval;
   const float step = 1.0f / (float)per_interval;
   int index = from_z / per_interval;
   float low = vdvr_sample_in_plane(samples, b, lx, ly, index);
@@ -139,21 +141,21 @@ inline float16 mixed(__global const float* p, int a, int b) {
 // Per tested piece and row of nodes: the largest |fourth difference| xx, yy, zz, xy, xz, yz over the corners
 // of its tested cells. float8 out[item][y].
 __kernel void verify_fourth(__global float8* out, __global const float* field, __global const uchar* tested,
-                            VdvrGrid grid, __global const int4* items, __global const int4* first, int rate,
-                            int cells, int nx, int ny, int z_padded, int count) {
-  const int side = cells + 1;
+                            VdvrGrid grid, __global const int4* items, __global const int4* first,
+                            VdvrPieces s) {
+  const int side = s.cells + 1;
   const int y = (int)get_global_id(0), i = (int)get_global_id(1);
-  if (y >= side || i >= count) return;
+  if (y >= side || i >= s.count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];
-  const int last_x = last_node(item.x, cells, grid.cells_x * rate),
-            last_y = last_node(item.y, cells, grid.cells_y * rate),
-            last_z = last_node(item.z, cells, grid.cells_z * rate);
-  const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
-  __global const uchar* mask =
-      tested + ((size_t)item.w * mask_y + (item.y - begin.y) * cells) * mask_x + (item.x - begin.x) * cells;
+  const int last_x = last_node(item.x, s.cells, grid.cells_x * s.rate),
+            last_y = last_node(item.y, s.cells, grid.cells_y * s.rate),
+            last_z = last_node(item.z, s.cells, grid.cells_z * s.rate);
+  const int mask_x = s.nx - 1 - 2 * RADIUS, mask_y = s.ny - 1 - 2 * RADIUS;
+  __global const uchar* mask = tested + ((size_t)item.w * mask_y + (item.y - begin.y) * s.cells) * mask_x +
+                               (item.x - begin.x) * s.cells;
   float16 xx = (float16)(0.0f), yy = xx, zz = xx, xy = xx, xz = xx, yz = xx;
-  const int row = nx * z_padded;
+  const int row = s.nx * s.z_padded;
   if (y <= last_y)
     for (int x = 0; x <= last_x; ++x) {
       bool is_corner = false;
@@ -162,16 +164,16 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
           if (x + dx >= 0 && x + dx < last_x && y + dy >= 0 && y + dy < last_y)
             is_corner = is_corner || mask[(y + dy) * mask_x + x + dx];
       if (!is_corner) continue;
-      __global const float* column = field_column(field, item, begin, x, y, cells, nx, ny, z_padded);
+      __global const float* column = field_column(field, item, begin, x, y, s.cells, s.nx, s.ny, s.z_padded);
       for (int z = 0; z <= last_z; z += 16) {
         __global const float* p = column + z;
         const int16 outside = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) > last_z;
         const float16 none = (float16)(0.0f);
-        xx = fmax(xx, select(fabs(fourth(p, z_padded)), none, outside));
+        xx = fmax(xx, select(fabs(fourth(p, s.z_padded)), none, outside));
         yy = fmax(yy, select(fabs(fourth(p, row)), none, outside));
         zz = fmax(zz, select(fabs(fourth(p, 1)), none, outside));
-        xy = fmax(xy, select(fabs(mixed(p, z_padded, row)), none, outside));
-        xz = fmax(xz, select(fabs(mixed(p, z_padded, 1)), none, outside));
+        xy = fmax(xy, select(fabs(mixed(p, s.z_padded, row)), none, outside));
+        xz = fmax(xz, select(fabs(mixed(p, s.z_padded, 1)), none, outside));
         yz = fmax(yz, select(fabs(mixed(p, row, 1)), none, outside));
       }
     }
@@ -188,23 +190,23 @@ inline float16 curvature(__global const float* p, int stride, float correction) 
                 inner = (low - c) + (high - c);
   return inner + (3.0f * inner - outer) * (correction * (1.0f / 12.0f));
 }
-#define CORNER(dx, dy, dz)                                                                     \
-  {                                                                                            \
-    __global const float* p = at + (dy)*row + (dx)*z_padded + (dz);                            \
-    const float16 cx = curvature(p, z_padded, correction), cy = curvature(p, row, correction), \
-                  cz = curvature(p, 1, correction);                                            \
-    px = fmax(px, cx);                                                                         \
-    mx = fmin(mx, cx);                                                                         \
-    py = fmax(py, cy);                                                                         \
-    my = fmin(my, cy);                                                                         \
-    pz = fmax(pz, cz);                                                                         \
-    mz = fmin(mz, cz);                                                                         \
-    const float16 v = vload16(0, p);                                                           \
-    low = fmin(low, v);                                                                        \
-    high = fmax(high, v);                                                                      \
-    const float16 ec = vload16(0, err + ((dy)*side + (dx)) * error_padded + (dz));             \
-    highest = fmax(highest, ec);                                                               \
-    lowest = fmin(lowest, ec);                                                                 \
+#define CORNER(dx, dy, dz)                                                                           \
+  {                                                                                                  \
+    __global const float* p = at + (dy)*row + (dx)*s.z_padded + (dz);                                \
+    const float16 cx = curvature(p, s.z_padded, s.correction), cy = curvature(p, row, s.correction), \
+                  cz = curvature(p, 1, s.correction);                                                \
+    px = fmax(px, cx);                                                                               \
+    mx = fmin(mx, cx);                                                                               \
+    py = fmax(py, cy);                                                                               \
+    my = fmin(my, cy);                                                                               \
+    pz = fmax(pz, cz);                                                                               \
+    mz = fmin(mz, cz);                                                                               \
+    const float16 v = vload16(0, p);                                                                 \
+    low = fmin(low, v);                                                                              \
+    high = fmax(high, v);                                                                            \
+    const float16 ec = vload16(0, err + ((dy)*side + (dx)) * s.error_padded + (dz));                 \
+    highest = fmax(highest, ec);                                                                     \
+    lowest = fmin(lowest, ec);                                                                       \
   }
 
 // Per column of gold cells of a tested piece: int4 {largest bound of |V - F| less the piece's constant, the
@@ -214,31 +216,29 @@ inline float16 curvature(__global const float* p, int stride, float correction) 
 __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __global const float* error,
                            __global const float* field, __global const uchar* tested, VdvrGrid grid,
                            __global const int4* items, __global const int4* first,
-                           __global const float* widening, int rate, int cells, int nx, int ny, int z_padded,
-                           int error_padded, int words, int z_first, int z_last, int windowed,
-                           float window_low, float window_high, float correction, int count) {
-  const int side = cells + 1;
+                           __global const float* widening, VdvrPieces s) {
+  const int side = s.cells + 1;
   const int x = (int)get_global_id(0), y = (int)get_global_id(1), i = (int)get_global_id(2);
-  if (x >= cells || y >= cells || i >= count) return;
+  if (x >= s.cells || y >= s.cells || i >= s.count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];
-  const size_t column = ((size_t)i * cells + y) * cells + x;
-  const int mask_x = nx - 1 - 2 * RADIUS, mask_y = ny - 1 - 2 * RADIUS;
-  const bool inside = x < last_node(item.x, cells, grid.cells_x * rate) &&
-                      y < last_node(item.y, cells, grid.cells_y * rate) &&
-                      tested[((size_t)item.w * mask_y + (item.y - begin.y) * cells + y) * mask_x +
-                             (item.x - begin.x) * cells + x];
-  // Cells of the block's z range [z_first, z_last] meet the covered heights.
-  const int z_begin = (item.z - begin.z) * cells,
-            end = min(last_node(item.z, cells, grid.cells_z * rate), z_last + 1 - z_begin);
+  const size_t column = ((size_t)i * s.cells + y) * s.cells + x;
+  const int mask_x = s.nx - 1 - 2 * RADIUS, mask_y = s.ny - 1 - 2 * RADIUS;
+  const bool inside = x < last_node(item.x, s.cells, grid.cells_x * s.rate) &&
+                      y < last_node(item.y, s.cells, grid.cells_y * s.rate) &&
+                      tested[((size_t)item.w * mask_y + (item.y - begin.y) * s.cells + y) * mask_x +
+                             (item.x - begin.x) * s.cells + x];
+  // Cells of the block's z range [s.z_first, s.z_last] meet the covered heights.
+  const int z_begin = (item.z - begin.z) * s.cells,
+            end = min(last_node(item.z, s.cells, grid.cells_z * s.rate), s.z_last + 1 - z_begin);
   float best = -1.0f, worst_error = 0.0f;
   int best_z = -1;
-  const int row = nx * z_padded;
-  for (int z = 0, word = 0; word < words; z += 16, ++word) {
+  const int row = s.nx * s.z_padded;
+  for (int z = 0, word = 0; word < s.words; z += 16, ++word) {
     uint bits = 0;
     if (inside && z < end) {
-      __global const float* at = field_column(field, item, begin, x, y, cells, nx, ny, z_padded) + z;
-      __global const float* err = error + (((size_t)i * side + y) * side + x) * error_padded + z;
+      __global const float* at = field_column(field, item, begin, x, y, s.cells, s.nx, s.ny, s.z_padded) + z;
+      __global const float* err = error + (((size_t)i * side + y) * side + x) * s.error_padded + z;
       float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
       float16 low = (float16)(INFINITY), high = -low, lowest = low, highest = high;
       CORNER(0, 0, 0)
@@ -252,9 +252,9 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
       // Where F is convex its interpolant lies above it, where it is concave below.
       const float16 over = 0.125f * (px + py + pz), under = -0.125f * (mx + my + mz);
       const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-      int16 counts = (k < end) & (k + z_begin >= z_first);
-      if (windowed) {
-        counts &= ~((low - over - widening[i] > window_high) | (high + under + widening[i] < window_low));
+      int16 counts = (k < end) & (k + z_begin >= s.z_first);
+      if (s.windowed) {
+        counts &= ~((low - over - widening[i] > s.window_high) | (high + under + widening[i] < s.window_low));
       }
       float16 total = fmax(highest + over, under - lowest), e = fmax(highest, -lowest);
       total = select((float16)(INFINITY), total, total <= FLT_MAX);
@@ -273,7 +273,7 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
           if (values[lane] == largest) best_z = z + lane;
       }
     }
-    cells_tested[column * words + word] = bits;
+    cells_tested[column * s.words + word] = bits;
   }
   out[column] = (int4)(as_int(best), as_int(worst_error), best_z, 0);
 }

@@ -60,7 +60,7 @@ Case wave_of_one_row(double epsilon) {
                        }),
       epsilon);
   c.rates = {64, Interpolation::linear, 2};
-  c.settings.coefficients = "sampled";
+  c.settings.comparison.coefficients = Coefficients::sampled;
   return c;
 }
 
@@ -74,7 +74,7 @@ Case wave_along_v() {
                               }),
               0.15);
   c.rates = {8, Interpolation::cubic, 2};
-  c.settings.coefficients = "sampled";
+  c.settings.comparison.coefficients = Coefficients::sampled;
   return c;
 }
 

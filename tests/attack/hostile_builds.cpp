@@ -16,7 +16,6 @@ using namespace vdvr::hostile;
 
 namespace {
 
-const char* name_of(Closing c) { return c == Closing::paper ? "paper" : "coarse"; }
 const char* name_of(StorageChoice s) {
   return s == StorageChoice::automatic ? "auto"
          : s == StorageChoice::f32     ? "f32"
@@ -32,9 +31,10 @@ std::string text_of_case(const Case& c) {
       std::to_string(c.grid.cells[2]) + " of " + detail::text_of(c.grid.spacing) + " px at " +
       detail::text_of(c.grid.origin) + "; upsampling " + rate(c.rates.upsampling) + " " +
       (c.rates.interpolation ? text_of(*c.rates.interpolation) : "auto") + ", gold " + rate(c.rates.gold) +
-      ", " + c.settings.coefficients + ", " + text_of(c.settings.levels) + ", closing " +
-      name_of(c.options.closing) + ", granularity " + std::to_string(c.settings.granularity) + ", storage " +
-      name_of(c.options.storage) + ", " + text_of(c.field.filter) + " " + detail::text_of(c.field.cutoff);
+      ", " + text_of(c.settings.comparison.coefficients) + ", " + text_of(c.settings.levels) + ", closing " +
+      text_of(c.settings.comparison.closing) + ", granularity " + std::to_string(c.settings.granularity) +
+      ", storage " + name_of(c.options.storage) + ", " + text_of(c.field.filter) + " " +
+      detail::text_of(c.field.cutoff);
   if (const auto& base = c.settings.coarsening)
     text += ", base " + std::to_string(1 << (*base)[2]) + "x" + std::to_string(1 << (*base)[1]) + "x" +
             std::to_string(1 << (*base)[0]);

@@ -73,15 +73,16 @@ std::pair<float, float> bounds_near(const std::vector<float>& bounds, const Vec3
 
 BOOST_AUTO_TEST_CASE(dvr_shows_the_largest_bound_of_the_samples_that_are_seen) {
   const std::vector<float> bounds = some_bounds();
-  ResidentVolume v(device(), volume());
-  v.set_bounds(bounds);
+  const ResidentVolume v(device(), volume());
+  Renderer renderer(device(), v);
+  renderer.set_bounds(bounds);
   RenderOptions o = error_options(RenderMode::dvr);
   // What is above 0.3 is seen wherever it lies: 0.009 a cell, of which 22 cells of at most 0.03 leave half.
   o.transfer = {"thin", {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.03}}};
   for (const SamplerKind sampler : {SamplerKind::buffer, SamplerKind::image3d}) {
     if (sampler == SamplerKind::image3d && !v.has_image3d()) continue;
     o.sampler = sampler;
-    const auto shown = raycast(device(), v, o).values.values;
+    const auto shown = renderer.render(o).values.values;
     int seen = 0, wrong = 0;
     for (std::int64_t i = 0; i < 65 * 65; ++i) {
       const reference::Ray ray = reference::pixel_ray(o.camera, 65, 65, i % 65, i / 65);
@@ -110,13 +111,14 @@ BOOST_AUTO_TEST_CASE(dvr_shows_the_largest_bound_of_the_samples_that_are_seen) {
 
 BOOST_AUTO_TEST_CASE(surfaces_and_maxima_show_the_bound_of_their_point) {
   const std::vector<float> bounds = some_bounds();
-  ResidentVolume v(device(), volume());
-  v.set_bounds(bounds);
+  const ResidentVolume v(device(), volume());
+  Renderer renderer(device(), v);
+  renderer.set_bounds(bounds);
   for (const RenderMode mode : {RenderMode::iso, RenderMode::mip}) {
     RenderOptions o = error_options(mode);
-    const auto shown = raycast(device(), v, o).values.values;
+    const auto shown = renderer.render(o).values.values;
     o.output = RenderOutput::depth;
-    const auto depth = raycast(device(), v, o).values.values;
+    const auto depth = renderer.render(o).values.values;
     int seen = 0, wrong = 0;
     for (std::int64_t i = 0; i < 65 * 65; ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -135,12 +137,13 @@ BOOST_AUTO_TEST_CASE(surfaces_and_maxima_show_the_bound_of_their_point) {
 
 BOOST_AUTO_TEST_CASE(every_way_of_stepping_shows_bounds_of_what_it_took) {
   const std::vector<float> alike(volume().level.size(), 0.25f);
-  ResidentVolume v(device(), volume());
-  v.set_bounds(alike);
+  const ResidentVolume v(device(), volume());
+  Renderer renderer(device(), v);
+  renderer.set_bounds(alike);
   RenderOptions o = error_options(RenderMode::dvr);
   const auto seen_by = [&] {
     int seen = 0;
-    for (const float x : raycast(device(), v, o).values.values) {
+    for (const float x : renderer.render(o).values.values) {
       BOOST_REQUIRE((std::isnan(x) || x == 0.25f));
       if (!std::isnan(x)) ++seen;
     }
@@ -154,10 +157,12 @@ BOOST_AUTO_TEST_CASE(every_way_of_stepping_shows_bounds_of_what_it_took) {
   BOOST_TEST(seen_by() > 300);
 }
 
-BOOST_AUTO_TEST_CASE(volumes_without_bounds_show_none) {
-  ResidentVolume v(device(), volume());
+BOOST_AUTO_TEST_CASE(renderers_without_bounds_show_none) {
+  const ResidentVolume v(device(), volume());
+  Renderer renderer(device(), v);
+  BOOST_CHECK_THROW(renderer.render(error_options(RenderMode::dvr)), InputError);
   BOOST_CHECK_THROW(raycast(device(), v, error_options(RenderMode::dvr)), InputError);
-  BOOST_CHECK_THROW(v.set_bounds({1, 2, 3}), InputError);
+  BOOST_CHECK_THROW(renderer.set_bounds({1, 2, 3}), InputError);
   Certificate c;
   BOOST_CHECK_THROW(brick_bounds(c, false), InputError);
   c.brick_totals = {0.5f, -1.0f};

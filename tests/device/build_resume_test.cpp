@@ -24,7 +24,7 @@ BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted
   const Grid grid = grid_of(scan, {17, 17, 12}, 1.0);
   Device device("", 20 << 20);
   PlanSettings sampled;
-  sampled.coefficients = "sampled";
+  sampled.comparison.coefficients = Coefficients::sampled;
   sampled.granularity = 2;
   const Plan plan = make_plan(device, scan, grid, {}, {8, Interpolation::linear, 8}, {0.1, {}}, sampled);
   BuildOptions options;
@@ -73,10 +73,11 @@ BOOST_AUTO_TEST_CASE(journal_of_another_build_is_refused_with_what_differs) {
   const Grid grid = grid_of(scan, {8, 8, 4}, 1.0);
   const support::TemporaryFolder folder;
   const auto build_with = [&](const ProjectionSet& of, double epsilon, Closing closing) {
-    const Plan plan = make_plan(device, of, grid, {}, {8, Interpolation::linear, 8}, {epsilon, {}});
+    PlanSettings settings;
+    settings.comparison.closing = closing;
+    const Plan plan = make_plan(device, of, grid, {}, {8, Interpolation::linear, 8}, {epsilon, {}}, settings);
     Journal journal(folder / "o.journal", true);
     BuildOptions options;
-    options.closing = closing;
     options.journal = &journal;
     build(device, of, plan, options);
   };

@@ -27,7 +27,7 @@ struct Wanted {
   RateOptions rates{};
   BuildOptions options{};
   std::uint64_t max_memory = 0;
-  bool sampled = false;
+  Comparison comparison{};
   bool isotropic = false;
   std::optional<LevelTriple> coarsening{};
   std::optional<double> epsilon_abs{};  // in place of epsilon
@@ -42,7 +42,7 @@ struct Built {
 Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   Device device("", wanted.max_memory);
   PlanSettings settings;
-  if (wanted.sampled) settings.coefficients = "sampled";
+  settings.comparison = wanted.comparison;
   if (wanted.isotropic) settings.levels = Levels::isotropic;
   settings.granularity = wanted.granularity;
   settings.coarsening = wanted.coarsening;
@@ -199,7 +199,7 @@ BOOST_AUTO_TEST_CASE(eight_bits_that_leave_no_room_are_refused_and_auto_takes_mo
   BOOST_CHECK_EXCEPTION(build_of(scan, wanted), ToleranceError, [](const ToleranceError& e) {
     const std::string text = e.what();
     return text.find("integer samples round") != std::string::npos &&
-           text.find("--storage") != std::string::npos && text.find("interpolating") == std::string::npos;
+           text.find("`storage`") != std::string::npos && text.find("interpolating") == std::string::npos;
   });
   wanted.options.storage = StorageChoice::automatic;
   const Built built = build_of(scan, wanted);
@@ -211,8 +211,7 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_the_paper_closing) {
   const ProjectionSet scan = noise_scan(19, 9, 33, 4);
   for (const StorageChoice storage : {StorageChoice::f32, StorageChoice::u8}) {
     Wanted wanted{grid_of(scan, {11, 10, 7}, 0.9), 0.15};
-    wanted.options.closing = Closing::paper;
-    wanted.sampled = true;
+    wanted.comparison = {Coefficients::sampled, Terms::all, Closing::paper};
     wanted.options.storage = storage;
     const Built built = build_of(scan, wanted);
     check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 40, 150, 3));
@@ -225,8 +224,8 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_with_the_paper_closing) {
 BOOST_AUTO_TEST_CASE(certificate_holds_where_the_paper_closing_raises_easy_bricks) {
   ProjectionSet scan = simulated(sphere(2.8), 17, 9, 24);
   Wanted wanted{make_grid(scan.geometry, {}), 0.03, {{}, {}, 8}};
-  wanted.options.closing = Closing::paper;
-  wanted.sampled = wanted.isotropic = true;
+  wanted.comparison = {Coefficients::sampled, Terms::all, Closing::paper};
+  wanted.isotropic = true;
   const Built built = build_of(scan, wanted);
   check_certificate(scan, built, random_points(wanted.grid.origin, end_of(wanted.grid), 20, 150, 3));
   BOOST_TEST(verifies(scan, built.result.volume, built.result.certificate));
@@ -451,7 +450,7 @@ BOOST_AUTO_TEST_CASE(absurd_tolerance_is_out_of_reach) {
   // plan that does not count them foresees how much that is.
   const RateOptions coarse{2, Interpolation::linear, 2};
   PlanSettings comparison;
-  comparison.terms = "grid";
+  comparison.comparison.terms = Terms::grid;
   const ErrorBudget budget = make_plan(device, scan, grid, {}, coarse, {whole_range, {}}, comparison).budget;
   const double taken = std::max(budget.gold.value, budget.projection.value);
   BOOST_TEST(taken > 0);

@@ -62,7 +62,7 @@ BOOST_AUTO_TEST_CASE(a_certificate_is_complete) {
 
 BOOST_AUTO_TEST_CASE(planned_before_or_at_once_it_is_the_same_volume) {
   const Plan plan = make_plan(device(), scan(), part_of_range(0.2));
-  const BuildResult again = certify(device(), scan(), plan, part_of_range(0.2));
+  const BuildResult again = certify(device(), scan(), plan);
   BOOST_TEST(again.certificate.content_sha256 == certified().certificate.content_sha256);
   BOOST_TEST(again.certificate.options_json == certified().certificate.options_json);
 }
@@ -94,7 +94,7 @@ BOOST_AUTO_TEST_CASE(options_that_exclude_each_other_are_refused_by_name) {
     o.plan.levels = Levels::isotropic;
     o.plan.coarsening = LevelTriple{1, 0, 0};
   });
-  refused("coefficients", [](CertifyOptions& o) { o.build.closing = Closing::paper; });
+  refused("coefficients", [](CertifyOptions& o) { o.plan.comparison.closing = Closing::paper; });
 }
 
 BOOST_AUTO_TEST_CASE(a_file_holds_against_its_projections_and_no_others) {

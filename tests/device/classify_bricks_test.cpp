@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "host/certify/close_boundaries.hpp"
-#include "host/fbp/reconstruct_field.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "vdvr/simulate.hpp"

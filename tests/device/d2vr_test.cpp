@@ -203,7 +203,7 @@ BOOST_AUTO_TEST_CASE(picture_is_that_of_a_finely_sampled_volume) {
   o.step = 8;
   o.transfer.points.back().opacity = 0.0125;
   o.termination = 1;
-  const FloatPicture direct = raycast_float(device(), scene, o), sampled = raycast_float(device(), volume, o);
+  const FloatPicture direct = raycast_float(scene, o), sampled = raycast_float(device(), volume, o);
 
   const reference::BilinearViews q = views_of(scan);
   double miss = 0, magnitude = 0;
@@ -245,7 +245,7 @@ BOOST_AUTO_TEST_CASE(normals_are_central_differences_of_the_field) {
   RenderOptions o = options_for(grid);
   o.output = RenderOutput::normal;
   o.transfer.points.back().opacity = 0.9;
-  const FloatPicture picture = raycast_float(device(), D2vrScene(device(), field, grid), o);
+  const FloatPicture picture = raycast_float(D2vrScene(device(), field, grid), o);
   const reference::BilinearViews q = views_of(scan);
   const double eye = std::sqrt(reference::dot(o.camera.position, o.camera.position));
   const double filtered = filter_error(scan);
@@ -298,7 +298,7 @@ BOOST_AUTO_TEST_CASE(analytic_normals_are_the_derivative_of_the_sum) {
   o.output = RenderOutput::normal;
   o.gradient = GradientKind::analytic;
   o.transfer.points.back().opacity = 0.9;
-  const FloatPicture picture = raycast_float(device(), D2vrScene(device(), field, grid), o);
+  const FloatPicture picture = raycast_float(D2vrScene(device(), field, grid), o);
   const reference::BilinearViews q = views_of(scan);
   const double eye = std::sqrt(reference::dot(o.camera.position, o.camera.position));
   // As above: how far the point may lie aside, and the rounding of its columns and rows.
@@ -340,9 +340,9 @@ BOOST_AUTO_TEST_CASE(lanes_and_groups_change_no_bit) {
   const D2vrScene scene(device(), field, box(22, 1));
   RenderOptions o = options_for(box(22, 1));
   o.width = 37;
-  const FloatPicture one = raycast_float(device(), scene, o, {8, 8, 1});
+  const FloatPicture one = raycast_float(scene, o, {8, 8, 1});
   for (const int lanes : {4, 8, 16}) {
-    const FloatPicture many = raycast_float(device(), scene, o, {4, 4, lanes});
+    const FloatPicture many = raycast_float(scene, o, {4, 4, lanes});
     BOOST_TEST(same_bits(one, many));
   }
 }
@@ -354,9 +354,9 @@ BOOST_AUTO_TEST_CASE(skipping_saves_samples_of_a_soft_field_and_changes_no_bit) 
   const Grid grid = box(26, 0.8);
   const D2vrScene scene(device(), field, grid);
   RenderOptions o = options_for(grid);
-  const FloatPicture skipping = raycast_float(device(), scene, o);
+  const FloatPicture skipping = raycast_float(scene, o);
   o.skip_empty = false;
-  const FloatPicture all = raycast_float(device(), scene, o);
+  const FloatPicture all = raycast_float(scene, o);
   BOOST_TEST(same_bits(skipping, all));
   BOOST_TEST(skipping.samples < all.samples);
 
@@ -392,6 +392,8 @@ BOOST_AUTO_TEST_CASE(what_needs_a_stored_volume_is_refused) {
   refused([](RenderOptions& o) { o.classification = Classification::preintegrated; });
   refused([](RenderOptions& o) { o.step_mode = StepMode::level; });
   refused([](RenderOptions& o) { o.sampler = SamplerKind::image3d; });
+  refused([](RenderOptions& o) { o.gradient = GradientKind::stored; });
+  refused([](RenderOptions& o) { o.output = RenderOutput::error; });
   refused([](RenderOptions& o) { o.width = 0; });
   BOOST_CHECK_THROW(D2vrField(device(), soft_scan(), {{}, 3}), InputError);
   BOOST_CHECK_THROW(D2vrField(device(), testing::noise_scan(3, 3, 1), {}), InputError);

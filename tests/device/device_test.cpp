@@ -15,7 +15,7 @@ BOOST_AUTO_TEST_CASE(unknown_device_is_refused_with_the_list) {
     BOOST_FAIL("accepted");
   } catch (const DeviceError& e) {
     BOOST_TEST(std::string(e.what()).find("there are:") != std::string::npos);
-    BOOST_TEST(e.exit_code() == 3);
+    BOOST_TEST((e.kind() == ErrorKind::device));
   }
 }
 

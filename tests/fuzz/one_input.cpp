@@ -36,10 +36,10 @@ Verdict judge(const std::filesystem::path& folder, const std::uint8_t* bytes, st
       why = "the message does not name the file: " + why;
       return Verdict::wrong;
     }
-    if (e.exit_code() == 2) return Verdict::refused;
-    if (e.exit_code() == 1) return Verdict::mismatch;
+    if (e.kind() == ErrorKind::input || e.kind() == ErrorKind::file) return Verdict::refused;
+    if (e.kind() == ErrorKind::mismatch || e.kind() == ErrorKind::tolerance) return Verdict::mismatch;
     if (why.find("limit") != std::string::npos) return Verdict::beyond_limit;
-    why = "exit code " + std::to_string(e.exit_code()) + ": " + why;
+    why = "kind " + std::to_string(static_cast<int>(e.kind())) + ": " + why;
     return Verdict::wrong;
   } catch (const std::exception& e) {
     why = std::string("an exception that is not ours: ") + e.what();

@@ -93,3 +93,23 @@ BOOST_AUTO_TEST_CASE(cameras_without_a_direction_are_refused) {
   BOOST_CHECK_THROW(look_at(eye, middle, std::nullopt, 180), InputError);
   BOOST_CHECK_THROW(look_at(eye, {0, NAN, 0}, std::nullopt, 30), InputError);
 }
+
+BOOST_AUTO_TEST_CASE(every_camera_is_held_to_one_check) {
+  const Camera good;
+  check_camera(good);
+  const auto refused = [&](auto&& change) {
+    Camera c = good;
+    change(c);
+    BOOST_CHECK_THROW(check_camera(c), InputError);
+  };
+  refused([](Camera& c) { c.focal_point = c.position; });
+  refused([](Camera& c) { c.view_up = {0, 0, 0}; });
+  refused([](Camera& c) { c.view_up = {0, 7, 0}; });
+  // Nearly parallel: within 1e-6, whoever made the camera.
+  refused([](Camera& c) { c.view_up = {1e-7, 1, 0}; });
+  BOOST_CHECK_THROW(look_at(good.position, good.focal_point, Vec3{1e-7, 1, 0}, 30), InputError);
+  check_camera(look_at(good.position, good.focal_point, Vec3{1e-5, 1, 0}, 30));
+  refused([](Camera& c) { c.view_angle_deg = 0; });
+  refused([](Camera& c) { c.view_angle_deg = NAN; });
+  refused([](Camera& c) { c.view_up[1] = INFINITY; });
+}

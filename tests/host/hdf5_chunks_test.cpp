@@ -312,7 +312,7 @@ BOOST_AUTO_TEST_CASE(a_small_file_of_a_large_volume_is_refused_by_the_memory_lim
   write_vdvr(path, zeros, support::full_certificate());
   BOOST_TEST(fs::file_size(path) < zeros.base.bytes() / 100);
   BOOST_CHECK_EXCEPTION(read_vdvr(path, 1 << 20), ResourceError, [](const ResourceError& e) {
-    return says(e.what(), {"zeros.vdvr", "--max-memory"});
+    return says(e.what(), {"zeros.vdvr", "`max_memory`"});
   });
   BOOST_TEST(same_volume(read_vdvr(path, 64 << 20).volume, zeros));
 }

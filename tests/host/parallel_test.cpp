@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(a_requested_stop_ends_loops_that_report_nothing) {
                                        if (i == n / 2) request_stop(143);
                                        ++done;
                                      }),
-                        Interrupted, [](const Interrupted& e) { return e.exit_code() == 143; });
+                        Interrupted, [](const Interrupted& e) { return e.reason() == 143; });
   BOOST_TEST(done < n);
   BOOST_CHECK_THROW(parallel_for(1, {}, "", [](std::int64_t) {}), Interrupted);
   request_stop(0);

@@ -141,7 +141,7 @@ BOOST_AUTO_TEST_CASE(stack_is_read_with_its_angles_file) {
       "MET_UCHAR\nElementDataFile = LOCAL\n";
   const Path stack = folder.file("a.mha", header + "abcdef");
   ScanOptions options;
-  BOOST_TEST(has(refusal(stack), "--angles-file"));
+  BOOST_TEST(has(refusal(stack), "`angles_file`"));
   options.angles_file = folder.file("angles.txt", "0\n90\n");
   const ProjectionSet scan = read_scan(stack, options);
   BOOST_TEST(scan.geometry.rows == 1);

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <iterator>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "host/io/hdf5_file.hpp"
@@ -78,6 +79,52 @@ BOOST_AUTO_TEST_CASE(a_given_content_hash_is_stored_as_given) {
   BOOST_TEST((back.seal == Seal::whole));
   BOOST_TEST(says(back.altered, {"does not match its hash"}));
   BOOST_CHECK_THROW(read_vdvr(folder.path / "a.vdvr"), MismatchError);
+}
+
+BOOST_AUTO_TEST_CASE(a_volume_for_comparison_carries_a_record_and_no_certificate) {
+  const Folder folder;
+  Certificate c = support::full_certificate();
+  c.comparison = true;
+  c.holds_buffer = false;
+  c.holds_image3d = false;
+  c.budget.arithmetic.value = 0.25;
+  write_vdvr(folder.path / "a.vdvr", small_volume(), c);
+  {
+    const io::hdf5_file::Reader file(folder.path / "a.vdvr");
+    BOOST_TEST(file.has("/comparison"));
+    BOOST_TEST(!file.has("/certificate"));
+    BOOST_TEST(!file.has("/brick_total"));
+  }
+  const VdvrFile back = read_vdvr(folder.path / "a.vdvr");
+  BOOST_TEST((back.seal == Seal::whole));
+  BOOST_TEST(back.certificate.comparison);
+  BOOST_TEST(!back.certificate.holds_buffer);
+  BOOST_TEST(back.certificate.content_sha256 == content_sha256(small_volume()));
+  BOOST_TEST(back.certificate_json.find("\"holds\"") == std::string::npos);
+  BOOST_TEST(back.certificate_json.find("\"total\"") == std::string::npos);
+  // What a certificate would say can still be told.
+  BOOST_TEST(back.certificate.total_buffer ==
+             c.measured_total + c.budget.arithmetic.value + c.budget.sampler.buffer.value);
+}
+
+BOOST_AUTO_TEST_CASE(a_certificate_in_the_place_of_a_record_is_refused) {
+  BOOST_TEST(says(refusal_after([](hid_t file) {
+                    H5Lmove(file, "/certificate", file, "/comparison", H5P_DEFAULT, H5P_DEFAULT);
+                  }),
+                  {"/comparison", "does not say"}));
+}
+
+BOOST_AUTO_TEST_CASE(a_comparison_of_an_earlier_version_opens) {
+  // It said so in a certificate in which nothing holds.
+  auto j = nlohmann::json::parse(to_json(support::full_certificate()));
+  j["comparison"] = true;
+  j["holds"] = {{"buffer", false}, {"image3d", false}};
+  j["content_sha256"] = content_sha256(small_volume());
+  BOOST_TEST(certificate_from_json(j.dump()).comparison);
+  BOOST_TEST(refusal_after(set_certificate(j.dump())).find("/certificate") == std::string::npos);
+  j.erase("comparison");
+  j.erase("holds");
+  BOOST_CHECK_THROW(certificate_from_json(j.dump()), FileError);
 }
 
 BOOST_AUTO_TEST_CASE(a_volume_of_many_chunks_and_the_finest_level_comes_back) {
@@ -404,7 +451,7 @@ BOOST_AUTO_TEST_CASE(reading_honours_the_memory_limit) {
   const Folder folder;
   const fs::path path = write_small(folder);
   BOOST_CHECK_EXCEPTION(read_vdvr(path, 1000), ResourceError, [](const ResourceError& e) {
-    return says(e.what(), {"small.vdvr", "1000", "--max-memory"});
+    return says(e.what(), {"small.vdvr", "1000", "`max_memory`"});
   });
   BOOST_TEST(same_volume(read_vdvr(path, 1 << 20).volume, small_volume()));
 }

@@ -6,11 +6,12 @@
 #include <limits>
 #include <vector>
 
-#include "host/error_measure.hpp"
+#include "apps/paper/error_measure.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
+using namespace vdvr::paper;
 
 namespace {
 // Sums in double over a handful of fp32 values of size 10: what is left to round.

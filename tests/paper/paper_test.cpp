@@ -1,9 +1,10 @@
-// The quick form of `bench paper` against recorded numbers (tests/paper/paper_quick.json), and what the
-// recorded ones may differ by on another device: rounding of the fields, and bricks that rounding alone
-// decides.
+// The quick form of vdvr-paper, which the CTest paper_quick runs, against recorded numbers (quick.json), and
+// what the recorded ones may differ by on another device: rounding of the fields, and bricks that rounding
+// alone decides.
 #define BOOST_TEST_MODULE paper
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -12,9 +13,8 @@
 #include <sstream>
 #include <string>
 
-#include "host/paper_cases.hpp"
+#include "apps/paper/report.hpp"
 #include "tests/support/device.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 
 using namespace vdvr;
@@ -32,24 +32,14 @@ std::string contents(const fs::path& path) {
   return text.str();
 }
 
-/// The report of one quick run, made once.
-struct Report {
-  support::TemporaryFolder folder;
-  fs::path output = folder.path() / "report";
-  json numbers;
-  Report() {
-    const std::string command =
-        "\"" VDVR_BINARY "\" bench paper --quick --quiet -o \"" + output.string() + "\"";
-    BOOST_REQUIRE_EQUAL(std::system(command.c_str()), 0);
-    numbers = json::parse(contents(output / "paper.json"));
-  }
-};
-const Report& report_made() {
-  static const Report one;
+const fs::path kReport = VDVR_PAPER_REPORT;
+
+const json& made() {
+  static const json one = json::parse(contents(kReport / "paper.json"));
   return one;
 }
 const json& recorded() {
-  static const json one = json::parse(contents(fs::path(VDVR_SOURCE_DIR) / "tests/paper/paper_quick.json"));
+  static const json one = json::parse(contents(fs::path(VDVR_SOURCE_DIR) / "tests/paper/quick.json"));
   return one;
 }
 
@@ -84,7 +74,7 @@ const json& case_of(const json& numbers, const std::string& settings, double eps
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(projection_errors_are_those_recorded) {
-  const json &now = report_made().numbers.at("figure_3"), &then = recorded().at("figure_3");
+  const json &now = made().at("figure_3"), &then = recorded().at("figure_3");
   BOOST_TEST_REQUIRE(now.size() == then.size());
   for (std::size_t i = 0; i < now.size(); ++i)
     for (const char* method : {"upsampled", "d2vr"})
@@ -93,7 +83,7 @@ BOOST_AUTO_TEST_CASE(projection_errors_are_those_recorded) {
 }
 
 BOOST_AUTO_TEST_CASE(error_maps_are_those_recorded) {
-  const json &now = report_made().numbers.at("figure_12"), &then = recorded().at("figure_12");
+  const json &now = made().at("figure_12"), &then = recorded().at("figure_12");
   BOOST_TEST_REQUIRE(now.size() == then.size());
   for (std::size_t i = 0; i < now.size(); ++i) {
     const std::string method = now[i].at("method");
@@ -106,7 +96,7 @@ BOOST_AUTO_TEST_CASE(error_maps_are_those_recorded) {
 }
 
 BOOST_AUTO_TEST_CASE(upsampled_volumes_are_those_recorded) {
-  const json &now = report_made().numbers.at("figure_11"), &then = recorded().at("figure_11");
+  const json &now = made().at("figure_11"), &then = recorded().at("figure_11");
   for (std::size_t i = 0; i < std::min(now.size(), then.size()); ++i) {
     const std::string volume = now[i].at("volume");
     // Band-limited interpolation raises what the samples err by, per axis by 2 + log(65) at most.
@@ -118,7 +108,7 @@ BOOST_AUTO_TEST_CASE(upsampled_volumes_are_those_recorded) {
 
 BOOST_AUTO_TEST_CASE(every_certified_volume_keeps_its_tolerance) {
   int certified = 0;
-  for (const auto& c : report_made().numbers.at("table_2_marschner_lobb")) {
+  for (const auto& c : made().at("table_2_marschner_lobb")) {
     if (c.at("settings") != "ours") continue;
     BOOST_TEST(c.at("certified").get<bool>());
     // Against F as it is computed here, which errs by no more than the arithmetic term.
@@ -134,9 +124,12 @@ BOOST_AUTO_TEST_CASE(storage_in_the_papers_settings_is_that_recorded) {
   // base and the maximum that the tolerance is a part of by `arithmetic` each in either run: the recorded
   // storage lies between those of this device's tolerances lowered and raised by so much, since before the
   // closing storage falls with the tolerance.
-  const double epsilon = 0.04;
-  const json &now = case_of(report_made().numbers, "paper, closing none", epsilon),
+  const double epsilon = 0.03;
+  const json &now = case_of(made(), "paper, closing none", epsilon),
              &then = case_of(recorded(), "paper, closing none", epsilon);
+  const double recorded_ratio = then.at("storage").at("interior").at("samples_ratio"),
+               ratio = now.at("storage").at("interior").at("samples_ratio");
+  if (ratio == recorded_ratio) return;  // as on the device that recorded it: nothing to bound
   const double part = 6 * then.at("arithmetic").get<double>() / then.at("epsilon_abs").get<double>();
   const paper::TestScan test = paper::marschner_lobb_scan(74);
   const auto storage = [&](double e) {
@@ -147,8 +140,6 @@ BOOST_AUTO_TEST_CASE(storage_in_the_papers_settings_is_that_recorded) {
         .samples_ratio;
   };
   const double most = storage(epsilon * (1 - part)), least = storage(epsilon * (1 + part));
-  const double recorded_ratio = then.at("storage").at("interior").at("samples_ratio"),
-               ratio = now.at("storage").at("interior").at("samples_ratio");
   BOOST_TEST_MESSAGE("storage " << ratio << ", recorded " << recorded_ratio << ", between " << least
                                 << " and " << most);
   BOOST_TEST(recorded_ratio <= most);
@@ -160,7 +151,7 @@ BOOST_AUTO_TEST_CASE(storage_in_the_papers_settings_is_that_recorded) {
 BOOST_AUTO_TEST_CASE(the_papers_numbers_are_met_where_they_were) {
   // The verdict of a claim is part of what is recorded; speeds depend on the machine.
   std::size_t compared = 0;
-  for (const auto& now : report_made().numbers.at("claims"))
+  for (const auto& now : made().at("claims"))
     for (const auto& then : recorded().at("claims")) {
       const std::string claim = now.at("paper");
       if (then.at("paper") != claim || then.at("where") != now.at("where") ||
@@ -169,21 +160,42 @@ BOOST_AUTO_TEST_CASE(the_papers_numbers_are_met_where_they_were) {
       BOOST_TEST(now.at("verdict") == then.at("verdict"), claim << ": " << now.at("found"));
       ++compared;
     }
-  BOOST_TEST(compared >= 20);
+  BOOST_TEST(compared >= 15);
 }
 
-BOOST_AUTO_TEST_CASE(the_report_is_complete_and_stands_alone) {
-  const Report& made = report_made();
-  const std::string page = contents(made.output / "paper.html");
-  for (const char* outside : {"src=\"http", "href=", "<script", "url("})
-    BOOST_TEST(page.find(outside) == std::string::npos);
-  for (const char* file :
-       {"claims.csv", "figure-3.csv", "figure-3.svg", "figure-10.png", "figure-11.png", "figure-12-field.png",
-        "figure-13.png", "figure-15.png", "table-1.csv", "table-2-rms.csv", "speed.csv"})
-    BOOST_TEST(fs::file_size(made.output / file) > 0);
-  BOOST_TEST(page.find("give --head") != std::string::npos);
-  for (const auto& entry : fs::directory_iterator(made.output))
+BOOST_AUTO_TEST_CASE(the_report_is_complete) {
+  const auto holds = [](const std::string& file) {
+    BOOST_TEST((fs::exists(kReport / file) && fs::file_size(kReport / file) > 0), file);
+  };
+  std::size_t figures = 0;
+  for (const auto& section : made().at("sections")) {
+    for (const auto& table : section.at("tables")) holds(table.at("name").get<std::string>() + ".csv");
+    for (const auto& figure : section.at("figures")) {
+      ++figures;
+      if (figure.contains("field")) holds(figure.at("field"));
+      if (figure.at("kind") == "pictures")
+        for (const auto& panel : figure.at("panels")) holds(panel.at("picture"));
+      if (figure.at("kind") == "frequencies")
+        for (const auto& row : figure.at("rows"))
+          for (const auto& panel : row) holds(panel.at("field"));
+    }
+  }
+  BOOST_TEST(figures == 15);
+  BOOST_TEST(made().dump().find("give --head") != std::string::npos);
+  for (const auto& entry : fs::directory_iterator(kReport))
     BOOST_TEST(entry.path().filename().string().front() != '.', "left behind: " << entry.path());
+}
+
+BOOST_AUTO_TEST_CASE(csv_quotes_what_would_split_a_row) {
+  const paper::Table table{"t", "", {"a", "b"}, {{"1,5", "say \"x\""}, {"plain", ""}}};
+  BOOST_TEST(csv(table) == "a,b\n\"1,5\",\"say \"\"x\"\"\"\nplain,\n");
+}
+
+BOOST_AUTO_TEST_CASE(a_run_writes_no_file_that_it_does_not_name) {
+  const std::vector<std::string> names = paper::file_names();
+  for (const auto& entry : fs::directory_iterator(kReport))
+    BOOST_TEST((std::find(names.begin(), names.end(), entry.path().filename().string()) != names.end()),
+               entry.path());
 }
 
 BOOST_AUTO_TEST_CASE(window_is_kept_where_terms_are_left_out) {

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/volume/upsample_volume.hpp"
+#include "apps/paper/upsample_volume.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
+using namespace vdvr::paper;
 
 namespace {
 

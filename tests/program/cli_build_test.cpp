@@ -28,6 +28,32 @@ BOOST_AUTO_TEST_CASE(settings_that_exclude_each_other_are_refused) {
   check_refused({"run", "x.h5", "--epsilon", "3%", "-o", at("run"), "--paper"}, "use vdvr build");
 }
 
+BOOST_AUTO_TEST_CASE(a_volume_for_comparison_carries_no_certificate) {
+  const std::string file = at("comparison.vdvr");
+  const Ended built = run({"build", small_scan(), "--epsilon", "20%", "--paper", "-o", file});
+  BOOST_TEST(built.code == 1);
+  BOOST_TEST(last_line(built.err) == "vdvr build: a volume for comparison: nothing is certified\n");
+  const auto json = nlohmann::json::parse(run({"info", file, "--json"}).out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  BOOST_TEST(!json.contains("certificate"));
+  BOOST_TEST(!json.at("comparison").contains("holds"));
+  BOOST_TEST(json.at("content_sha256") == json.at("comparison").at("content_sha256"));
+  check_refused({"verify", file, "--projections", small_scan()}, "carries no promise to verify");
+  BOOST_TEST(run({"render", file, "-o", at("comparison.png"), "--size", "32x32"}).code == 0);
+}
+
+// The paper's closing and coefficients alone leave all that a certificate needs.
+BOOST_AUTO_TEST_CASE(the_paper_s_closing_and_coefficients_are_certified) {
+  const std::string file = at("closed.vdvr");
+  const Ended built = run({"build", small_scan(), "--epsilon", "20%", "--closing", "paper", "--coefficients",
+                           "sampled", "--epsilon-of", "max", "-o", file});
+  BOOST_TEST(built.code == 0, built.err);
+  const auto json = nlohmann::json::parse(run({"info", file, "--json"}).out, nullptr, false);
+  BOOST_REQUIRE(json.is_object());
+  BOOST_TEST(json.at("certificate").at("holds").at("buffer").get<bool>());
+  BOOST_TEST(json.at("certificate").at("options").at("epsilon_of") == "max");
+}
+
 BOOST_AUTO_TEST_CASE(info_shows_storage_beside_the_certificate) {
   const std::string volume = small_volume();
   const auto json = nlohmann::json::parse(run({"info", volume, "--json"}).out, nullptr, false);

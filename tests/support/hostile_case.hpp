@@ -92,7 +92,7 @@ inline Inputs inputs_at(const Case& c, const Scale& s) {
   if (c.window) in.options.window = {density_at(c.window->first), density_at(c.window->second)};
   if (c.against == Against::absolute) in.tolerance.absolute = c.epsilon * range * s.density;
   else in.tolerance.relative = c.epsilon;
-  in.tolerance.of_max = c.against == Against::largest;
+  in.settings.comparison.epsilon_of_max = c.against == Against::largest;
   return in;
 }
 
@@ -309,11 +309,12 @@ inline void draw_options(Random& random, Case& c) {
   if (chance(random, 0.7)) c.rates.gold = one_of(random, {2, 2, 4, 4, 8, 8, 16, 32});
   c.rates.interpolation = one_of<std::optional<Interpolation>>(
       random, {std::nullopt, std::nullopt, Interpolation::linear, Interpolation::cubic});
-  c.settings.coefficients = one_of<const char*>(random, {"midrange", "midrange", "sampled"});
+  c.settings.comparison.coefficients =
+      one_of(random, {Coefficients::midrange, Coefficients::midrange, Coefficients::sampled});
   c.settings.levels = one_of(random, {Levels::anisotropic, Levels::anisotropic, Levels::isotropic});
   if (chance(random, 0.15)) {
-    c.options.closing = Closing::paper;
-    c.settings.coefficients = "sampled";
+    c.settings.comparison.closing = Closing::paper;
+    c.settings.comparison.coefficients = Coefficients::sampled;
     c.settings.levels = Levels::isotropic;
   }
   c.settings.foresee = chance(random, 0.3);
@@ -380,7 +381,7 @@ inline void draw_base(Random& random, Case& c) {
   for (std::size_t a = 0; a < 3; ++a)
     if (base[2 - a] > 0) c.grid.cells[a] += c.grid.cells[a] % 2;
   if (c.settings.granularity == 1) c.settings.granularity = 2;
-  if (c.options.closing != Closing::paper) c.settings.coarsening = base;
+  if (c.settings.comparison.closing != Closing::paper) c.settings.coarsening = base;
 }
 
 inline void draw_region_and_window(Random& random, Case& c) {

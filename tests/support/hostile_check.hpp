@@ -450,7 +450,7 @@ inline void compare_scales(const Case& c, const Inputs& in, const Outcome& one, 
   }
   if (scaled.kind == "built") return;
   // A file's step is a normal number: integers of smaller densities may be too coarse, and it says so.
-  if (scaled.kind == "tolerance" && scaled.message.find("--storage") != std::string::npos &&
+  if (scaled.kind == "tolerance" && scaled.message.find("`storage`") != std::string::npos &&
       c.scale.density < 0x1p-90)
     return;
   const bool is_zero = std::all_of(in.scan.data.begin(), in.scan.data.end(), [](float p) { return p == 0; });

@@ -27,13 +27,14 @@ class Program {
   /// stdout and stderr go to files in `folder`.
   explicit Program(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
+  std::string binary = VDVR_BINARY;
   /// Environment of the next runs, beside the test's own.
   std::map<std::string, std::string> environment;
   /// Called in the child before the program takes over.
   std::function<void()> prepare = [] {};
 
   [[nodiscard]] pid_t start(const std::vector<std::string>& words, const std::string& name = "std") const {
-    std::vector<std::string> all{VDVR_BINARY};
+    std::vector<std::string> all{binary};
     all.insert(all.end(), words.begin(), words.end());
     std::vector<char*> argv;
     std::transform(all.begin(), all.end(), std::back_inserter(argv), [](std::string& s) { return s.data(); });

@@ -6,13 +6,12 @@
 #include <chrono>
 #include <cmath>
 
-#include "apps/vdvr/bench_paper.hpp"
 #include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
@@ -88,7 +87,7 @@ int bench_fbp(Arguments& args) {
   const double radius = 0.375 * static_cast<double>(size);
 
   Device device = open_device(common);
-  ProgressLine progress("bench", common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = simulate(sphere(radius), simulated, progress.callback());
   GridOptions cells;
   cells.size = Index3{size - 1, size - 1, size - 1};
@@ -139,7 +138,7 @@ int bench_build(Arguments& args) {
   Wanted wanted = wanted_of(args);
   wanted.options.plan.foresee = false;
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
-  ProgressLine progress("bench", common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   Device device = open_device(common);
   std::vector<double> seconds;
   std::optional<BuildResult> built;  // checked by build itself: it throws unless the certificate holds
@@ -195,7 +194,7 @@ int bench_render(Arguments& args) {
   const std::string method = method_option(args);
   const std::int64_t frames = args.integer_or("frames", 60, 1, 100000);
   const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
-  ProgressLine progress("bench", common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   Source source(args, common, method, false, progress.callback());
   const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);
@@ -267,7 +266,7 @@ int bench_bounds(Arguments& args) {
   const Rates measured{rates.upsampling.value_or(8), rates.interpolation.value_or(Interpolation::linear),
                        rates.gold.value_or(8)};
   Device device = open_device(common);
-  ProgressLine progress("bench", common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
   field.center = center_of(field, scan.geometry);
   const Grid grid = make_grid(scan.geometry, grid_options(args));
@@ -304,16 +303,15 @@ int bench_command(Arguments& args) {
   if (name == "render") return bench_render(args);
   if (name == "bounds") return bench_bounds(args);
   if (name == "tune") return bench_tune(args);
-  if (name == "paper") return bench_paper(args);
   if (!name.empty())
-    throw InputError(fmt::format(
-        "'{}' is not a case of this version; there are fbp, build, render, bounds, tune, paper", name));
+    throw InputError(
+        fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
   args.group(
           "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N] | bounds IN | "
-          "tune | paper -o DIR; each has its own --help")
+          "tune; each has its own --help")
       .flag("help,h", "this text");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, build, render, bounds, tune or paper");
+  throw InputError("name a case: fbp, build, render, bounds or tune");
 }
 
 }  // namespace vdvr::cli

@@ -6,7 +6,7 @@
 
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/tune.hpp"
 
 namespace vdvr::cli {
@@ -29,7 +29,7 @@ int bench_tune(Arguments& args) {
   const std::int64_t views = args.integer_or("angles", 180, 2, 1 << 14);
   const int repetitions = static_cast<int>(args.integer_or("repetitions", 5, 1, 1000));
   Device device = open_device(common);
-  ProgressLine progress("bench", common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const TuneResult result = tune(device, size, views, repetitions, progress.callback());
   progress.clear();
   Json candidates = Json::array(), filters = Json::array(), recorded;

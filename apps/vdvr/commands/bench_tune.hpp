@@ -1,7 +1,7 @@
 // vdvr bench tune. Called by bench.cpp.
 #pragma once
 
-#include "apps/vdvr/arguments.hpp"
+#include "apps/common/arguments.hpp"
 
 namespace vdvr::cli {
 

@@ -5,7 +5,7 @@
 
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 
 namespace vdvr::cli {
 
@@ -14,7 +14,7 @@ namespace {
 int build_file(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
                const std::filesystem::path& output) {
   Device device = open_device(common);
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   const BuildResult result = build_planned(device, planned, wanted, progress.callback());
   throw_if_stopped();
@@ -29,7 +29,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
                      {"storage", storage_json(result.volume, bytes)},
                      {"resumed", {{"records", wanted.options.build.journal->replayed()}}},
                      {"peak_bytes", device.peak_memory()},
-                     {"certificate", certificate_json(result.certificate)},
+                     {record_name(result.certificate), certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
     print_scan(planned.scan);
@@ -39,7 +39,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
     print_seconds(result.seconds);
     fmt::print("written        {}\n", output.string());
   });
-  return certificate_exit_code(args.command(), result.certificate);
+  return certificate_exit_code(args.who(), result.certificate);
 }
 
 }  // namespace

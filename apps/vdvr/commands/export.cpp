@@ -3,7 +3,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 
@@ -60,7 +60,7 @@ int export_command(Arguments& args) {
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args, args.has("unverified"));
   const Grid grid = finer(file.volume.grid, oversampling);
   const Volume volume = sample_all(file.volume, grid, common.max_memory, progress.callback());

@@ -5,7 +5,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 
@@ -29,8 +29,9 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
   std::string mismatch = file.altered;
   if (const std::string what = contradiction(file.certificate); mismatch.empty() && !what.empty())
     mismatch = "the certificate contradicts itself: " + what;
+  const std::string kind = file.certificate.comparison ? "volume for comparison" : "certified volume";
   Json json = {{"file", path.string()},
-               {"kind", "certified volume"},
+               {"kind", kind},
                {"generator", file.generator},
                {"format_version", file.format_version},
                {"grid", grid_json(file.volume.grid)}};
@@ -41,10 +42,10 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
   json["storage"] = storage_json(file.volume, file.file_bytes);
   json["seal"] = text_of(file.seal);
   json["content_matches"] = mismatch.empty();
-  json["certificate"] = certificate_json(file.certificate);
+  json["content_sha256"] = file.certificate.content_sha256;
+  json[record_name(file.certificate)] = certificate_json(file.certificate);
   print_result(common, json, [&] {
-    fmt::print("{}: certified volume, format {}, by {}\n", path.string(), file.format_version,
-               file.generator);
+    fmt::print("{}: {}, format {}, by {}\n", path.string(), kind, file.format_version, file.generator);
     print_grid(file.volume.grid);
     print_storage(file.volume, file.file_bytes);
     print_certificate(file.certificate);
@@ -70,7 +71,7 @@ int volume_info(const std::filesystem::path& path, const CommonOptions& common) 
 }
 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
   const Grid grid = make_grid(scan.geometry, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());

@@ -9,7 +9,7 @@
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/plan_pictures.hpp"
@@ -111,7 +111,7 @@ int plan_command(Arguments& args) {
   }
 
   Device device = open_device(common);
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   Json json = plan_json(planned), pictures;
   if (folder) {

@@ -9,7 +9,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/region_of_interest.hpp"
@@ -17,6 +17,7 @@
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
+#include "vdvr/output_file.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
@@ -224,7 +225,7 @@ int probe_command(Arguments& args) {
     refuse(args, {"projections"}, path.string() + " is not a certified volume");
   const std::vector<Vec3> points = read_points(points_path);
 
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const std::vector<Probe> probes = kind == InputKind::certified
                                         ? probe_certified(path, args, points, progress.callback())
                                     : kind == InputKind::volume ? probe_volume(path, args, points)

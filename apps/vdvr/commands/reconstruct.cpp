@@ -7,7 +7,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 
@@ -37,7 +37,7 @@ int reconstruct_command(Arguments& args) {
   check_output(output, common.force, {args.path("IN")});
 
   Device device = open_device(common);
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, options.field, progress.callback());
   const Grid grid = make_grid(scan.geometry, grid_wanted);
   const Volume volume = reconstruct(device, scan, grid, options, progress.callback());

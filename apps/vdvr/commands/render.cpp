@@ -7,7 +7,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error_slice.hpp"
@@ -262,7 +262,7 @@ int render_bound(const CommonOptions& common, const RenderOptions& o, const std:
 int render_error(const Arguments& args, const CommonOptions& common, const RenderOptions& o,
                  const std::filesystem::path& output, OutputKind kind) {
   const auto path = args.path("FILE");
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const Scene scene = open_scene(path, args, "vdvr", false);
   if (!scene.certificate)
     throw InputError(fmt::format("{}: has no certificate to measure against", path.string()));
@@ -411,7 +411,7 @@ int render_command(Arguments& args) {
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
   const std::string method = method_option(args);
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   Source source(args, common, method, args.has("unverified"), progress.callback());
   const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);

@@ -7,7 +7,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
@@ -48,7 +48,8 @@ std::vector<std::string> file_names() {
 void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, const Progress& progress) {
   const MixedVolume& volume = out.built.volume;
   const Brightness bright = brightness_of(volume);
-  ResidentVolume resident(device, volume);
+  const ResidentVolume resident(device, volume);
+  Renderer renderer(device, resident);
   RenderOptions o;
   o.width = o.height = kPictureSide;
   o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
@@ -59,7 +60,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
     report(progress, "render", 0);
-    const RenderResult r = raycast(device, resident, o);
+    const RenderResult r = renderer.render(o);
     write_png(folder.file(name), r.image);
     out.files.emplace_back(name, what);
     out.outside[name] = outside_certificate(o);
@@ -76,9 +77,9 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     RenderOptions bound = o;
     bound.output = RenderOutput::error;
     bound.height -= kErrorCaption;
-    resident.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
+    renderer.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
     write_png(folder.file("bound.png"),
-              bound_picture(raycast(device, resident, bound).values, out.built.certificate.epsilon_abs));
+              bound_picture(renderer.render(bound).values, out.built.certificate.epsilon_abs));
     out.files.emplace_back("bound.png", "how far the samples behind each pixel of dvr.png can lie from F");
     o.mode = RenderMode::iso;
     draw("iso.png", fmt::format("iso-surface at {:.4g}", bright.threshold));
@@ -144,7 +145,7 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
 int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
               const std::filesystem::path& output, OutputFolder& folder) {
   Device device = open_device(common);
-  ProgressLine line(args.command(), common.quiet);
+  ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
   out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress); });
@@ -176,7 +177,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
 
   const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
   print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
-  return certificate_exit_code(args.command(), certificate);
+  return certificate_exit_code(args.who(), certificate);
 }
 
 }  // namespace
@@ -193,7 +194,7 @@ int run_command(Arguments& args) {
   Wanted wanted = wanted_of(args);
   wanted.options.plan.foresee = false;
   wanted.compression = compression(args);
-  if (is_comparison(wanted.options.plan, wanted.options.build))
+  if (wanted.options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);

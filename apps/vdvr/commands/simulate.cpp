@@ -8,7 +8,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/volume_file.hpp"
@@ -142,7 +142,7 @@ int simulate_command(Arguments& args) {
   if (args.has("volume")) inputs.push_back(args.path("volume"));
   check_output(output, common.force, inputs);
 
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   Setup setup = setup_for(args);
   apply_scan_options(args, setup.scan);
   const Phantom phantom = phantom_for(setup);

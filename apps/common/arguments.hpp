@@ -1,0 +1,89 @@
+// The words after a command's name: declared, parsed strictly, and read by typed getters whose errors name
+// the option. Every command declares its options on the Arguments it is given, then calls parse().
+#pragma once
+
+#include <array>
+#include <boost/program_options.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/common/command.hpp"
+#include "vdvr/grid.hpp"
+
+namespace vdvr::cli {
+
+class Arguments {
+ public:
+  Arguments(const Command& command, std::vector<std::string> tokens);
+
+  /// Opens a new heading of the help text; options declared next belong to it.
+  Arguments& group(const std::string& title);
+  Arguments& flag(const std::string& name, const std::string& help);
+  /// `name` may be "output,o"; `shape` is the placeholder of the help text.
+  Arguments& value(const std::string& name, const std::string& shape, const std::string& help);
+  /// The same, which may be given several times; read by texts().
+  Arguments& values(const std::string& name, const std::string& shape, const std::string& help);
+  /// The next stray word; all positionals are required.
+  Arguments& positional(const std::string& name, const std::string& help);
+
+  /// False when --help was asked for and printed. Throws InputError for what does not parse.
+  [[nodiscard]] bool parse();
+
+  [[nodiscard]] std::string who() const { return command_.who(); }
+  /// Takes the first word away (the case of `bench`); empty when there is none or it is an option.
+  std::string take_word();
+
+  [[nodiscard]] bool has(const std::string& name) const;
+  /// True when the words hold "--name value", whatever else they lack; for options that only ask. Before
+  /// parse().
+  [[nodiscard]] bool asks(const std::string& name, const std::string& value) const;
+  /// The text given; InputError when it is absent.
+  [[nodiscard]] std::string text(const std::string& name) const;
+  /// Every text given for an option that `values` declared; empty when there is none.
+  [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
+  [[nodiscard]] std::string text_or(const std::string& name, const std::string& fallback) const;
+  [[nodiscard]] std::filesystem::path path(const std::string& name) const { return text(name); }
+  [[nodiscard]] std::optional<double> number(const std::string& name) const;
+  [[nodiscard]] double number_or(const std::string& name, double fallback) const;
+  [[nodiscard]] double positive_or(const std::string& name, double fallback) const;
+  [[nodiscard]] std::optional<std::int64_t> integer(const std::string& name) const;
+  [[nodiscard]] std::int64_t integer_or(const std::string& name, std::int64_t fallback, std::int64_t lowest,
+                                        std::int64_t highest) const;
+  /// `count` numbers separated by commas.
+  /// Numbers separated by commas; a count of 0 takes any.
+  [[nodiscard]] std::optional<std::vector<double>> numbers(const std::string& name, std::size_t count) const;
+  [[nodiscard]] std::optional<Vec3> vec3(const std::string& name) const;
+  /// `count` positive integers separated by 'x'.
+  [[nodiscard]] std::optional<std::vector<std::int64_t>> sizes(const std::string& name,
+                                                               std::size_t count) const;
+  /// One of `allowed`; `fallback` when absent.
+  [[nodiscard]] std::string choice(const std::string& name, const std::vector<std::string>& allowed,
+                                   const std::string& fallback) const;
+
+ private:
+  void print_help() const;
+  /// "vdvr build"; "vdvr bench tune" once the case was taken.
+  [[nodiscard]] std::string name() const;
+  [[nodiscard]] std::string usage() const;
+
+  const Command& command_;
+  std::vector<std::string> tokens_;
+  std::string case_;  ///< the word that take_word took
+  std::vector<boost::program_options::options_description> groups_;
+  boost::program_options::options_description hidden_;
+  boost::program_options::positional_options_description positionals_;
+  std::vector<std::pair<std::string, std::string>> positional_help_;
+  boost::program_options::variables_map values_;
+};
+
+/// "2G" and the like: K, M, G, T are powers of 1024. Throws InputError.
+std::uint64_t parse_bytes(const std::string& option, const std::string& text);
+/// A whole text as a finite number; throws InputError naming `what`.
+double parse_number(const std::string& what, const std::string& text);
+/// Three numbers separated by commas; throws InputError naming `what`.
+Vec3 parse_vec3(const std::string& what, const std::string& text);
+
+}  // namespace vdvr::cli

@@ -1,0 +1,30 @@
+// What a program does with its words, and how it ends. Called by the main.cpp of each program.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vdvr::cli {
+
+class Arguments;
+
+struct Command {
+  const char* name;     ///< "build"; empty for a program that does one thing
+  const char* usage;    ///< what follows the name on the usage line
+  const char* purpose;  ///< one line
+  int (*run)(Arguments& args);
+  const char* program = "vdvr";
+
+  /// "vdvr build": what stands before messages.
+  [[nodiscard]] std::string who() const { return std::string(program) + (*name ? " " : "") + name; }
+};
+
+/// Runs the command under handlers of signals and turns what it throws into a message and an exit code: 0
+/// done, 1 mismatch or tolerance out of reach, 2 bad usage or input, 3 device or resource, 130/143
+/// interrupted.
+int run_guarded(const Command& command, std::vector<std::string> words);
+
+/// Says why on stderr, "interrupted" once a stop was requested; the exit code.
+int fail(const std::string& who, std::string message, int code);
+
+}  // namespace vdvr::cli

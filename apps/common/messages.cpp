@@ -1,0 +1,87 @@
+#include "apps/common/messages.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace vdvr::cli {
+namespace {
+
+const std::set<std::string>& fields_with_options() {
+  static const std::set<std::string> names{"angles_file",
+                                           "azimuth",
+                                           "base",
+                                           "camera_focal_point",
+                                           "camera_position",
+                                           "camera_view_angle",
+                                           "camera_view_up",
+                                           "center",
+                                           "classification",
+                                           "closing",
+                                           "coefficients",
+                                           "device",
+                                           "elevation",
+                                           "epsilon",
+                                           "epsilon_abs",
+                                           "filter_cutoff",
+                                           "gold",
+                                           "gradient",
+                                           "granularity",
+                                           "iso",
+                                           "levels",
+                                           "light",
+                                           "max_memory",
+                                           "method",
+                                           "mode",
+                                           "origin",
+                                           "resume",
+                                           "roi",
+                                           "sampler",
+                                           "show",
+                                           "size",
+                                           "slice_position",
+                                           "spacing",
+                                           "step",
+                                           "step_mode",
+                                           "storage",
+                                           "tf",
+                                           "u_filter",
+                                           "upsampling",
+                                           "window",
+                                           "zoom"};
+  return names;
+}
+
+}  // namespace
+
+std::string with_options(const std::string& text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text[at] == '`' ? text.find('`', at + 1) : std::string::npos;
+    std::string name = end == std::string::npos ? "" : text.substr(at + 1, end - at - 1);
+    if (fields_with_options().count(name) == 0) {
+      out += text[at++];
+      continue;
+    }
+    std::replace(name.begin(), name.end(), '_', '-');
+    out += "--" + name;
+    at = end + 1;
+  }
+  return out;
+}
+
+int exit_code_of(const Error& error) {
+  switch (error.kind()) {
+    case ErrorKind::mismatch:
+    case ErrorKind::tolerance:
+      return 1;
+    case ErrorKind::input:
+    case ErrorKind::file:
+      return 2;
+    case ErrorKind::interrupted:
+      return static_cast<const Interrupted&>(error).reason();
+    default:
+      return 3;
+  }
+}
+
+}  // namespace vdvr::cli
