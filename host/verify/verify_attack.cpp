@@ -94,8 +94,7 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
     if (stored_.window && !(F[i] - exact.rounding() >= stored_.window->first &&
                             F[i] + exact.rounding() <= stored_.window->second))
       continue;
-    const Index3 b = brick_at(volume_, points[i]);
-    const std::int64_t brick = (b[2] * n[1] + b[1]) * n[0] + b[0];
+    const std::int64_t brick = bricks.number(brick_at(volume_, points[i]));
     const double bound = certified(brick), value = static_cast<double>(sample_at(volume_, points[i])),
                  error = std::abs(value - F[i]);
     if (std::isinf(bound)) continue;
