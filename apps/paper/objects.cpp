@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/common/brightness.hpp"
+#include "vdvr/automatic_view.hpp"
 #include "apps/paper/report.hpp"
 #include "apps/paper/scans.hpp"
 #include "apps/paper/upsample_volume.hpp"
@@ -37,7 +37,7 @@ Case build_settings(Report& run, const TestScan& test, Settings settings, double
 }
 
 TransferFunction transfer_of(const MixedVolume& volume) {
-  return per_base_cell(cli::two_material_transfer(cli::brightness_of(volume)), volume.grid);
+  return per_base_cell(two_material_transfer(brightness_of(volume)), volume.grid);
 }
 
 Speed speed_of(Report& run, const Case& made) {
@@ -174,7 +174,7 @@ void add_head_figure(Report& run, const TestScan& test, const Case& mixed) {
                                  {"VDVR (ours) 3 %", mixed.volume}};
   const Grid at = lattice(test.grid, {97, 97, 61});
   const std::vector<float> field = field_on(run.device, test.scan, at, run.progress);
-  const TransferFunction transfer = cli::two_material_transfer(cli::brightness_of(shown[0].volume));
+  const TransferFunction transfer = two_material_transfer(brightness_of(shown[0].volume));
   measure_speeds(run, "head at carp size", test, mixed, shown[0].volume, transfer_of(shown[0].volume));
   Section section{"Fig. 14: a head at carp size", {}, {}, {}, {}};
   section.paragraphs = {

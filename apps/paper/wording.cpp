@@ -1,7 +1,7 @@
 // What the sections share: wording, JSON of measures, views.
 #include <fmt/format.h>
 
-#include "apps/common/brightness.hpp"
+#include "vdvr/automatic_view.hpp"
 #include "apps/paper/report.hpp"
 #include "apps/common/volume_json.hpp"
 
@@ -62,7 +62,7 @@ RenderOptions lobb_view(const Grid& grid, std::int64_t side) {
 }
 
 RenderResult draw_case(Report& run, const ResidentVolume& resident, const Case& made, RenderOptions options) {
-  options.sampler = cli::safe_sampler(SamplerKind::automatic, made.certificate);
+  options.sampler = safe_sampler(SamplerKind::automatic, made.certificate);
   return raycast(run.device, resident, options);
 }
 

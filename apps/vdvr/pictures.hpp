@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 
-#include "apps/common/brightness.hpp"
 #include "apps/vdvr/options.hpp"
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/mixed_volume.hpp"

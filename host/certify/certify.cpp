@@ -38,7 +38,7 @@ void check_options(const CertifyOptions& options) {
         throw InputError(fmt::format("`roi`: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
   const PlanSettings& plan = options.plan;
   if (plan.levels == Levels::isotropic && plan.coarsening.value_or(LevelTriple{}) != LevelTriple{})
-    throw InputError("coarsening: isotropic levels have the grid itself as their base");
+    throw InputError("`coarsening`: isotropic levels have the grid itself as their base");
   if (plan.comparison.closing != Closing::paper) return;
   if (plan.comparison.coefficients != Coefficients::sampled)
     throw InputError("`closing` paper feeds bricks with samples of F: take `coefficients` sampled with it");

@@ -15,8 +15,8 @@
 namespace vdvr {
 
 struct Tolerance {
-  std::optional<double> relative;  ///< fraction of the reference range, or as the settings' comparison says
-  std::optional<double> absolute;  ///< density units; one of the two is set
+  std::optional<double> relative{};  ///< fraction of the reference range, or as the settings' comparison says
+  std::optional<double> absolute{};  ///< density units; one of the two is set
 };
 
 /// What is not given is chosen by trial.

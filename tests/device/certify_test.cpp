@@ -128,7 +128,7 @@ BOOST_AUTO_TEST_CASE(altered_samples_are_measured_everywhere_and_do_not_hold) {
 BOOST_AUTO_TEST_CASE(what_promises_nothing_cannot_be_verified) {
   const support::TemporaryFolder folder;
   CertifyOptions options;
-  options.plan.terms = "grid";
+  options.plan.comparison.terms = Terms::grid;
   const BuildResult compared = certify(device(), scan(), part_of_range(0.2), options);
   BOOST_TEST(compared.certificate.comparison);
   write_vdvr(folder / "c.vdvr", compared.volume, compared.certificate);

@@ -25,7 +25,7 @@ endfunction()
 
 run(0 "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}" --component "vdvr_${KIND}")
 file(READ "${prefix}/${LIBDIR}/cmake/vdvr/vdvrConfig.cmake" config)
-file(READ "${prefix}/${LIBDIR}/cmake/vdvr/vdvrTargets.cmake" targets)
+file(READ "${prefix}/${LIBDIR}/cmake/vdvr/vdvr_${KIND}.cmake" targets)
 if(KIND STREQUAL "shared")
   # What the library links itself is no business of its user.
   if(config MATCHES "find_dependency\\(" OR targets MATCHES "clFFT|hdf5|OpenCL")
