@@ -380,7 +380,7 @@ void add_lobb_pictures(Report& run, const Lobb& lobb) {
   pictures.push_back({"function", raycast(run.device, exact, lobb_view(lobb.test.grid, side)).image});
   Section section{"Fig. 15: thresholds", {}, {}, {}, {}};
   section.paragraphs = {
-      "Iso-surface at 0.5: the paper's settings in one row, the certified volumes below, the function last."};
+      "Iso-surface at 0.5: the paper's settings first, then the certified volumes, the function last."};
   section.figures = {pictures_figure(run, "figure-15", "Fig. 15.", std::move(pictures), run.quick ? 3 : 4)};
   run.sections.push_back(std::move(section));
 }

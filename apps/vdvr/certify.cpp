@@ -39,7 +39,7 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wante
 
 BuildResult build_planned(Device& device, const Planned& planned, const Wanted& wanted,
                           const Progress& progress) {
-  return certify(device, planned.scan, planned.plan, wanted.tolerance, wanted.options, progress);
+  return certify(device, planned.scan, planned.plan, wanted.options, progress);
 }
 
 std::filesystem::path journal_path(const std::filesystem::path& output) {

@@ -8,15 +8,13 @@
 
 #include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/round_up.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 // One derivative of the filtered projections in a sum of bounds.
 struct Term {

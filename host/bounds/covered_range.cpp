@@ -4,12 +4,10 @@
 #include <cmath>
 #include <vector>
 
+#include "host/system/casts.hpp"
+
 namespace vdvr {
-namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
-
-}  // namespace
+namespace {}  // namespace
 
 std::vector<std::uint8_t> covered_in_plane(const Grid& grid, const Coverage& coverage) {
   const Index3 n = grid.samples();

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_map.hpp"
@@ -20,9 +21,6 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double unit_roundoff = 0x1p-24;
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 constexpr double smallest_normal = 0x1p-126;
 

@@ -20,13 +20,13 @@
 #include "host/gold/worst_node.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 class Stopwatch {
  public:
@@ -180,10 +180,8 @@ class Builder {
         [&](GoldStream::Batch& batch) { where = vdvr::worst_node(batch, volume, worst.brick, worst.rate); },
         {}, "worst");
     if (where) return *where;
-    const Index3 n = volume.bricks();
-    const std::int64_t g = volume.granularity;
-    return volume.grid.position(
-        {worst.brick % n[0] * g, worst.brick / n[0] % n[1] * g, worst.brick / n[0] / n[1] * g});
+    const Bricks bricks(volume.grid, volume.granularity);
+    return volume.grid.position(bricks.first_cell(bricks.position(worst.brick)));
   }
 
   const std::vector<BrickMeasure>& measures() const { return node_test_->measures(); }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/volume/volume_problem.hpp"
 
@@ -21,8 +22,6 @@ constexpr double worth = 0.2;
 // Of a wave of half the Nyquist frequency the error between samples is that much more than an eighth of the
 // second difference; slower ones come nearer to 1.
 constexpr double between_samples = 1.2;
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // log2 of samples a cell, along x, y, z.
 using Density = std::array<int, 3>;

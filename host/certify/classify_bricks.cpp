@@ -4,12 +4,11 @@
 #include <algorithm>
 
 #include "host/certify/build_journal.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Of the tolerance: a brick whose coarse slack takes more is not tried on coarse gold once it is refined.
 constexpr double easy_share = 0.48;

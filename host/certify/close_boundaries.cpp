@@ -7,15 +7,16 @@
 #include <functional>
 #include <utility>
 
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr LevelTriple in_base{0, 0, 0};
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 class Packer {
  public:
@@ -180,13 +181,13 @@ MixedVolume close_boundaries(const OpenBricks& b, Closing closing) {
 
 std::vector<std::uint8_t> changed_bricks(const MixedVolume& before, const MixedVolume& after) {
   std::vector<std::uint8_t> changed(after.level.size(), 0);
-  const Index3 n = after.bricks();
+  const Bricks bricks(after.grid, after.granularity);
   parallel_for(static_cast<std::int64_t>(changed.size()), {}, "compare", [&](std::int64_t i) {
     if (before.level[at(i)] != after.level[at(i)]) {
       changed[at(i)] = 1;
       return;
     }
-    const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+    const Index3 p = bricks.position(i);
     const BrickSamples a(before, p), b(after, p);
     const Index3& end = a.end();
     for (std::int64_t z = 0; z <= end[2]; ++z)

@@ -5,12 +5,11 @@
 #include <utility>
 
 #include "host/certify/close_boundaries.hpp"
+#include "host/system/casts.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 float fraction(std::int64_t part, std::int64_t whole) {
   return static_cast<float>(part) / static_cast<float>(whole);

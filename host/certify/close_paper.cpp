@@ -5,12 +5,11 @@
 #include <bit>
 
 #include "host/certify/close_boundaries.hpp"
+#include "host/system/casts.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 LevelTriple isotropic(int level) {
   const auto l = static_cast<std::uint8_t>(level);

@@ -8,20 +8,14 @@
 #include <random>
 
 #include "host/opencl/host_memory.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr std::int64_t layers = 6, timed_blocks = 3;
 constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
-
-Index3 bricks_of(const GoldSettings& s) {
-  Index3 n{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (s.grid.cells[a] + s.granularity - 1) / s.granularity;
-  return n;
-}
 
 // The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
 // trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
@@ -164,7 +158,7 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const st
 Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
                        const std::vector<float>& stored, double tolerance) {
   const GoldSettings& settings = gold.fine().settings();
-  const Index3 n = bricks_of(settings);
+  const Index3 n = Bricks(settings.grid, settings.granularity).along();
   const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
   const DeviceField field(state, as_mixed(stored, settings));
   HostMemory host(state);

@@ -9,14 +9,14 @@
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/scan/units.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr int granularity = 4, finer = 4;
 constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Bounds of every brick that may hold a covered node.
 struct BrickBounds {
@@ -148,16 +148,14 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   out.bricks = static_cast<std::int64_t>(chosen.size());
 
-  const Index3 n{(grid.cells[0] + granularity - 1) / granularity,
-                 (grid.cells[1] + granularity - 1) / granularity, 0};
+  const Bricks bricks(grid, granularity);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const std::int64_t id = chosen[i];
     const BrickGold fine = brick_gold(truth, id, t.slack.size()),
                     exact = brick_gold(sharp, id, t.slack.size()),
                     computed = brick_gold(given, id, t.slack.size());
     out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
-    const Index3 first{id % n[0] * granularity, id / n[0] % n[1] * granularity,
-                       id / n[0] / n[1] * granularity};
+    const Index3 first = bricks.first_cell(bricks.position(id));
     const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, rates.upsampling,
                                                  rates.interpolation, rates.gold, first, computed.side);
     for (std::int64_t z = 0; z < computed.side[2]; ++z)

@@ -4,23 +4,15 @@
 #include <algorithm>
 #include <bit>
 
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
+
 namespace vdvr {
-namespace {
+namespace {}  // namespace
 
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
+Index3 OpenBricks::counts() const { return Bricks(grid, granularity).along(); }
 
-}  // namespace
-
-Index3 OpenBricks::counts() const {
-  Index3 n{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
-  return n;
-}
-
-Index3 OpenBricks::position(std::int64_t brick) const {
-  const Index3 n = counts();
-  return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
-}
+Index3 OpenBricks::position(std::int64_t brick) const { return Bricks(grid, granularity).position(brick); }
 
 std::vector<std::int64_t> incident_bricks(const OpenBricks& b, std::int64_t brick,
                                           const std::array<int, 3>& side, bool all) {

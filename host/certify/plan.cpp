@@ -21,6 +21,8 @@
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 
@@ -34,8 +36,6 @@ const std::vector<int> bound_rates{1, 2, 4, 8, 16, 32};
 constexpr double share = 0.5, patient_share = 0.65;
 // The same for P alone: a finer cubic interpolation costs memory only.
 constexpr double linear_share = 0.1, cubic_share = 0.03;
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Cheapest first: gold costs eight times per doubling, cubic in u twice the linear, upsampling memory only.
 std::vector<Rates> candidates(const RateOptions& wanted) {
@@ -123,9 +123,9 @@ struct Trial {
 
 // A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
 std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int gold) {
-  Index3 n{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + granularity - 1) / granularity;
-  std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
+  const Bricks bricks(grid, granularity);
+  const Index3 n = bricks.along();
+  std::vector<std::uint8_t> selected(at(bricks.size()), 0);
   const std::int64_t side = std::max<std::int64_t>(
       1, std::min<std::int64_t>(128, 1024 / gold) / (std::int64_t{granularity} * gold));
   for (const auto& [fx, fy, fz] :
@@ -140,7 +140,7 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
     for (std::int64_t z = first[2]; z < std::min(n[2], first[2] + side); ++z)
       for (std::int64_t y = first[1]; y < std::min(n[1], first[1] + side); ++y)
         for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x)
-          selected[at((z * n[1] + y) * n[0] + x)] = 1;
+          selected[at(bricks.number({x, y, z}))] = 1;
   }
   return selected;
 }
@@ -195,13 +195,10 @@ Trial try_rates(opencl::State& state, GoldStream& stream, double arithmetic, con
 double worst_node_bound(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
                         const GoldSettings& s, std::int64_t brick) {
   if (brick < 0) return 0;
-  Index3 n{}, first{}, nodes{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (s.grid.cells[a] + s.granularity - 1) / s.granularity;
-  const Index3 at_brick{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
-  for (std::size_t a = 0; a < 3; ++a) {
-    first[a] = at_brick[a] * s.granularity;
-    nodes[a] = std::min<std::int64_t>(s.granularity, s.grid.cells[a] - first[a]) * s.rate + 1;
-  }
+  const Bricks bricks(s.grid, s.granularity);
+  const Index3 position = bricks.position(brick), first = bricks.first_cell(position);
+  Index3 nodes = bricks.cells(position);
+  for (std::int64_t& n : nodes) n = n * s.rate + 1;
   const auto p = projection_bound_at_nodes(state, upsampler, scan, s.grid, s.upsampling, s.interpolation,
                                            s.rate, first, nodes);
   return static_cast<double>(*std::max_element(p.begin(), p.end()));

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
+#include "host/system/casts.hpp"
+
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Of linear interpolation along one axis.
 float error(const AxisErrors& along, std::size_t axis, int level, int top) {

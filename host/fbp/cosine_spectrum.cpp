@@ -5,6 +5,7 @@
 
 #include "host/fbp/axis_product.hpp"
 #include "host/fbp/cosine_series.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -12,8 +13,6 @@ namespace {
 
 using opencl::DeviceArray;
 constexpr std::int64_t kBlockSamples = std::int64_t{8} << 20;  // two such buffers: 64 MiB
-
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 }  // namespace
 

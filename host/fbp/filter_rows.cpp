@@ -18,6 +18,7 @@
 #include "host/opencl/fft.hpp"
 #include "host/opencl/host_fft.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
@@ -37,8 +38,6 @@ double stored_rounding(double largest) {
   constexpr double u = unit_roundoff<float>;
   return is_double<Real> ? u / (1 - u) * largest : 0.0;
 }
-
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
 
 cl_int to_int(std::int64_t n) {
   if (n > INT32_MAX) throw InputError(fmt::format("a size of {} passes 2^31", n));

@@ -7,13 +7,11 @@
 #include <utility>
 
 #include "host/fbp/reconstruct.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
-
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // (index in a batch's [block][cell z][y][x], index in the grid's cells) of every base cell inside the grid.
 template <class Visit>

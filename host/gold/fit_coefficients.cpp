@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 
 namespace vdvr {
 namespace {
@@ -15,10 +16,6 @@ constexpr float share = 0.8f;
 constexpr std::uint64_t room = 64;
 // Of 16 nodes of a column, a bit each.
 constexpr std::int64_t most_runs = 32;
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 template <class T>
 void grow(opencl::State& state, opencl::DeviceArray<T>& array, std::uint64_t size, const char* what) {

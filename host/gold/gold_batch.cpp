@@ -8,16 +8,14 @@
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 
 namespace vdvr {
 
 static_assert(sizeof(VdvrGoldShape) == 48 && sizeof(VdvrLattice) == 36);
 
 namespace {
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Of what rounding may move a sample: the worst node is seldom one of the samples that rounding moves most.
 // Without room a brick at the tolerance is raised by repair, for twice its samples; with all of it too many
@@ -41,9 +39,7 @@ std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const {
 // Equal blocks by their first bricks in x and y, and the selected bricks in them.
 void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
                                const std::vector<std::uint8_t>& selected) {
-  const Grid& grid = settings_.grid;
-  const std::int64_t g = settings_.granularity;
-  const std::int64_t across = (grid.cells[0] + g - 1) / g, deep = (grid.cells[1] + g - 1) / g;
+  const Bricks bricks(settings_.grid, settings_.granularity);
   first_brick_.clear();
   bricks_.clear();
   place_.clear();
@@ -54,7 +50,7 @@ void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, s
     for (std::int64_t dz = 0; dz < bricks_z_; ++dz)
       for (std::int64_t dy = 0; dy < bricks_y_; ++dy)
         for (std::int64_t dx = 0; dx < bricks_x_; ++dx) {
-          const std::int64_t brick = ((first_z + dz) * deep + by + dy) * across + bx + dx;
+          const std::int64_t brick = bricks.number({bx + dx, by + dy, first_z + dz});
           if (!selected[at(brick)]) continue;
           bricks_.push_back(brick);
           place_[brick] = {static_cast<std::int64_t>(b), dx, dy, dz};

@@ -11,15 +11,13 @@
 
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_blocks.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Room for 16-lane reads that begin at the last node of the last column.
 constexpr std::int64_t gold_room = 64;
@@ -112,8 +110,7 @@ double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int6
 // Work by slab, equal blocks together.
 std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8_t>& selected) const {
   const std::int64_t g = settings_.granularity;
-  Index3 bricks{};
-  for (std::size_t a = 0; a < 3; ++a) bricks[a] = (settings_.grid.cells[a] + g - 1) / g;
+  const Index3 bricks = Bricks(settings_.grid, settings_.granularity).along();
   std::map<std::int64_t, std::vector<Work>> by_slab;
   for (const BrickBox& box : cover_bricks(bricks, selected, block_bricks(),
                                           [&](const Index3& n) { return samples(n[0], n[1], n[2]); })) {
@@ -209,9 +206,9 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
 std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity;
-  Index3 n{};
-  for (std::size_t a = 0; a < 3; ++a) n[a] = (grid.cells[a] + g - 1) / g;
-  std::vector<std::uint8_t> near(at(n[0] * n[1] * n[2]), 0);
+  const Bricks bricks(grid, settings_.granularity);
+  const Index3 n = bricks.along();
+  std::vector<std::uint8_t> near(at(bricks.size()), 0);
   const double reach = std::hypot(grid.spacing[0], grid.spacing[1]) * (0.5 * static_cast<double>(g) + 1);
   for (std::int64_t y = 0; y < n[1]; ++y)
     for (std::int64_t x = 0; x < n[0]; ++x) {
@@ -220,7 +217,7 @@ std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
       const double cy =
           grid.origin[1] + (static_cast<double>(y) + 0.5) * static_cast<double>(g) * grid.spacing[1];
       if (coverage_.margin(cx, cy) < -reach) continue;
-      for (std::int64_t z = 0; z < n[2]; ++z) near[at((z * n[1] + y) * n[0] + x)] = 1;
+      for (std::int64_t z = 0; z < n[2]; ++z) near[at(bricks.number({x, y, z}))] = 1;
     }
   return near;
 }

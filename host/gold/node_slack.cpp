@@ -5,15 +5,11 @@
 
 #include "host/fbp/back_project.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/round_up.hpp"
 
 namespace vdvr {
-namespace {
-
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-
-}  // namespace
+namespace {}  // namespace
 
 NodeSlack::NodeSlack(opencl::State& state, CellBounds& cells, const FilteredScan& scan, const FieldSups& sups,
                      const GoldSettings& settings, double arithmetic, double rounding)

@@ -1,12 +1,13 @@
 // Finds the worst node of one brick.
 #include "host/gold/worst_node.hpp"
 
+#include "host/volume/bricks.hpp"
+
 namespace vdvr {
 
 std::optional<Vec3> worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
                                int gold_rate) {
-  const Index3 bricks = volume.bricks();
-  const Index3 p{brick % bricks[0], brick / bricks[0] % bricks[1], brick / bricks[0] / bricks[1]};
+  const Index3 p = Bricks(volume.grid, volume.granularity).position(brick);
   const std::int64_t g = volume.granularity;
   const double rate = gold_rate;
   std::optional<Vec3> where;

@@ -15,6 +15,8 @@
 #include "host/render/check_render_options.hpp"
 #include "host/render/raycast_params.hpp"
 #include "host/sampler/resident_volume.hpp"
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 
@@ -31,8 +33,6 @@ constexpr int kGranularity = 4;
 // Columns and rows are found in fp32: a point on the detector's edge stays covered whatever the rounding. At
 // 16384 stored columns three roundings err by less than this.
 constexpr double kEdge = 0x1p-8;
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 void check_options(const ParallelGeometry& g, const D2vrOptions& options) {
   const int n = options.upsampling;
@@ -230,9 +230,8 @@ std::vector<float> D2vrField::at(std::span<const Vec3> points, const Progress& p
 // --- the scene ---
 
 std::vector<cl_float2> occupied_ranges(const Volume& v, int granularity) {
-  const Index3 n = v.grid.samples(), cells = v.grid.cells;
-  Index3 bricks{};
-  for (std::size_t a = 0; a < 3; ++a) bricks[a] = (cells[a] + granularity - 1) / granularity;
+  const Index3 n = v.grid.samples();
+  const Index3 bricks = Bricks(v.grid, granularity).along();
   std::vector<cl_float2> ranges;
   ranges.reserve(at(bricks[0] * bricks[1] * bricks[2]));
   for (std::int64_t bz = 0; bz < bricks[2]; ++bz)

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "host/opencl/kernel.hpp"
+#include "host/volume/bricks.hpp"
 #include "shared/lit_gradient.h"
 
 namespace vdvr {
@@ -49,11 +50,12 @@ LitLayout::LitLayout(const MixedVolume& v) {
     if (v.level[i] != LevelTriple{0, 0, 0}) bricks[v.level[i]].push_back(static_cast<std::uint32_t>(i));
 
   // Places: of base bricks where they lie in the base, of tiles in the order of their bricks.
-  const Index3 n = v.bricks(), base = v.base_samples();
+  const Bricks all(v.grid, v.granularity);
+  const Index3 base = v.base_samples();
   std::vector<std::uint64_t> place(v.level.size());
   for (std::size_t i = 0; i < place.size(); ++i) {
     const auto k = static_cast<std::int64_t>(i);
-    const Index3 first = first_base_sample(v, {k % n[0], k / n[0] % n[1], k / (n[0] * n[1])});
+    const Index3 first = first_base_sample(v, all.position(k));
     place[i] = static_cast<std::uint64_t>((first[2] * base[1] + first[1]) * base[0] + first[0]);
   }
   blocks_.push_back({block_of_base(v), {}});

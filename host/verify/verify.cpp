@@ -12,24 +12,23 @@
 
 #include "host/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
+#include "host/system/casts.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_scope.hpp"
 #include "host/verify/verify_seams.hpp"
 #include "host/verify/verify_terms.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"
+#include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {
 
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
-
 Index3 place_of(const MixedVolume& v, std::int64_t brick) {
-  const Index3 n = v.bricks();
-  return {brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+  return Bricks(v.grid, v.granularity).position(brick);
 }
 
 // The layers of bricks a sample is drawn from: each costs the filtered rows of its heights, so they are few.

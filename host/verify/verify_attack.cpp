@@ -8,10 +8,11 @@
 #include <limits>
 #include <set>
 
+#include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
+
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 constexpr std::size_t points_per_cell = 19;     // of 27: not the corners, which are nodes
 constexpr std::size_t most_cells = 210;         // 3,990 points
@@ -70,9 +71,9 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
       std::max(48.0, most_work / static_cast<double>(g.views() * g.rows * g.columns)));
   std::set<double> heights;
   std::vector<Vec3> points;
-  const Index3 n = volume_.bricks();
+  const Bricks bricks(volume_.grid, volume_.granularity);
   for (std::size_t i = 0; i < std::min(cells.size(), most_cells) && heights.size() + 3 <= most_heights; ++i) {
-    const Index3 brick{cells[i].brick % n[0], cells[i].brick / n[0] % n[1], cells[i].brick / n[0] / n[1]};
+    const Index3 brick = bricks.position(cells[i].brick);
     for_each_middle([&](const Index3& half) {
       Vec3 p{};
       for (std::size_t a = 0; a < 3; ++a) {
@@ -93,8 +94,7 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
     if (stored_.window && !(F[i] - exact.rounding() >= stored_.window->first &&
                             F[i] + exact.rounding() <= stored_.window->second))
       continue;
-    const Index3 b = brick_at(volume_, points[i]);
-    const std::int64_t brick = (b[2] * n[1] + b[1]) * n[0] + b[0];
+    const std::int64_t brick = bricks.number(brick_at(volume_, points[i]));
     const double bound = certified(brick), value = static_cast<double>(sample_at(volume_, points[i])),
                  error = std::abs(value - F[i]);
     if (std::isinf(bound)) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_cosines.hpp"
 
@@ -16,8 +17,6 @@ using namespace verify_cosines;
 constexpr double pi = std::numbers::pi;
 constexpr double u = 0x1p-24;            // rounding unit of fp32
 constexpr std::int64_t sup_density = 3;  // points per pixel where sups are sampled
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 }  // namespace
 

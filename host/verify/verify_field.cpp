@@ -11,6 +11,7 @@
 
 #include "host/certify/result_units.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_cosines.hpp"
 #include "shared/verify_pieces.h"
@@ -25,9 +26,6 @@ constexpr double pi = std::numbers::pi;
 constexpr std::int64_t halo = 2;   // of gold nodes: RADIUS of the kernel
 constexpr std::int64_t room = 64;  // floats after a buffer's end that 16-lane reads may touch
 
-cl_int to_int(std::int64_t n) { return static_cast<cl_int>(n); }
-std::uint64_t count(std::int64_t n) { return static_cast<std::uint64_t>(n); }
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
 
 // Gold cells of a piece's side at most: what is computed at once stays small whatever the rate.

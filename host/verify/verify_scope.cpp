@@ -10,12 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // A value is written with all its digits, and computed again by at most a few roundings more.
 bool same(double a, double b) {

@@ -14,11 +14,10 @@
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/opencl/host_memory.hpp"
+#include "host/system/casts.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 // Sups and tables are sums in fp32 over at most a few thousand terms: devices agree on them better than this.
 constexpr double table_rounding = 0x1p-10;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -17,7 +18,6 @@ static_assert(static_cast<int>(SampleType::f32) == VDVR_F32 &&
 
 namespace {
 
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 constexpr LevelTriple in_base{0, 0, 0};
 
 std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "vdvr/error.hpp"
@@ -14,7 +15,6 @@ namespace vdvr {
 
 namespace {
 
-std::size_t at(std::int64_t n) { return static_cast<std::size_t>(n); }
 constexpr LevelTriple in_base{0, 0, 0};
 
 template <class T>

@@ -376,7 +376,7 @@ BOOST_AUTO_TEST_CASE(bases_coarser_than_the_grid_are_certified_and_continuous) {
   for (const bool sampled : {false, true})
     for (const LevelTriple& coarsening : {LevelTriple{2, 0, 0}, {0, 1, 2}, {2, 2, 1}, {1, 1, 1}}) {
       Wanted wanted{grid_of(scan, {12, 12, 8}, 0.9), 0.2};
-      wanted.sampled = sampled;
+      if (sampled) wanted.comparison.coefficients = Coefficients::sampled;
       wanted.coarsening = coarsening;
       check_all(scan, wanted, 3);
       BOOST_TEST((build_of(scan, wanted).result.volume.coarsening == coarsening));

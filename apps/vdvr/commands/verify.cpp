@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "apps/vdvr/inputs.hpp"
-#include "apps/vdvr/progress.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error.hpp"
 
@@ -42,7 +42,7 @@ int verify_command(Arguments& args) {
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
-  ProgressLine progress(args.command(), common.quiet);
+  ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = read_to_verify(path, common.max_memory);
   const Certificate& certificate = file.certificate;
   check_field_options(args, certificate.field);
