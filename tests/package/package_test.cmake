@@ -1,5 +1,6 @@
 # The library of KIND (static, shared), installed from BUILD into an empty prefix, and the examples built on it: by find_package
 # and by pkg-config. They run on a simulated scan and refuse what the program refuses.
+cmake_minimum_required(VERSION 3.22)
 set(work "${BUILD}/tests/package_${KIND}")
 set(prefix "${work}/prefix")
 file(REMOVE_RECURSE "${work}")
@@ -42,11 +43,11 @@ run(0 "${CMAKE_COMMAND}" -S "${SOURCE}/examples" -B "${work}/found" -G "${GENERA
 run(0 "${CMAKE_COMMAND}" --build "${work}/found")
 
 # By pkg-config, as a shell puts it.
-set(static "")
+set(all_libraries "")
 if(KIND STREQUAL "static")
-  set(static "--static")
+  set(all_libraries --static)
 endif()
-run(0 "${PKG_CONFIG}" --cflags --libs ${static} vdvr)
+run(0 "${PKG_CONFIG}" --cflags --libs ${all_libraries} vdvr)
 separate_arguments(flags UNIX_COMMAND "${output}")
 run(0 "${CXX}" -std=c++20 "${SOURCE}/examples/certify.cpp" ${flags} "-Wl,-rpath,${prefix}/${LIBDIR}" -o "${work}/certify")
 
