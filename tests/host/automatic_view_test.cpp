@@ -11,13 +11,14 @@ namespace {
 constexpr double kBackground = 0.1, kSoft = 0.4, kDense = 1.0;
 constexpr std::int64_t kCells = 15;
 
-/// Background, a block of soft material and in the corner of high coordinates a dense one.
+/// Background, a block of soft material and in the corner of high coordinates a dense one, of an eighth of
+/// all: Otsu's criterion parts materials by their amount too.
 MixedVolume three_materials() {
   Volume volume{{{kCells, kCells, kCells}, {0, 0, 0}, {1, 1, 1}, "pixel"}, {}};
   for (std::int64_t z = 0; z <= kCells; ++z)
     for (std::int64_t y = 0; y <= kCells; ++y)
       for (std::int64_t x = 0; x <= kCells; ++x) {
-        const bool soft = x > 4 && y > 4 && z > 4, dense = x > 11 && y > 11 && z > 11;
+        const bool soft = x > 4 && y > 4 && z > 4, dense = x > 7 && y > 7 && z > 7;
         volume.samples.push_back(static_cast<float>(dense ? kDense : soft ? kSoft : kBackground));
       }
   return as_mixed(volume);
@@ -38,7 +39,7 @@ BOOST_AUTO_TEST_CASE(thresholds_lie_between_materials) {
   BOOST_TEST(b.threshold < kDense);
   BOOST_TEST(b.soft > kBackground);
   BOOST_TEST(b.soft < kSoft);
-  for (const double c : b.dense_center) BOOST_TEST(c == 13.5);  // the middle of samples 12 to 15
+  for (const double c : b.dense_center) BOOST_TEST(c == 11.5);  // the middle of samples 8 to 15
 }
 
 BOOST_AUTO_TEST_CASE(background_is_clear_and_the_dense_material_is_not) {
@@ -48,7 +49,7 @@ BOOST_AUTO_TEST_CASE(background_is_clear_and_the_dense_material_is_not) {
              transfer_at(view.transfer.points, kSoft).opacity);
   BOOST_REQUIRE(view.surfaces.size() == 1);
   BOOST_TEST(view.surfaces[0].value > kSoft);
-  BOOST_TEST(*view.slice_position == 13.5);
+  BOOST_TEST(*view.slice_position == 11.5);
 }
 
 BOOST_AUTO_TEST_CASE(a_sampler_without_a_certificate_is_taken_only_by_name) {
