@@ -209,12 +209,13 @@ std::vector<cl_float4> random_points(const MixedVolume& v, unsigned seed, int gr
   return points;
 }
 
-// --- sampling
-// ---------------------------------------------------------------------------------------------------------
+// --- sampling ---
 
 cl::Program build_points(const opencl::Defines& defines) {
   std::ifstream file(VDVR_SOURCE_DIR "/tests/device/one_sampler.cl");
-  const std::string points{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::ostringstream text;
+  text << file.rdbuf();
+  const std::string points = text.str();
   BOOST_REQUIRE(!points.empty());
   opencl::State& state = device().state();
   cl::Program program(state.context, opencl::resolve_source("render/raycast.cl") + points);
