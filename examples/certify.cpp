@@ -11,7 +11,7 @@ int main(int count, char** words) try {
   if (count != 4) throw vdvr::InputError("usage: certify SCAN FRACTION OUT.vdvr");
   const vdvr::ProjectionSet scan = vdvr::read_scan(words[1]);
   vdvr::Device device;
-  const auto made = vdvr::certify(device, scan, {.relative = std::stod(words[2])});
+  const auto made = vdvr::certify(device, scan, {.relative = std::stod(words[2]), .absolute = {}});
   vdvr::write_vdvr(words[3], made.volume, made.certificate);
   std::cout << "|V - F| <= " << made.certificate.epsilon_abs << " at every covered point\n";
 } catch (const vdvr::Error& error) {
