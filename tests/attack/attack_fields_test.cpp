@@ -183,9 +183,9 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
           const double bound = total[at((b[2] * n[1] + b[1]) * n[0] + b[0])] + others,
                        error = std::abs(static_cast<double>(sample_at(v, points[i])) - F[i]);
           if (error > 0) closest = std::max(closest, error / bound);
-          BOOST_TEST(error <= tolerance::bound(bound), scan.name << ", " << rates.name() << ", kind " << kind
-                                                                 << ": |V - F| " << error << ", certified "
-                                                                 << bound);
+          BOOST_TEST(error <= tolerance::bound(bound), scan.name << ", " << name_of(rates) << ", kind "
+                                                                 << kind << ": |V - F| " << error
+                                                                 << ", certified " << bound);
         }
       }
     }

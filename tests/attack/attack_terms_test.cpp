@@ -257,9 +257,9 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_gold_of_awkward_scans) {
                          0.5 * static_cast<double>(scan.data.geometry.rows - 1);
       const Arithmetic a = measure(filtered, filtered.samples, upsampling, filter, block, row);
       if (a.error > 0) closest = std::max(closest, a.error / a.bound);
-      BOOST_TEST(a.error <= tolerance::bound(a.bound), scan.name << ", " << filter << " " << upsampling
-                                                                 << ": error " << a.error << ", bound "
-                                                                 << a.bound);
+      BOOST_TEST(a.error <= tolerance::bound(a.bound), scan.name << ", " << text_of(filter) << " "
+                                                                 << upsampling << ": error " << a.error
+                                                                 << ", bound " << a.bound);
     }
   }
   BOOST_TEST_MESSAGE("  gold of awkward scans: error / bound " << closest);
@@ -290,7 +290,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_errors_of_the_filtered_samples) {
                                                static_cast<double>(right.samples[i])));
         wrong.ramp_error = largest * static_cast<double>(g.views());
         expect(measure(wrong, right.samples, upsampling, filter, {1, 1, 1, 1, {{0, 0}}, {}}, row),
-               "filter, " + std::string(filter) + " " + std::to_string(upsampling) + ", row " +
+               "filter, " + std::string(text_of(filter)) + " " + std::to_string(upsampling) + ", row " +
                    std::to_string(row));
       }
 }
@@ -337,7 +337,7 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_long_biased_sums) {
         const FilteredScan f = given_samples(
             g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
         expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
-               std::string("summation of ") + std::to_string(views) + " views, " + filter + ", " +
+               std::string("summation of ") + std::to_string(views) + " views, " + text_of(filter) + ", " +
                    std::to_string(term));
       }
   }
@@ -355,6 +355,6 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
         return std::sin(reference::frequency(m, columns) * (static_cast<double>(u) + 0.5) + 0.1);
       });
       expect(measure(f, f.samples, 2, filter, {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
-             std::string("position, ") + filter + ", wave " + std::to_string(m));
+             std::string("position, ") + text_of(filter) + ", wave " + std::to_string(m));
     }
 }

@@ -202,7 +202,7 @@ void check_global(const Scan& scan, Chain& chain, const GoldLattice& l, const Ra
 void attack(const Scan& scan, Chain& chain, const Rates& rates, double spacing, Place place, bool global) {
   const Grid grid = grid_at(scan.data.geometry, scan.target, spacing, rates.gold, place);
   const std::string how =
-      rates.name() + ", spacing " + std::to_string(spacing) + ", target " + name_of(place);
+      attacks::name_of(rates) + ", spacing " + std::to_string(spacing) + ", target " + name_of(place);
   std::mt19937 random(static_cast<unsigned>(fields_times_rates));
   const GoldLattice l = stream_lattice(chain, grid, rates);
   check_gold(scan, chain, l, how, random);

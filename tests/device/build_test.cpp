@@ -236,7 +236,7 @@ BOOST_AUTO_TEST_CASE(certificate_of_noise_holds_for_every_u_filter_and_granulari
   const Grid grid = grid_of(scan, {9, 7, 6}, 0.8);
   for (const int granularity : {1, 2, 4})
     for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
-      check_all(scan, {grid, 0.15, {16, filter, 8}, {}, 0, false, false, {}, {}, granularity}, 2);
+      check_all(scan, {grid, 0.15, {16, filter, 8}, {}, 0, {}, false, {}, {}, granularity}, 2);
 }
 
 BOOST_AUTO_TEST_CASE(certificate_holds_to_the_edge_of_the_covered_region) {
@@ -290,7 +290,10 @@ BOOST_AUTO_TEST_CASE(points_one_rounding_below_a_face_of_the_region_are_certifie
   // Faces of bricks of two cells, approached from inside and left out by one rounding of a double.
   const double below = std::nextafter(2.0, -1.0);
   const std::array<double, 6> roi{-4, -4, -2, below, below, below};
-  const Built built = build_of(scan, {grid, 0.05, {}, {2, roi, {}}});
+  Wanted wanted{grid, 0.05};
+  wanted.options.roi = roi;
+  wanted.granularity = 2;
+  const Built built = build_of(scan, wanted);
   std::vector<Vec3> points = random_points({-4, -4, -2}, {2, 2, 2}, 10, 150, 5);
   for (std::size_t i = 0; i < points.size(); ++i) points[i][i % 3] = below;
   const MixedVolume& v = built.result.volume;

@@ -7,8 +7,8 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <set>
+#include <sstream>
 
 #include "host/opencl/embedded.hpp"
 #include "host/render/raycast.hpp"
@@ -27,8 +27,7 @@ std::int64_t below(Random& random, std::int64_t n) {
   return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
 }
 
-// --- volumes
-// ----------------------------------------------------------------------------------------------------------
+// --- volumes ---
 
 /// What a volume is to have; the rest is drawn.
 struct Kind {
@@ -143,8 +142,7 @@ MixedVolume random_volume(const Kind& kind, unsigned seed) {
   }
 }
 
-// --- points
-// -----------------------------------------------------------------------------------------------------------
+// --- points ---
 
 constexpr int slots = 16, steps = 6;
 
@@ -209,12 +207,13 @@ std::vector<cl_float4> random_points(const MixedVolume& v, unsigned seed, int gr
   return points;
 }
 
-// --- sampling
-// ---------------------------------------------------------------------------------------------------------
+// --- sampling ---
 
 cl::Program build_points(const opencl::Defines& defines) {
   std::ifstream file(VDVR_SOURCE_DIR "/tests/device/one_sampler.cl");
-  const std::string points{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::ostringstream text;
+  text << file.rdbuf();
+  const std::string points = text.str();
   BOOST_REQUIRE(!points.empty());
   opencl::State& state = device().state();
   cl::Program program(state.context, opencl::resolve_source("render/raycast.cl") + points);

@@ -7,6 +7,7 @@
 #include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/raycast.hpp"
 
 using namespace vdvr;
 

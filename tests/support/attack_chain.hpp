@@ -16,12 +16,10 @@ namespace vdvr::attacks {
 
 using support::device;
 
-struct Rates : vdvr::Rates {
-  [[nodiscard]] std::string name() const {
-    return std::string(text_of(interpolation)) + " " + std::to_string(upsampling) + ", gold " +
-           std::to_string(gold);
-  }
-};
+inline std::string name_of(const Rates& rates) {
+  return std::string(text_of(rates.interpolation)) + " " + std::to_string(rates.upsampling) + ", gold " +
+         std::to_string(rates.gold);
+}
 
 /// Every pair of rates: 4 upsamplings, 2 filters, 4 of gold.
 inline std::vector<Rates> all_rates() {
