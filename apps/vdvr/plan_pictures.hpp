@@ -1,5 +1,5 @@
 // The pictures of `plan --pictures DIR`: what interpolation does to the frequencies of this scan, after
-// Figs. 4 and 5 of the paper. Called by plan.cpp and paper_spectra.cpp.
+// Figs. 4 and 5 of the paper. Called by plan.cpp.
 #pragma once
 
 #include "apps/vdvr/output.hpp"
