@@ -1,5 +1,5 @@
 // The cosine coefficients of an image or volume under half-sample mirror extension: the spectrum that bounds
-// by amplitude are sums over. Called by plan_pictures.cpp.
+// by amplitude are sums over. Called by plan_pictures.cpp and vdvr-paper.
 #pragma once
 
 #include <cstdint>
