@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <stdexcept>
 
 #include "host/opencl/embedded.hpp"
 #include "host/render/raycast.hpp"
@@ -75,11 +76,12 @@ SampleBlock random_block(Random& random, SampleType type, std::int64_t tiles, st
   return b;
 }
 
-LevelTriple random_coarsening(Random& random, int granularity) {
-  LevelTriple c{};
-  for (auto& n : c)
-    n = static_cast<std::uint8_t>(below(random, std::bit_width(static_cast<unsigned>(granularity))));
-  return c;
+/// In turn, another along each axis.
+LevelTriple coarsening_of(unsigned turn, int granularity) {
+  const unsigned count = static_cast<unsigned>(std::bit_width(static_cast<unsigned>(granularity)));
+  // Factors without a divisor in common with 2, 3 and 4: every count is gone through.
+  return {static_cast<std::uint8_t>(turn % count), static_cast<std::uint8_t>((5 * turn + 1) % count),
+          static_cast<std::uint8_t>((7 * turn + 2) % count)};
 }
 
 /// Triples up to the finest level whose tiles are not too large for a test.
@@ -116,7 +118,7 @@ MixedVolume random_volume(const Kind& kind, unsigned seed) {
   Random random(seed);
   MixedVolume shape;
   shape.granularity = kind.granularity;
-  if (!kind.uniform) shape.coarsening = random_coarsening(random, kind.granularity);
+  if (!kind.uniform) shape.coarsening = coarsening_of(seed / 4, kind.granularity);
   const int deepest = *std::max_element(shape.coarsening.begin(), shape.coarsening.end());
   // At least two levels, and now and then the finest that a record can name.
   if (!kind.uniform) shape.rate = 1 << (seed % 5 == 4 ? largest_level - deepest : 1 + below(random, 3));
