@@ -13,7 +13,7 @@
 #include <random>
 
 #include "host/opencl/kernel.hpp"
-#include "vdvr/sampler.hpp"
+#include "vdvr/probe_sampler.hpp"
 
 namespace vdvr {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/mixed_volume.hpp"
-#include "vdvr/sampler.hpp"
+#include "vdvr/probe_sampler.hpp"
 
 namespace vdvr {
 

@@ -12,7 +12,7 @@
 #include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/resident_volume.hpp"
-#include "vdvr/sampler.hpp"
+#include "vdvr/probe_sampler.hpp"
 #include "vdvr/transfer_function.hpp"
 
 namespace vdvr {

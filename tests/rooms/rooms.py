@@ -82,6 +82,8 @@ def faults(root):
         for name in includes(path):
             if not name.startswith("vdvr/"):
                 yield f"{path.relative_to(root)}: a public header includes {name}"
+        if declares(path.read_text(encoding="utf-8")) and not list((root / "host").glob(f"*/{path.stem}.cpp")):
+            yield f"{path.relative_to(root)}: no room has a source of its stem"
     for folder in ("apps", "examples"):
         for path in files(root / folder, ".hpp", ".cpp"):
             for name in includes(path):
@@ -145,6 +147,7 @@ FAULTS = [
     ("host/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/fbp/coverage.cpp: includes"),
     ("host/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
     ("include/vdvr/grid.hpp", '#include "host/system/parallel.hpp"\n', "a public header includes"),
+    ("include/vdvr/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "no room has a source of its stem"),
     ("apps/vdvr/x.cpp", '#include "host/system/parallel.hpp"\n', "only include/vdvr is public"),
     ("examples/x.cpp", '#include "shared/mixed_sampler.h"\n', "only include/vdvr is public"),
     ("tests/loose_test.cpp", "\n", "lies loose in tests/"),
