@@ -39,7 +39,8 @@ LobbCase measure_case(Report& run, const Lobb& lobb, Settings settings, double e
   RenderOptions view = timing_view(lobb.test.grid);
   view.transfer = transfer_preset("marschner-lobb", 0, 1);
   const ResidentVolume resident(run.device, c.made.volume);
-  c.speed = measure_speed([&](const RenderOptions& o) { return draw_case(run, resident, c.made, o); }, view,
+  Renderer renderer(run.device, resident);
+  c.speed = measure_speed([&](const RenderOptions& o) { return draw_case(renderer, c.made, o); }, view,
                           lobb.test.grid, run.frames(), run.progress);
   return c;
 }
@@ -356,7 +357,8 @@ void add_lobb_pictures(Report& run, const Lobb& lobb) {
     pictures.push_back({"D2VR", raycast(run.device, scene, view).image});
     if (ours) {
       const ResidentVolume resident(run.device, ours->made.volume);
-      pictures.push_back({"VDVR (ours) 2 %", draw_case(run, resident, ours->made, view).image});
+      Renderer renderer(run.device, resident);
+      pictures.push_back({"VDVR (ours) 2 %", draw_case(renderer, ours->made, view).image});
     }
     Section section{"Fig. 13: the function against D2VR", {}, {}, {}, {}};
     section.paragraphs = {
@@ -372,9 +374,10 @@ void add_lobb_pictures(Report& run, const Lobb& lobb) {
       const LobbCase* c = lobb.find(s, p.epsilon);
       if (!c) continue;
       const ResidentVolume resident(run.device, c->made.volume);
+      Renderer renderer(run.device, resident);
       pictures.push_back(
           {fmt::format("{} {}", percent(p.epsilon), s == Settings::ours ? "ours" : "paper's settings"),
-           draw_case(run, resident, c->made, lobb_view(lobb.test.grid, side)).image});
+           draw_case(renderer, c->made, lobb_view(lobb.test.grid, side)).image});
     }
   const ResidentVolume exact(run.device, function);
   pictures.push_back({"function", raycast(run.device, exact, lobb_view(lobb.test.grid, side)).image});

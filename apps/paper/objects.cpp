@@ -42,9 +42,10 @@ TransferFunction transfer_of(const MixedVolume& volume) {
 
 Speed speed_of(Report& run, const Case& made) {
   const ResidentVolume resident(run.device, made.volume);
+  Renderer renderer(run.device, resident);
   RenderOptions view = timing_view(made.volume.grid);
   view.transfer = transfer_of(made.volume);
-  return measure_speed([&](const RenderOptions& o) { return draw_case(run, resident, made, o); }, view,
+  return measure_speed([&](const RenderOptions& o) { return draw_case(renderer, made, o); }, view,
                        made.volume.grid, run.frames(), run.progress);
 }
 

@@ -163,6 +163,6 @@ Json case_json(const Case& c);
 /// A picture of Marschner-Lobb's surface at 0.5 from above, which all of its figures share.
 RenderOptions lobb_view(const Grid& grid, std::int64_t side);
 /// With the sampler that the case's certificate allows.
-RenderResult draw_case(Report& run, const ResidentVolume& resident, const Case& made, RenderOptions options);
+RenderResult draw_case(Renderer& renderer, const Case& made, RenderOptions options);
 
 }  // namespace vdvr::paper

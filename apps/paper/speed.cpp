@@ -20,18 +20,19 @@ void measure_speeds(Report& run, const std::string& object, const TestScan& test
         {object, method, bytes, measure_speed(draw, view, test.grid, frames, run.progress), 1, std::nullopt});
   };
   const ResidentVolume mixed(run.device, made.volume), base(run.device, uniform);
-  const auto draw_mixed = [&](const RenderOptions& o) { return draw_case(run, mixed, made, o); };
+  Renderer of_mixed(run.device, mixed), of_base(run.device, base);
+  const auto draw_mixed = [&](const RenderOptions& o) { return draw_case(of_mixed, made, o); };
   time("VDVR (ours)", mixed.bytes(), many, draw_mixed);
-  time("uniform DVR", base.bytes(), many,
-       [&](const RenderOptions& o) { return raycast(run.device, base, o); });
+  time("uniform DVR", base.bytes(), many, [&](const RenderOptions& o) { return of_base.render(o); });
   std::optional<double> d2vr;
   const GradientKind usual = view.gradient;
   for (const GradientKind gradient : {GradientKind::central, GradientKind::analytic}) {
     const D2vrField field(run.device, test.scan, {}, run.progress);
     const D2vrScene scene(run.device, field, test.grid, run.progress);
+    Renderer of_scene(run.device, scene);
     view.gradient = gradient;
     time(gradient == GradientKind::central ? "D2VR" : "D2VR, gradient from the projections", field.bytes(),
-         few, [&](const RenderOptions& o) { return raycast(run.device, scene, o); });
+         few, [&](const RenderOptions& o) { return of_scene.render(o); });
     if (!d2vr) d2vr = rows.back().speed.seconds_median;
   }
   view.gradient = usual;
@@ -51,11 +52,12 @@ void measure_lobb_speeds(Report& run, const Lobb& lobb) {
   const D2vrField fine(run.device, lobb.test.scan, {{}, 8}, run.progress),
       plain(run.device, lobb.test.scan, {}, run.progress);
   const D2vrScene scene(run.device, fine, lobb.test.grid, run.progress);
+  Renderer of_scene(run.device, scene);
   RenderOptions view = timing_view(lobb.test.grid);
   view.transfer = transfer;
   SpeedRow row{"Marschner-Lobb", "D2VR, 8x upsampled", fine.bytes(), {}, 1, std::nullopt};
-  row.speed = measure_speed([&](const RenderOptions& o) { return raycast(run.device, scene, o); }, view,
-                            lobb.test.grid, 2, run.progress);
+  row.speed = measure_speed([&](const RenderOptions& o) { return of_scene.render(o); }, view, lobb.test.grid,
+                            2, run.progress);
   row.function = measure_error(d2vr_on(fine, lobb.lattice, run.progress), lobb.function);
   for (auto& r : run.speeds) {
     if (r.object != row.object) continue;

@@ -61,9 +61,9 @@ RenderOptions lobb_view(const Grid& grid, std::int64_t side) {
   return o;
 }
 
-RenderResult draw_case(Report& run, const ResidentVolume& resident, const Case& made, RenderOptions options) {
+RenderResult draw_case(Renderer& renderer, const Case& made, RenderOptions options) {
   options.sampler = safe_sampler(SamplerKind::automatic, made.certificate);
-  return raycast(run.device, resident, options);
+  return renderer.render(options);
 }
 
 }  // namespace vdvr::paper

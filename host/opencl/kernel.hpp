@@ -50,7 +50,7 @@ class Kernel {
       if (*largest == 1) break;
       *largest = (*largest + 1) / 2;
     }
-    const auto g = [&](int a) { return round_up(range.global[a], local[a]); };
+    const auto g = [&](std::size_t a) { return round_up(range.global[a], local[a]); };
     if (g(0) * g(1) * g(2) == 0) return;
     throw_if_stopped();
     try {
