@@ -303,6 +303,7 @@ int bench_command(Arguments& args) {
   if (name == "render") return bench_render(args);
   if (name == "bounds") return bench_bounds(args);
   if (name == "tune") return bench_tune(args);
+  if (name == "paper") throw InputError("the paper's figures and tables are made by the program vdvr-paper");
   if (!name.empty())
     throw InputError(
         fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
