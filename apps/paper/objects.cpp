@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vdvr/automatic_view.hpp"
 #include "apps/paper/report.hpp"
 #include "apps/paper/scans.hpp"
 #include "apps/paper/upsample_volume.hpp"
+#include "vdvr/automatic_view.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::paper {

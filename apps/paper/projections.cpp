@@ -7,8 +7,8 @@
 
 #include "apps/paper/report.hpp"
 #include "vdvr/cosine_spectrum.hpp"
-#include "vdvr/spectral_error.hpp"
 #include "vdvr/error_map.hpp"
+#include "vdvr/spectral_error.hpp"
 
 namespace vdvr::paper {
 namespace {

@@ -1,9 +1,9 @@
 // What the sections share: wording, JSON of measures, views.
 #include <fmt/format.h>
 
-#include "vdvr/automatic_view.hpp"
-#include "apps/paper/report.hpp"
 #include "apps/common/volume_json.hpp"
+#include "apps/paper/report.hpp"
+#include "vdvr/automatic_view.hpp"
 
 namespace vdvr::paper {
 

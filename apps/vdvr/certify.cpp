@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "apps/vdvr/inputs.hpp"
 #include "apps/common/progress.hpp"
-#include "vdvr/output_file.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr::cli {
 
@@ -28,6 +28,20 @@ Wanted wanted_of(const Arguments& args) {
   w.options.build = build_options(args);
   w.options.plan = plan_settings(args);
   return w;
+}
+
+void add_certify_options(Arguments& args) {
+  add_plan_options(args);
+  add_build(args);
+  add_compression(args);
+  add_common(args);
+}
+
+Wanted wanted_to_certify(const Arguments& args) {
+  Wanted wanted = wanted_of(args);
+  wanted.options.plan.foresee = false;
+  wanted.compression = compression(args);
+  return wanted;
 }
 
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress) {

@@ -24,6 +24,11 @@ struct Wanted {
 };
 Wanted wanted_of(const Arguments& args);
 
+/// All that `build` and `run` take besides their input and output.
+void add_certify_options(Arguments& args);
+/// What they are asked for: a plan without what is foreseen, and the file's compression.
+Wanted wanted_to_certify(const Arguments& args);
+
 struct Planned {
   ProjectionSet scan;
   Plan plan;

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "vdvr/decorate.hpp"
-#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_slice.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/open_bricks.hpp"
 #include "host/certify/journalled_gold.hpp"
+#include "host/certify/open_bricks.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "host/opencl/host_memory.hpp"
 

@@ -13,9 +13,9 @@
 
 #include "host/io/raster_file.hpp"
 #include "host/io/volume_stack.hpp"
-#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "host/picture/palette.hpp"
 #include "host/picture/png.hpp"
-#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "host/picture/bitmap_font.hpp"
-#include "vdvr/region_of_interest.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
+#include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "host/picture/png.hpp"
-#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 

@@ -11,8 +11,8 @@
 
 #include "host/picture/figure.hpp"
 #include "vdvr/cosine_spectrum.hpp"
-#include "vdvr/spectral_error.hpp"
 #include "vdvr/error_map.hpp"
+#include "vdvr/spectral_error.hpp"
 
 namespace vdvr {
 namespace {

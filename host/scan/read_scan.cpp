@@ -20,11 +20,11 @@
 #include "host/scan/preprocess.hpp"
 #include "host/scan/raster_scan.hpp"
 #include "host/scan/scan_folder.hpp"
-#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 namespace {

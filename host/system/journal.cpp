@@ -18,8 +18,8 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "vdvr/output_file.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 namespace {

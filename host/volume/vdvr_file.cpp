@@ -16,13 +16,13 @@
 #include <span>
 
 #include "host/io/hdf5_file.hpp"
-#include "vdvr/output_file.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr {
 namespace {

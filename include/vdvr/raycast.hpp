@@ -11,8 +11,8 @@
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
-#include "vdvr/resident_volume.hpp"
 #include "vdvr/probe_sampler.hpp"
+#include "vdvr/resident_volume.hpp"
 #include "vdvr/transfer_function.hpp"
 
 namespace vdvr {

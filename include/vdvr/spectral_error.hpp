@@ -8,8 +8,8 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/export.hpp"
 #include "vdvr/error_map.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "vdvr/error_slice.hpp"
 #include "host/render/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"
@@ -12,6 +11,7 @@
 #include "tests/support/rendering.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

@@ -11,11 +11,11 @@
 #include <numeric>
 #include <set>
 
-#include "vdvr/decorate.hpp"
 #include "host/picture/palette.hpp"
 #include "host/picture/png.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "vdvr/decorate.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <set>
 
-#include "vdvr/region_of_interest.hpp"
 #include "tests/support/hostile_case.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 #include "vdvr/verify.hpp"
 

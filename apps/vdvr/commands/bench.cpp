@@ -6,12 +6,12 @@
 #include <chrono>
 #include <cmath>
 
-#include "apps/vdvr/commands/bench_tune.hpp"
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/common/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"

@@ -4,9 +4,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 #include "vdvr/tune.hpp"
 
 namespace vdvr::cli {

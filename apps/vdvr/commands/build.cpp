@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 
 namespace vdvr::cli {
 
@@ -46,15 +46,10 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
 
 int build_command(Arguments& args) {
   args.positional("IN", "projections").value("output,o", "OUT.vdvr", "the certified volume to write");
-  add_plan_options(args);
-  add_build(args);
-  add_compression(args);
-  add_common(args);
+  add_certify_options(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  Wanted wanted = wanted_of(args);
-  wanted.options.plan.foresee = false;
-  wanted.compression = compression(args);
+  Wanted wanted = wanted_to_certify(args);
   const auto output = args.path("output");
   check_output(output, common.force || continues(args, output), {args.path("IN")});
   const auto journal = open_journal(args, common, output, {output});

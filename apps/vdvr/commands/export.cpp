@@ -1,9 +1,9 @@
 // vdvr export: a uniform volume from a certified one, for programs that know nothing of bricks.
 #include <fmt/format.h>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 

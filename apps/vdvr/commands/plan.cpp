@@ -6,10 +6,10 @@
 
 #include <optional>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/plan_pictures.hpp"

@@ -7,17 +7,16 @@
 #include <cmath>
 #include <fstream>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/region_of_interest.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {

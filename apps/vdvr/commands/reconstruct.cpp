@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/volume_file.hpp"
 

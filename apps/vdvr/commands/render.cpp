@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <array>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/common/progress.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {

@@ -3,14 +3,14 @@
 
 #include <chrono>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
-#include "apps/common/progress.hpp"
 #include "apps/vdvr/verification.hpp"
-#include "vdvr/error_slice.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/error_slice.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -185,15 +185,10 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
 int run_command(Arguments& args) {
   args.positional("IN", "projections")
       .value("output,o", "DIR", "the folder for volume, pictures and certificate");
-  add_plan_options(args);
-  add_build(args);
-  add_compression(args);
-  add_common(args);
+  add_certify_options(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  Wanted wanted = wanted_of(args);
-  wanted.options.plan.foresee = false;
-  wanted.compression = compression(args);
+  Wanted wanted = wanted_to_certify(args);
   if (wanted.options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";

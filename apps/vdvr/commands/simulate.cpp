@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/common/progress.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/volume_file.hpp"

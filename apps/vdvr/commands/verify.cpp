@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "apps/vdvr/inputs.hpp"
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error.hpp"
 
