@@ -2,7 +2,7 @@
 // and classify_bricks.cpp.
 #pragma once
 
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/system/bytes.hpp"
 #include "vdvr/build.hpp"
 

@@ -78,16 +78,15 @@ Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
 }
 
-ClassifyBricks::ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
-                               Journal* journal, Progress progress, Refuse refuse)
+ClassifyBricks::ClassifyBricks(opencl::State& state, JournalledRates& gold, OpenBricks& bricks,
+                               HostMemory& host, Progress progress, Refuse refuse)
     : state_(state),
       bricks_(bricks),
       host_(host),
-      fine_(gold.fine(), journal),
+      fine_(gold.fine),
+      coarse_(gold.coarse),
       progress_(std::move(progress)),
-      refuse_(std::move(refuse)) {
-  if (GoldStream* coarse = gold.coarse()) coarse_.emplace(*coarse, journal);
-}
+      refuse_(std::move(refuse)) {}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
   return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;

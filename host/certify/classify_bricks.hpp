@@ -12,7 +12,7 @@
 
 #include "host/certify/journalled_gold.hpp"
 #include "host/certify/open_bricks.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
 
 namespace vdvr {
@@ -40,6 +40,16 @@ class GoldRates {
   std::optional<GoldStream> fine_, coarse_;
 };
 
+/// The same with the journal of a build, in which passes of one rate are numbered through all attempts.
+struct JournalledRates {
+  /// Both are referred to; no journal: nullptr.
+  JournalledRates(GoldRates& gold, Journal* journal) : fine(gold.fine(), journal) {
+    if (GoldStream* stream = gold.coarse()) coarse.emplace(*stream, journal);
+  }
+  JournalledGold fine;
+  std::optional<JournalledGold> coarse;
+};
+
 enum class Verdict { within, beyond, undecided };
 /// Of a field measured on coarse gold. Beyond: at one of its nodes, which are nodes of the fine gold too.
 /// Within leaves room for the fine test, which counts a node's error and slack anew, to agree.
@@ -57,8 +67,8 @@ class ClassifyBricks {
   using Refuse = std::function<void(float slack, double tolerance)>;
 
   /// All but `progress` is referred to. `bricks`: levels, involved and tiles are written.
-  ClassifyBricks(opencl::State& state, GoldRates& gold, OpenBricks& bricks, HostMemory& host,
-                 Journal* journal, Progress progress, Refuse refuse);
+  ClassifyBricks(opencl::State& state, JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
+                 Progress progress, Refuse refuse);
 
   /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
   /// that stay at level 0 are measured on the stored base samples, which closing does not change.
@@ -109,8 +119,8 @@ class ClassifyBricks {
   opencl::State& state_;
   OpenBricks& bricks_;
   HostMemory& host_;
-  JournalledGold fine_;
-  std::optional<JournalledGold> coarse_;
+  JournalledGold& fine_;
+  std::optional<JournalledGold>& coarse_;
   Progress progress_;
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;

@@ -172,7 +172,8 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
     bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
     bricks.involved.assign(near.size(), 0);
     bricks.samples.resize(near.size());
-    ClassifyBricks test(state, gold, bricks, host, nullptr, {}, [](float, double) {});
+    JournalledRates unrecorded(gold, nullptr);
+    ClassifyBricks test(state, unrecorded, bricks, host, {}, [](float, double) {});
     test.classify(field, tolerance, selected);
     std::vector<std::pair<double, BrickMeasure>> out;
     const MixedVolume shape = bricks.shape();

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/system/bytes.hpp"
 #include "vdvr/journal.hpp"
 

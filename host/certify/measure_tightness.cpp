@@ -7,7 +7,7 @@
 #include <random>
 
 #include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"

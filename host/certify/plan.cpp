@@ -18,7 +18,7 @@
 #include "host/certify/foresee.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
 #include "host/system/casts.hpp"

@@ -1,12 +1,13 @@
 // What is done to a batch of gold blocks: fit, classify, extract, measure. Called by classify_bricks.cpp,
 // plan.cpp and measure_tightness.cpp. Launches kernels/gold/classify.cl and kernels/gold/measure.cl.
+#include "host/gold/gold_batch.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
 
 #include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_stream.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
@@ -25,7 +26,7 @@ constexpr float rounding_share = 0.25f;
 }  // namespace
 
 // Mirrors TileRequest of kernels/gold/classify.cl.
-struct GoldStream::Batch::TileRequest {
+struct GoldBatch::TileRequest {
   cl_int block, node_x, node_y, node_z;
   cl_int spacing_x, spacing_y, spacing_z;
   cl_int side_x, side_y, side_z;
@@ -34,11 +35,11 @@ struct GoldStream::Batch::TileRequest {
   cl_ulong offset;
 };
 
-std::array<std::int64_t, 4> GoldStream::Batch::place(std::int64_t brick) const { return place_.at(brick); }
+std::array<std::int64_t, 4> GoldBatch::place(std::int64_t brick) const { return place_.at(brick); }
 
 // Equal blocks by their first bricks in x and y, and the selected bricks in them.
-void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
-                               const std::vector<std::uint8_t>& selected) {
+void GoldBatch::choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
+                       const std::vector<std::uint8_t>& selected) {
   const Bricks bricks(settings_.grid, settings_.granularity);
   first_brick_.clear();
   bricks_.clear();
@@ -58,26 +59,25 @@ void GoldStream::Batch::choose(std::vector<std::array<std::int64_t, 2>> first, s
   }
 }
 
-Index3 GoldStream::Batch::spacing_of(const LevelTriple& level) const {
+Index3 GoldBatch::spacing_of(const LevelTriple& level) const {
   Index3 spacing{};
   for (std::size_t a = 0; a < 3; ++a)
     spacing[a] = std::int64_t{settings_.rate} << settings_.coarsening[2 - a] >> level[2 - a];
   return spacing;
 }
 
-std::size_t GoldStream::Batch::slot(std::int64_t brick) const {
+std::size_t GoldBatch::slot(std::int64_t brick) const {
   const auto [b, x, y, z] = place(brick);
   return at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
 }
 
-std::vector<std::uint8_t> GoldStream::Batch::flags(const std::vector<std::int64_t>& bricks) const {
+std::vector<std::uint8_t> GoldBatch::flags(const std::vector<std::int64_t>& bricks) const {
   std::vector<std::uint8_t> out(at(shape_.count * bricks_z_ * bricks_y_ * bricks_x_), 0);
   for (const std::int64_t brick : bricks) out[slot(brick)] = 1;
   return out;
 }
 
-const LevelSamples& GoldStream::Batch::lattice(const LevelTriple& level,
-                                               const std::vector<std::int64_t>& bricks) {
+const LevelSamples& GoldBatch::lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
   const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
   std::vector<NodeBox> boxes;
   for (const std::int64_t brick : bricks) {
@@ -90,8 +90,8 @@ const LevelSamples& GoldStream::Batch::lattice(const LevelTriple& level,
   return fit_(gold_, margin_, boxes, spacing_of(level), steps, settings_.curvature);
 }
 
-GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, const Index3& spacing,
-                                                          std::uint64_t offset) const {
+GoldBatch::TileRequest GoldBatch::request(std::int64_t brick, const Index3& spacing,
+                                          std::uint64_t offset) const {
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
   const auto side = [&](std::size_t a) { return to_int(g * rate / spacing[a] + 1); };
   const auto [b, x, y, z] = place(brick);
@@ -114,7 +114,7 @@ GoldStream::Batch::TileRequest GoldStream::Batch::request(std::int64_t brick, co
   return r;
 }
 
-VdvrGoldShape GoldStream::Batch::shape_on_device() const {
+VdvrGoldShape GoldBatch::shape_on_device() const {
   return {to_int(shape_.nx),
           to_int(shape_.ny),
           to_int(shape_.nz),
@@ -129,17 +129,17 @@ VdvrGoldShape GoldStream::Batch::shape_on_device() const {
           shape_.lowest};
 }
 
-opencl::Defines GoldStream::Batch::brick_nodes() const {
+opencl::Defines GoldBatch::brick_nodes() const {
   return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
 }
 
 // Per brick of the blocks, [block][z][y][x].
-struct GoldStream::Batch::Results {
+struct GoldBatch::Results {
   opencl::DeviceArray<cl_int> total, error, slack, violated;
 };
 
-GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& field, float tolerance,
-                                                          const opencl::DeviceArray<std::uint8_t>& selected) {
+GoldBatch::Results GoldBatch::run_measure(const DeviceField& field, float tolerance,
+                                          const opencl::DeviceArray<std::uint8_t>& selected) {
   const std::uint64_t n = blocks(), size = n * count(bricks_x_ * bricks_y_ * bricks_z_);
   Results r{{state_, size, "brick totals"},
             {state_, size, "brick errors"},
@@ -163,8 +163,8 @@ GoldStream::Batch::Results GoldStream::Batch::run_measure(const DeviceField& fie
   return r;
 }
 
-std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, float tolerance,
-                                                     const opencl::DeviceArray<std::uint8_t>& selected) {
+std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tolerance,
+                                             const opencl::DeviceArray<std::uint8_t>& selected) {
   const Results r = run_measure(field, tolerance, selected);
   const auto totals = r.total.to_host(), errors = r.error.to_host(), slacks = r.slack.to_host(),
              bits = r.violated.to_host();
@@ -186,7 +186,7 @@ std::vector<BrickMeasure> GoldStream::Batch::measure(const DeviceField& field, f
   return out;
 }
 
-std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::int64_t>& bricks) {
+std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& bricks) {
   constexpr int most = AxisErrors::most_levels;
   Index3 levels{};
   for (std::size_t a = 0; a < 3; ++a) levels[a] = std::min<int>(settings_.finest()[2 - a], most);
@@ -217,8 +217,7 @@ std::vector<AxisErrors> GoldStream::Batch::axis_errors(const std::vector<std::in
 }
 
 // The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
-std::vector<float> GoldStream::Batch::errors_at(const LevelTriple& level,
-                                                const std::vector<std::int64_t>& bricks) {
+std::vector<float> GoldBatch::errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
   const std::int64_t n = shape_.count;
   const std::vector<std::uint8_t> wanted = flags(bricks);
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
@@ -253,14 +252,13 @@ void give_tiles(const std::vector<BrickClass*>& bricks, const std::vector<float>
 
 }  // namespace
 
-struct GoldStream::Batch::Candidate {
+struct GoldBatch::Candidate {
   BrickClass* result;
   TripleSearch::Brick search;
 };
 
 // Round by round: every brick names its next level, and bricks that name the same are tested together.
-void GoldStream::Batch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
-                                   float tolerance) {
+void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search, float tolerance) {
   while (!candidates.empty()) {
     std::map<LevelTriple, std::vector<Candidate>> by_level;
     for (Candidate& c : candidates)
@@ -294,9 +292,9 @@ void GoldStream::Batch::try_levels(std::vector<Candidate>& candidates, const Tri
   }
 }
 
-std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, float tolerance,
-                                                    const opencl::DeviceArray<std::uint8_t>& selected,
-                                                    bool gold_too) {
+std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, float tolerance,
+                                            const opencl::DeviceArray<std::uint8_t>& selected,
+                                            bool gold_too) {
   std::vector<BrickClass> out;
   for (const BrickMeasure& m : measure(base, tolerance, selected)) {
     BrickClass c;
@@ -332,7 +330,7 @@ std::vector<BrickClass> GoldStream::Batch::classify(const DeviceField& base, flo
   return out;
 }
 
-std::vector<std::pair<float, float>> GoldStream::Batch::largest_p() {
+std::vector<std::pair<float, float>> GoldBatch::largest_p() {
   const auto p = p_.to_host();
   const std::int64_t g = settings_.granularity, rate = settings_.rate, cells_x = bricks_x_ * g,
                      cells_y = bricks_y_ * g, cells_z = (shape_.nz - 1) / rate;
@@ -352,9 +350,8 @@ std::vector<std::pair<float, float>> GoldStream::Batch::largest_p() {
 }
 
 // Tiles of one level from its lattice, concatenated.
-std::vector<float> GoldStream::Batch::copy_tiles(const LevelTriple& level,
-                                                 const std::vector<std::int64_t>& bricks,
-                                                 const LevelSamples* lattice) {
+std::vector<float> GoldBatch::copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
+                                         const LevelSamples* lattice) {
   if (bricks.empty()) return {};
   std::vector<TileRequest> requests;
   std::uint64_t total = 0, size = 0;
@@ -386,8 +383,7 @@ std::vector<float> GoldStream::Batch::copy_tiles(const LevelTriple& level,
   return out.to_host();
 }
 
-std::vector<float> GoldStream::Batch::extract(
-    const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
+std::vector<float> GoldBatch::extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
   std::map<LevelTriple, std::vector<std::size_t>> by_level;
   for (std::size_t i = 0; i < tiles.size(); ++i) by_level[tiles[i].second].push_back(i);
   std::vector<std::vector<float>> parts(tiles.size());
@@ -406,7 +402,7 @@ std::vector<float> GoldStream::Batch::extract(
   return out;
 }
 
-void GoldStream::Batch::fit_base(std::vector<float>& base) {
+void GoldBatch::fit_base(std::vector<float>& base) {
   const Grid& grid = settings_.grid;
   const Index3 n = grid.samples();
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
@@ -433,7 +429,7 @@ void GoldStream::Batch::fit_base(std::vector<float>& base) {
   }
 }
 
-float GoldStream::Batch::largest_value() const {
+float GoldBatch::largest_value() const {
   const std::vector<float> gold = gold_.to_host(), margins = margin_.to_host();
   const std::int64_t h = shape_.halo, wide = shape_.nx + 2 * h, deep = shape_.ny + 2 * h;
   float largest = 0;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/gold/gold_batch.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_blocks.hpp"
 #include "host/system/casts.hpp"

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 
 namespace vdvr {
 

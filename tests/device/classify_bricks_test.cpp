@@ -37,7 +37,8 @@ struct Case {
         base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, Interpolation::cubic, {})),
         host(state),
         gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate, anisotropic)),
-        classify(state, gold, bricks, host, nullptr, {},
+        unrecorded(gold, nullptr),
+        classify(state, unrecorded, bricks, host, {},
                  [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
     const auto [low, high] = std::minmax_element(base.samples.begin(), base.samples.end());
     tolerance = tolerance_of_range * static_cast<double>(*high - *low);
@@ -76,6 +77,7 @@ struct Case {
   Volume base;
   HostMemory host;
   GoldRates gold;
+  JournalledRates unrecorded;
   OpenBricks bricks;
   ClassifyBricks classify;
   double tolerance = 0;

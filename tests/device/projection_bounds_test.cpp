@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/device.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host/gold/gold_stream.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "tests/support/device.hpp"
 #include "vdvr/exact_field.hpp"
 
