@@ -1,0 +1,33 @@
+// What a sum over nodes errs on band-limited functions: the bounds behind gold_filters.cpp, six_taps.cpp and
+// remainder_norms.cpp, which call it.
+#pragma once
+
+#include <vector>
+
+namespace vdvr {
+
+/// sum_i taps[i] f(first + i), which stands for the derivative of even order `order` of f at 0. Unit of
+/// length: the nodes' spacing. On the wave exp(i kappa x) it errs by its *symbol error*
+///   e(kappa) = sum_i taps[i] exp(i kappa (first + i)) - (i kappa)^order ,
+/// kappa in radians a node. So `first` is minus the place at which the derivative is wanted, counted from
+/// the first tap's node.
+struct NodeFunctional {
+  std::vector<double> taps;
+  double first = 0;
+  int order = 0;  // 0, 2 or 4
+};
+
+/// At least |e(kappa)|, by no more than the rounding of the sum.
+double symbol_error(const NodeFunctional& functional, double kappa);
+
+/// At least |e| on |kappa| <= band: the largest on a grid of frequencies, and what derivatives of e allow
+/// between them. Cost: some 5,000 operations a tap.
+double largest_symbol_error(const NodeFunctional& functional, double band);
+
+/// A c with |error| <= c sup |f| for every bounded f of frequencies |kappa| <= band, however many: the sum of
+/// the magnitudes of the Fourier coefficients of e times a smooth cut that is 1 on the band, by FFT, with
+/// bounds of its tail and of aliasing (the best of several widths of the cut). At least
+/// largest_symbol_error. Cost: seven FFTs of length 512.
+double sup_constant(const NodeFunctional& functional, double band);
+
+}  // namespace vdvr

@@ -1,0 +1,44 @@
+// Filters that take gold from its nodes to a finer lattice along one axis, each with its bounds.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace vdvr {
+
+/// One filter of `taps` weights for each position phase / rate between two nodes: the value there is
+///   sum_i weights[phase * taps + i] f(first() + i),  nodes counted from the node on the left.
+/// Phase 0 is a copy. weights at phase p and rate - p mirror each other to the bit. All that is said below
+/// holds for the weights as rounded to fp32, evaluated exactly. Evaluated in fp32, a value errs by
+/// (taps / 2 + 1) u norm times the largest |f| more.
+struct GoldFilter {
+  int rate = 1;              // positions to a node, phase 0 included
+  int taps = 2;              // even
+  double band = 0;           // radians a node, at most pi / 2
+  std::vector<float> weights;  // [phase][taps]
+  /// E: largest error of a wave |kappa| <= band, of its amplitude.
+  double error = 0;
+  /// c: |interpolant - f| <= c sup |f| for every bounded f of frequencies |kappa| <= band. Along three axes
+  /// one after another: ((1 + c)^3 - 1) sup |f|, with the c of each axis.
+  double sup = 0;
+  /// L: largest sum of magnitudes of a phase, 1 for phase 0.
+  double norm = 1;
+  /// D2, D4: differences of the *interpolant* over neighbours on the finer lattice are at most this times the
+  /// largest |f| at the nodes, whatever f there.
+  double second_difference = 0, fourth_difference = 0;
+
+  [[nodiscard]] int first() const { return 1 - taps / 2; }
+};
+
+/// Nearly minimax over the band (iteratively reweighted least squares), in double precision, then rounded.
+/// The weights add to 1 but for `error`. A narrow band needs fewer taps than it is given: of all weights
+/// that are as good, those of the smallest sum of squares are taken. `rate` 1 is a copy: error and sup 0.
+/// Throws InputError unless rate is 1, 2, 4, 8, 16 or 32, 0 < band <= pi / 2, and taps is even, 2 .. 32 (a
+/// single tap could not be mirrored; two are about linear interpolation). Cost: about 1 ms a phase with 16
+/// taps.
+GoldFilter design_gold_filter(int rate, double band, int taps = 16);
+
+/// At least the error of the wave kappa, of its amplitude, at any phase; |kappa| <= filter.band.
+double gold_filter_error(const GoldFilter& filter, double kappa);
+
+}  // namespace vdvr
