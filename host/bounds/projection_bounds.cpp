@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
+#include "host/bounds/six_taps.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -20,22 +22,12 @@ namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double unit_roundoff = 0x1p-24;
-
 constexpr double smallest_normal = 0x1p-126;
 
 // What two products may lose below the smallest normal number: relative bounds do not cover it, and devices
 // may flush, in each of the terms and in what is kept of each run.
 double underflow(const ParallelGeometry& g, double gain_u) {
   return 4 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
-}
-
-// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
-// (kernels/fbp/batched_product.cl): a term is rounded within its run, the sum at its end, and the m roundings
-// that were kept are summed with m u of themselves.
-double product_error(std::int64_t n, int run) {
-  const double runs = std::ceil(static_cast<double>(n) / run);
-  return run + 2 + 1.01 * runs * runs * unit_roundoff;
 }
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
@@ -58,6 +50,13 @@ std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int 
 }
 
 }  // namespace
+
+// A term is rounded within its run, the sum at its end, and the m roundings that were kept are summed with m u of
+// themselves.
+double product_error(std::int64_t n, int run) {
+  const double runs = std::ceil(static_cast<double>(n) / run);
+  return run + 2 + 1.01 * runs * runs * unit_roundoff;
+}
 
 void require_finite(const std::vector<float>& sups, int order) {
   if (std::all_of(sups.begin(), sups.end(), [](float s) { return std::isfinite(s); })) return;
@@ -155,6 +154,60 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const 
   return scan.ramp_error * gain_anywhere(upsampler, columns) * lebesgue_constant(scan.geometry.rows);
 }
 
+namespace {
+
+// What interpolation between columns multiplies and adds.
+struct Weights {
+  double taps = 2;       // of a sample
+  double gain = 1;       // largest sum of magnitudes
+  double slope = 1;      // of the interpolant's slope, of the largest difference quotient of columns
+  double slope_sum = 0;  // and of the largest column
+  double rounding = 0;   // of the weights, beyond eight roundings of their sum
+};
+
+Weights weights_of(Interpolation interpolation) {
+  switch (interpolation) {
+    case Interpolation::linear: return {2, 1, 1, 0, 0};
+    case Interpolation::cubic: return {4, 1.25, 4.0 / 3, 0, 0};
+    case Interpolation::six_taps: break;
+  }
+  const SixTaps& six = six_tap_facts();
+  return {6, six.norm, six.slope, six.slope_sum, six.rounding};
+}
+
+double interpolation_error(const ParallelGeometry& g, const FieldSups& sups, int rate, Interpolation interpolation) {
+  const double step = g.pitch_u / rate;
+  if (interpolation == Interpolation::linear) return step * step / 8 * sups.second_u;
+  if (interpolation == Interpolation::cubic)
+    return 3.0 / 128 * std::pow(step, 4) * std::pow(pi / g.pitch_u, 2) * sups.second_u;
+  return rate >= 8 ? six_tap_facts().sup * sups.value : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
+                         const UpsampledColumns& columns, const ColumnBlocks& blocks, Interpolation interpolation) {
+  const ParallelGeometry& g = scan.geometry;
+  const double gain_u = gain_anywhere(upsampler, columns);
+  double samples = 0;
+  for (const double m : scan.view_max) samples += m;
+  const Weights w = weights_of(interpolation);
+  const double run = static_cast<double>(view_run(interpolation)), views = static_cast<double>(g.views());
+  // An upsampled column is at most the samples times the gain, and the sup of the signal.
+  const double largest = std::min(gain_u * samples, sups.value);
+  ChainErrors out;
+  out.ramp = filter_error_bound(upsampler, scan, columns);
+  out.columns = w.gain * unit_roundoff * (product_error(g.columns, column_run) + 2) * gain_u * samples;
+  out.summation = unit_roundoff * (w.taps * run + std::ceil(views / run) + 8) * w.gain * largest + w.rounding * largest;
+  out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
+  // A wrong position moves along the interpolant, and where its intervals meet may jump by twice what it errs.
+  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  const double moved = position_error(g, columns, blocks);
+  out.position = moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) + 2 * out.interpolation;
+  out.underflow = views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
+  return out;
+}
+
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         Interpolation interpolation) {
@@ -162,10 +215,8 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const double weight_gain =
-      interpolation == Interpolation::cubic ? 1.25 : 1.0;  // largest sum of |Lagrange weights|
-  const double slope_gain =
-      interpolation == Interpolation::cubic ? 4.0 / 3 : 1.0;  // and of their derivative's, of differences
+  const Weights w = weights_of(interpolation);
+  const double weight_gain = w.gain;
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
   const double upsampling =
@@ -173,16 +224,17 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                        (product_error(g.columns, column_run) + 2) * gain_u * sups.value);
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
-  const double per_view = interpolation == Interpolation::cubic ? 4 : 2,
-               runs =
+  const double runs =
                    std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(interpolation)));
   const double summation = unit_roundoff *
-                           (per_view * static_cast<double>(view_run(interpolation)) + runs + 8) *
-                           weight_gain * sups.value;
+                           (w.taps * static_cast<double>(view_run(interpolation)) + runs + 8) *
+                               weight_gain * sups.value +
+                           w.rounding * sups.value;
   // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is
   // bounded by Bernstein and by Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
-  const double position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * slope_gain * slope;
+  const double position = position_error(g, columns, blocks) *
+                          (g.pitch_u / columns.rate * w.slope * slope + w.slope_sum * sups.value);
   const double views = static_cast<double>(g.views());
   return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position +
          views * (2 * underflow(g, gain_u) + 8 * smallest_normal);

@@ -51,6 +51,24 @@ double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Gri
 /// a band-limited field itself, so bounds of curvature made from those samples need not pay for it again.
 double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns);
 
+constexpr double unit_roundoff = 0x1p-24;
+
+/// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
+/// (kernels/fbp/batched_product.cl).
+double product_error(std::int64_t n, int run);
+
+/// Where computed back-projected samples depart from F, step by step, on the detector's own rows.
+struct ChainErrors {
+  double ramp = 0;           ///< of the field of the computed filtered samples, anywhere: filter_error_bound
+  double columns = 0;        ///< of upsampled columns by fp32, each by itself, weights included
+  double summation = 0;      ///< of the sum over views, alike
+  double position = 0;       ///< of places in fp32, the same for all rows
+  double interpolation = 0;  ///< between columns, the same for all rows
+  double underflow = 0;      ///< of what relative bounds do not cover
+};
+ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
+                         const UpsampledColumns& columns, const ColumnBlocks& blocks, Interpolation interpolation);
+
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,

@@ -53,21 +53,12 @@ GoldSettings with_coarse(GoldSettings settings) {
 }  // namespace
 
 GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                     const FieldSups& sups, GoldSettings settings) {
+                     const FieldSups& sups, GoldSettings settings, std::shared_ptr<GoldSource> source) {
   settings = with_coarse(settings);
-  fine_.emplace(state, scan, upsampler, sups, settings);
+  fine_.emplace(state, scan, upsampler, sups, settings, std::move(source));
   if (settings.coarse_rate == 0) return;
   settings.rate = std::exchange(settings.coarse_rate, 0);
-  coarse_.emplace(state, scan, upsampler, sups, settings, fine_->cells());
-}
-
-double GoldRates::arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                             const FieldSups& sups, const GoldStream& fine) {
-  GoldSettings settings = with_coarse(fine.settings());
-  if (settings.coarse_rate == 0) return fine.arithmetic();
-  settings.rate = std::exchange(settings.coarse_rate, 0);
-  const GoldStream coarse(state, scan, upsampler, sups, settings, fine.cells());
-  return std::max(fine.arithmetic(), coarse.arithmetic());
+  coarse_.emplace(state, scan, upsampler, sups, settings, fine_->source());
 }
 
 Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
@@ -139,7 +130,7 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
            {[&](GoldStream::Batch& batch) {
               std::vector<Levels> levels;
               for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
-                levels.push_back({m, {}, false, {}, 0, 0});
+                levels.push_back({m, {}, false, {}});
               return record(batch, std::move(levels), {}, {});
             },
             [&](ByteReader in) { read(in, visit); }},
@@ -163,7 +154,7 @@ void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, doubl
          Tiles tiles;
          std::vector<float> samples;
          for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device, fine)) {
-           levels.push_back({c.base, c.level, c.passes, c.along, 0, 0});
+           levels.push_back({c.base, c.level, c.passes, c.along});
            if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
            tiles.emplace_back(c.base.brick, c.level);
            samples.insert(samples.end(), c.tile.begin(), c.tile.end());
@@ -192,22 +183,19 @@ void ClassifyBricks::take(const Levels& l) {
   along_[id] = l.along;
   const auto slack = static_cast<double>(m.slack);
   bounds_.total = std::max(bounds_.total, slack);
-  bounds_.projection = std::max(bounds_.projection, static_cast<double>(l.largest_p));
-  bounds_.gold = std::max(bounds_.gold, slack - static_cast<double>(l.smallest_p));
+  bounds_.projection = fine_.gold().projection();
+  bounds_.gold = std::max(bounds_.gold, slack - bounds_.projection);
 }
 
 Bytes ClassifyBricks::record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
                              const std::vector<float>& samples) const {
   ByteWriter out;
-  const auto p = batch.largest_p();
   out.put(static_cast<std::uint64_t>(levels.size()));
   for (std::size_t i = 0; i < levels.size(); ++i) {
     put(out, levels[i].base);
     out.put(levels[i].level);
     out.put(static_cast<std::uint8_t>(levels[i].passes));
     if (is_above_base(levels[i].level)) put(out, levels[i].along);
-    out.put(p[i].first);
-    out.put(p[i].second);
   }
   put_tiles(out, tiles, samples);
   return out.take();
@@ -221,8 +209,6 @@ void ClassifyBricks::read(ByteReader& in, const std::function<void(const Levels&
     l.level = in.get<LevelTriple>();
     l.passes = in.get<std::uint8_t>() != 0;
     if (is_above_base(l.level)) l.along = get_along(in);
-    l.largest_p = in.get<float>();
-    l.smallest_p = in.get<float>();
     visit(l);
   }
 }

@@ -22,7 +22,7 @@ namespace vdvr {
 class GoldRates {
  public:
   GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
-            GoldSettings settings);
+            GoldSettings settings, std::shared_ptr<GoldSource> source = nullptr);
   [[nodiscard]] GoldStream& fine() { return *fine_; }
   [[nodiscard]] const GoldStream& fine() const { return *fine_; }
   /// None where rate < 4, where slack does not count or where a window is given.
@@ -32,9 +32,10 @@ class GoldRates {
   [[nodiscard]] double arithmetic() const {
     return std::max(fine_->arithmetic(), coarse_ ? coarse_->arithmetic() : 0.0);
   }
-  /// The same before there are two rates: of those that a build with the settings of `fine` will take.
-  static double arithmetic(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                           const FieldSups& sups, const GoldStream& fine);
+  /// P of either rate.
+  [[nodiscard]] double projection() const {
+    return std::max(fine_->projection(), coarse_ ? coarse_->projection() : 0.0);
+  }
 
  private:
   std::optional<GoldStream> fine_, coarse_;
@@ -98,7 +99,6 @@ class ClassifyBricks {
     LevelTriple level{};
     bool passes = false;
     AxisErrors along{};
-    float largest_p = 0, smallest_p = 0;
   };
   void test(JournalledGold& gold, const DeviceField& base, double tolerance,
             const std::vector<std::uint8_t>& selected, const std::string& stage,

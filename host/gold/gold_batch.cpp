@@ -330,25 +330,6 @@ std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, float toler
   return out;
 }
 
-std::vector<std::pair<float, float>> GoldBatch::largest_p() {
-  const auto p = p_.to_host();
-  const std::int64_t g = settings_.granularity, rate = settings_.rate, cells_x = bricks_x_ * g,
-                     cells_y = bricks_y_ * g, cells_z = (shape_.nz - 1) / rate;
-  std::vector<std::pair<float, float>> out;
-  for (const std::int64_t brick : bricks_) {
-    const auto [b, x, y, z] = place(brick);
-    std::pair<float, float> range{0.0f, INFINITY};
-    for (std::int64_t k = z * g; k < std::min((z + 1) * g, cells_z); ++k)
-      for (std::int64_t j = y * g; j < (y + 1) * g; ++j)
-        for (std::int64_t i = x * g; i < (x + 1) * g; ++i) {
-          const float v = p[at(((b * cells_z + k) * cells_y + j) * cells_x + i)];
-          range = {std::max(range.first, v), std::min(range.second, v)};
-        }
-    out.push_back(range);
-  }
-  return out;
-}
-
 // Tiles of one level from its lattice, concatenated.
 std::vector<float> GoldBatch::copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
                                          const LevelSamples* lattice) {

@@ -69,9 +69,6 @@ class GoldBatch {
   /// The largest |gold| at a covered node of the blocks.
   float largest_value() const;
 
-  /// Per brick of bricks(): the largest and the smallest P of its base cells.
-  std::vector<std::pair<float, float>> largest_p();
-
   /// Calls visit(node index x, y, z in the brick, gold, Slack) for every node of one closed brick; reads the
   /// block back.
   template <class Visit>
@@ -136,7 +133,7 @@ class GoldBatch {
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;
-  opencl::DeviceArray<float> gold_, above_, below_, margin_, p_;
+  opencl::DeviceArray<float> gold_, above_, below_, margin_;
 };
 
 }  // namespace vdvr

@@ -1,4 +1,4 @@
-// Streams gold. Calls back_project.cpp and node_slack.cpp.
+// Streams gold. Calls kept_gold.cpp and node_slack.cpp.
 #include "host/gold/gold_stream.hpp"
 
 #include <fmt/format.h>
@@ -43,16 +43,12 @@ class Stopwatch {
 }  // namespace
 
 GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                       const FieldSups& sups, const GoldSettings& settings, std::shared_ptr<CellBounds> cells)
-    : state_(state),
-      scan_(scan),
-      upsampler_(upsampler),
-      settings_(settings),
-      coverage_(scan.geometry),
-      columns_(
-          columns_for(scan.geometry, coarsened(settings.grid, settings.coarsening), settings.upsampling)),
-      cells_(std::move(cells)) {
+                       const FieldSups& sups, const GoldSettings& settings, std::shared_ptr<GoldSource> source)
+    : state_(state), settings_(settings), coverage_(scan.geometry), source_(std::move(source)) {
   const std::int64_t g = settings.granularity;
+  if (!source_) source_ = std::make_shared<GoldSource>(state, scan, upsampler, sups, settings);
+  lattice_ = source_->kept.lattice(settings.grid, settings.rate);
+  errors_ = source_->kept.errors(lattice_);
   // Second differences look one node beyond a block, fits further.
   if (settings.midrange)
     fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
@@ -61,44 +57,17 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler
   // --max-memory.
   block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
   slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
-  // Tables of bounds are as large for coarse gold as for fine.
-  if (!settings.base_only) slab_bricks_ = std::clamp<std::int64_t>(32 / g, 1, slab_bricks_);
-  while (slab_bricks_ > 1 &&
-         slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() / 2, state.info.max_allocation))
-    slab_bricks_ /= 2;
   const auto block_bytes = [&] {
     const std::int64_t width = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
     return count(20 * width * width * (slab_bricks_ * g * settings.rate + 62 + 2 * halo_));
   };
+  while (slab_bricks_ > 1 && block_bytes() > state.memory.left() / 5) slab_bricks_ /= 2;
   while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
-  if (slab_bytes(slab_bricks_ * g) > std::min(state.memory.left() * 3 / 4, state.info.max_allocation)) {
-    throw ResourceError(fmt::format(
-        "gold at rate {} from {} views of {} upsampled columns needs {:.1f} MiB for its thinnest slab; raise "
-        "`max_memory`, "
-        "or choose a smaller `granularity`, `upsampling` or `gold`",
-        settings.rate, scan.geometry.views(), columns_.count,
-        static_cast<double>(slab_bytes(slab_bricks_ * g)) / (1 << 20)));
-  }
-  const std::int64_t side = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
-  const ColumnBlocks largest{
-      side, side, settings.grid.spacing[0] / settings.rate, settings.grid.spacing[1] / settings.rate, {}, {}};
-  arithmetic_ = arithmetic_bound(upsampler, scan, sups, columns_, largest, settings.interpolation);
   if (settings.base_only) return;
-  if (!cells_) cells_ = std::make_shared<CellBounds>(state, scan, upsampler, sups, settings);
-  node_slack_.emplace(state, *cells_, scan, sups, settings_, arithmetic_,
-                      arithmetic_ - filter_error_bound(upsampler, scan, columns_));
+  node_slack_.emplace(state, *source_->remainder, lattice_, errors_, settings_);
 }
 
 GoldStream::~GoldStream() = default;
-
-std::uint64_t GoldStream::slab_bytes(std::int64_t cells_z) const {
-  return upsampler_.slab_bytes(columns_, cells_z * settings_.rate + 1 + 2 * halo_);
-}
-
-std::int64_t GoldStream::padded_rows(std::int64_t height) const {
-  return static_cast<std::int64_t>(
-      opencl::round_up(count(height * settings_.granularity * settings_.rate + 1 + 2 * halo_), 16));
-}
 
 double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const {
   const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate,
@@ -108,31 +77,32 @@ double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int6
          static_cast<double>(opencl::round_up(count(nz + more), 16));
 }
 
-// Work by slab, equal blocks together.
+// Equal blocks together, layer by layer.
 std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8_t>& selected) const {
-  const std::int64_t g = settings_.granularity;
-  const Index3 bricks = Bricks(settings_.grid, settings_.granularity).along();
-  std::map<std::int64_t, std::vector<Work>> by_slab;
-  for (const BrickBox& box : cover_bricks(bricks, selected, block_bricks(),
+  std::vector<Work> works;
+  for (const BrickBox& box : cover_bricks(Bricks(settings_.grid, settings_.granularity).along(), selected, block_bricks(),
                                           [&](const Index3& n) { return samples(n[0], n[1], n[2]); })) {
-    std::vector<Work>& works = by_slab[box.first[2] / slab_bricks_];
     if (works.empty() || works.back().z != box.first[2] || works.back().size() != box.size)
-      works.push_back({box.first[2], box.size[2], box.size[0], box.size[1], {}, {}});
+      works.push_back({box.first[2], box.size[2], box.size[0], box.size[1], {}});
     works.back().first.push_back({box.first[0], box.first[1]});
   }
-  std::vector<Work> all;
-  for (auto& [index, works] : by_slab) {
-    const Slab whole{index * slab_bricks_, std::min(slab_bricks_, bricks[2] - index * slab_bricks_)};
-    // Rows shared by all where that is fewer, and where a layer begins with a chunk of 16.
-    std::int64_t apart = 0;
-    for (const Work& w : works) apart += padded_rows(w.height);
-    const bool share = apart > padded_rows(whole.height) && g * settings_.rate % 16 == 0;
-    for (Work& w : works) {
-      w.slab = share ? whole : Slab{w.z, w.height};
-      all.push_back(std::move(w));
-    }
-  }
-  return all;
+  return works;
+}
+
+// The nodes of a block, its halo included.
+GoldBox GoldStream::box(const Work& work, const std::array<std::int64_t, 2>& first) const {
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
+  const SlabShape slab = slab_of(work);
+  return {{first[0] * side - halo_, first[1] * side - halo_, work.z * side - halo_},
+          {slab.cells_x * settings_.rate + 1 + 2 * halo_, slab.cells_y * settings_.rate + 1 + 2 * halo_,
+           slab.cells_z * settings_.rate + 1 + 2 * halo_}};
+}
+
+std::vector<GoldBox> GoldStream::boxes(const std::vector<Work>& works) const {
+  std::vector<GoldBox> out;
+  for (const Work& w : works)
+    for (const auto& first : w.first) out.push_back(box(w, first));
+  return out;
 }
 
 // The share of a block's columns that may be kept, from a coarse raster: the others are not computed.
@@ -158,16 +128,17 @@ void GoldStream::begin(For purpose) {
   halo_ = purpose == For::samples ? fit_halo_ : 1;
 }
 
-GoldWork GoldStream::work(const std::vector<std::uint8_t>& selected, For purpose) {
+double GoldStream::samples(const std::vector<std::uint8_t>& selected, For purpose) {
   begin(purpose);
-  GoldWork out;
-  Slab slab;
-  for (const Work& w : partition(selected)) {
-    if (!(w.slab == std::exchange(slab, w.slab))) out.rows += static_cast<double>(padded_rows(w.slab.height));
-    for (const auto& first : w.first)
-      out.samples += samples(w.width_x, w.width_y, w.height) * kept_share(w, first);
-  }
+  double out = 0;
+  for (const Work& w : partition(selected))
+    for (const auto& first : w.first) out += samples(w.width_x, w.width_y, w.height) * kept_share(w, first);
   return out;
+}
+
+std::int64_t GoldStream::missing_tiles(const std::vector<std::uint8_t>& selected, For purpose) {
+  begin(purpose);
+  return source_->kept.missing(lattice_, boxes(partition(selected)));
 }
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
@@ -181,7 +152,8 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
                              For purpose) {
   begin(purpose);
   const std::vector<Work> all = partition(selected);
-  upsampled_ = {};  // an earlier run may have ended early
+  source_->kept.prepare(lattice_, boxes(all), progress);
+  if (node_slack_) source_->remainder->require(selected, progress);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
@@ -199,9 +171,6 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
     }
     if (from < w.first.size()) run_blocks(w, from, selected, on_batch, tick);
   }
-  upsampled_ = {};
-  projections_ = {};
-  if (cells_) cells_->end();
 }
 
 std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
@@ -242,28 +211,6 @@ std::vector<float> GoldStream::margins(const ColumnBlocks& columns) const {
       out[at(row * columns.nx + i)] = inside ? static_cast<float>(coverage_.margin(x, y)) : beyond_grid;
     }
   });
-  return out;
-}
-
-// Columns worth computing: those that may be kept, and those around them, for second differences.
-std::vector<std::array<std::int32_t, 2>> GoldStream::wanted(const std::vector<float>& margins,
-                                                            std::int64_t nx, std::int64_t ny) const {
-  const float kept = static_cast<float>(-settings_.kept());
-  const auto is_kept = [&](float v) { return v >= kept; };
-  const std::int64_t rows = static_cast<std::int64_t>(margins.size()) / nx;
-  std::vector<std::array<std::int32_t, 2>> out(at(rows), {to_int(nx), -1});
-  for (std::int64_t row = 0; row < rows; ++row) {
-    const float* m = margins.data() + row * nx;
-    const float* low = std::find_if(m, m + nx, is_kept);
-    if (low == m + nx) continue;
-    const auto high = std::find_if(std::reverse_iterator(m + nx), std::reverse_iterator(m), is_kept);
-    const std::int64_t block = row / ny * ny;
-    for (std::int64_t r = std::max(block, row - 1); r <= std::min(block + ny - 1, row + 1); ++r) {
-      auto& w = out[at(r)];
-      w[0] = std::min(w[0], to_int(std::max<std::int64_t>(0, low - m - 1)));
-      w[1] = std::max(w[1], to_int(std::min<std::int64_t>(nx - 1, high.base() - m)));
-    }
-  }
   return out;
 }
 
@@ -308,11 +255,9 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   if (node_slack_) {
     batch.above_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack above");
     batch.below_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack below");
-    batch.p_ = opencl::DeviceArray<float>(
-        state_, count(together * slab.cells_x * slab.cells_y * slab.cells_z), "projection bounds of cells");
     node_slack_->begin(slab, together);
   }
-  // Columns that nobody wants keep what the buffer held: let that be finite.
+  // What lies between columns, and beyond the last, is read and not used: let it be finite.
   batch.gold_.fill(0.0f);
   return together;
 }
@@ -320,44 +265,25 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
 SlabShape GoldStream::slab_of(const Work& work) const {
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity;
-  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0, {}};
+  SlabShape slab{work.z * g, work.width_x * g, work.width_y * g, 0, 0, 0};
   slab.cells_z = std::min(work.height * g, grid.cells[2] - slab.cell_z);
   slab.z_first = grid.origin[2] + static_cast<double>(slab.cell_z) * grid.spacing[2];
   slab.stride = column_stride(slab.cells_z * settings_.rate + 17);
-  slab.slab = {work.slab.z * g, std::min(work.slab.height * g, grid.cells[2] - work.slab.z * g)};
   return slab;
-}
-
-void GoldStream::upsample(const Slab& slab) {
-  if (slab == upsampled_) return;
-  projections_ = {};  // before the next one is allocated
-  const Grid& grid = settings_.grid;
-  const std::int64_t g = settings_.granularity, rate = settings_.rate;
-  const double hz = grid.spacing[2] / static_cast<double>(rate);
-  const double first = grid.origin[2] + static_cast<double>(slab.z * g) * grid.spacing[2];
-  const std::int64_t cells = std::min(slab.height * g, grid.cells[2] - slab.z * g);
-  projections_ = upsampler_(columns_, detector_rows(scan_.geometry, first - static_cast<double>(halo_) * hz,
-                                                    hz, cells * rate + 1 + 2 * halo_));
-  upsampled_ = slab;
-  spent_[at(static_cast<std::int64_t>(purpose_))].work.rows += static_cast<double>(projections_.rows_padded);
 }
 
 void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                             const OnBatch& on_batch, const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
+  GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
   const Grid& grid = settings_.grid;
   const std::int64_t g = settings_.granularity;
-  const SlabShape slab = slab_of(work);
   const double hx = grid.spacing[0] / static_cast<double>(settings_.rate),
                hy = grid.spacing[1] / static_cast<double>(settings_.rate);
-  upsample(work.slab);
-  spent_[at(static_cast<std::int64_t>(purpose_))].slab_seconds += watch.lap();
-
   Batch batch(state_, settings_);
-  const std::int64_t together = begin_batch(batch, work, slab);
+  const std::int64_t together = begin_batch(batch, work, slab_of(work));
   ColumnBlocks columns{batch.shape_.nx + 2 * halo_, batch.shape_.ny + 2 * halo_, hx, hy, {}, {}};
-  columns.first_row = (work.z - work.slab.z) * g * settings_.rate;
-  columns.rows = batch.shape_.nz + 2 * halo_;
+  const std::uint64_t block = count(columns.nx * columns.ny * batch.shape_.gold_stride);
   for (std::size_t begin = from; begin < work.first.size(); begin += at(together)) {
     const std::size_t n = std::min(at(together), work.first.size() - begin);
     batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -369,32 +295,24 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
           {grid.origin[0] + static_cast<double>(f[0] * g) * grid.spacing[0] - static_cast<double>(halo_) * hx,
            grid.origin[1] + static_cast<double>(f[1] * g) * grid.spacing[1] -
                static_cast<double>(halo_) * hy});
-    const std::vector<float> margins = this->margins(columns);
-    columns.wanted = wanted(margins, columns.nx, columns.ny);
-    batch.margin_.write(margins);
-    batch.margins_ = margins;
-    back_project(state_, scan_.geometry, projections_, columns, settings_.interpolation, batch.gold_);
+    batch.margins_ = margins(columns);
+    batch.margin_.write(batch.margins_);
+    for (std::size_t b = 0; b < n; ++b)
+      source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block, batch.shape_.gold_stride);
     if (node_slack_)
-      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_,
-                     batch.p_);
+      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
-      spent_[at(static_cast<std::int64_t>(purpose_))].work.samples +=
-          samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
+      spent.samples += samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
     tick(static_cast<double>(n));
   }
-  spent_[at(static_cast<std::int64_t>(purpose_))].block_seconds += watch.lap();
-  if (node_slack_) {
-    node_slack_->end();
-    const double tables = cells_->take_table_seconds();
-    spent_[at(static_cast<std::int64_t>(purpose_))].table_seconds += tables;
-    spent_[at(static_cast<std::int64_t>(purpose_))].block_seconds -= tables;
-  }
+  spent.seconds += watch.lap();
+  if (node_slack_) node_slack_->end();
 }
 
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
                       const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
-                      const Progress& progress) {
+                      const Progress& progress, std::shared_ptr<GoldSource> source) {
   // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
   settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
@@ -402,7 +320,7 @@ void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler&
   settings.granularity = fitting_granularity(settings.granularity, settings.grid);
   settings.coarsening = {};
   settings.midrange = settings.base_only = true;
-  GoldStream stream(state, scan, upsampler, sups, settings);
+  GoldStream stream(state, scan, upsampler, sups, settings, std::move(source));
   stream.run(
       stream.bricks_near_coverage(), [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
       GoldStream::For::samples);

@@ -19,9 +19,9 @@
 #include "host/bounds/projection_bounds.hpp"
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
-#include "host/gold/cell_bounds.hpp"
 #include "host/gold/fit_coefficients.hpp"
 #include "host/gold/gold_settings.hpp"
+#include "host/gold/gold_source.hpp"
 #include "host/gold/node_slack.hpp"
 #include "host/gold/search_triples.hpp"
 #include "host/opencl/kernel.hpp"
@@ -33,19 +33,12 @@
 
 namespace vdvr {
 
-/// Upsampled rows over all slabs, and gold samples over all blocks, halos included.
-struct GoldWork {
-  double rows = 0, samples = 0;
-};
+/// Gold samples over all blocks, halos included, and the seconds that these took.
 struct GoldSpent {
-  GoldWork work;
-  double slab_seconds = 0, table_seconds = 0, block_seconds = 0;
+  double samples = 0, seconds = 0;
   GoldSpent& operator-=(const GoldSpent& earlier) {
-    work.rows -= earlier.work.rows;
-    work.samples -= earlier.work.samples;
-    slab_seconds -= earlier.slab_seconds;
-    table_seconds -= earlier.table_seconds;
-    block_seconds -= earlier.block_seconds;
+    samples -= earlier.samples;
+    seconds -= earlier.seconds;
     return *this;
   }
 };
@@ -54,10 +47,9 @@ class GoldBatch;  // gold_batch.hpp
 
 class GoldStream {
  public:
-  /// `cells`: bounds of base cells that another stream of the same grid and rates in u has, of gold finer or
-  /// coarser (settings.coarse_rate); none: its own.
+  /// `source`: of another stream of the same scan, grid and interpolation in u; none: its own.
   GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
-             const GoldSettings& settings, std::shared_ptr<CellBounds> cells = nullptr);
+             const GoldSettings& settings, std::shared_ptr<GoldSource> source = nullptr);
   ~GoldStream();
 
   /// The blocks of one batch on the device, as handed to the callback.
@@ -71,16 +63,10 @@ class GoldStream {
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
            const std::string& stage, For purpose = For::measuring);
 
-  /// A run of brick layers whose rows are upsampled together.
-  struct Slab {
-    std::int64_t z = 0, height = 0;  ///< bricks
-    bool operator==(const Slab&) const = default;
-  };
-  /// Equal blocks in one slab, by their first bricks.
+  /// Equal blocks of the same heights, by their first bricks.
   struct Work {
     std::int64_t z, height, width_x, width_y;  ///< bricks
     std::vector<std::array<std::int64_t, 2>> first;
-    Slab slab;
     [[nodiscard]] Index3 size() const { return {width_x, width_y, height}; }
   };
   /// How many blocks of a work, from the given one on, somebody has the results of already.
@@ -93,21 +79,27 @@ class GoldStream {
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
 
-  /// fp32 error bound of any gold sample.
-  [[nodiscard]] double arithmetic() const { return arithmetic_; }
+  /// fp32 error bound of any gold sample, the filter's included.
+  [[nodiscard]] double arithmetic() const { return errors_.rounding + errors_.ramp; }
+  /// P: how far a gold sample lies from the field of the computed filtered samples but for rounding.
+  [[nodiscard]] double projection() const { return settings_.grid_only ? 0 : errors_.interpolation; }
+  /// What interpolation adds to every slack.
+  [[nodiscard]] double projection_in_slack() const {
+    return settings_.grid_only ? 0 : errors_.interpolation + errors_.curved_interpolation;
+  }
   /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
   [[nodiscard]] double rounding_in_slack() const { return node_slack_ ? node_slack_->rounding() : 0; }
-  [[nodiscard]] const std::shared_ptr<CellBounds>& cells() const { return cells_; }
+  [[nodiscard]] const std::shared_ptr<GoldSource>& source() const { return source_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
-  /// What `run` would compute for these bricks.
-  [[nodiscard]] GoldWork work(const std::vector<std::uint8_t>& selected, For purpose);
+  /// Samples that `run` would compute for these bricks, and tiles of kept gold that it would add.
+  [[nodiscard]] double samples(const std::vector<std::uint8_t>& selected, For purpose);
+  [[nodiscard]] std::int64_t missing_tiles(const std::vector<std::uint8_t>& selected, For purpose);
   /// What it has computed so far for a purpose, and what that took.
   [[nodiscard]] const GoldSpent& spent(For purpose) const {
     return spent_[static_cast<std::size_t>(purpose)];
   }
-  [[nodiscard]] std::uint64_t slab_bytes(std::int64_t cells_z) const;
 
  private:
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
@@ -116,27 +108,23 @@ class GoldStream {
                                                                 std::int64_t nx, std::int64_t ny) const;
   std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
-  [[nodiscard]] std::int64_t padded_rows(std::int64_t height) const;
+  [[nodiscard]] GoldBox box(const Work& work, const std::array<std::int64_t, 2>& first) const;
+  [[nodiscard]] std::vector<GoldBox> boxes(const std::vector<Work>& works) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
-  void upsample(const Slab& slab);
   void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
 
   opencl::State& state_;
-  const FilteredScan& scan_;
-  Upsampler& upsampler_;
   GoldSettings settings_;
   Coverage coverage_;
-  UpsampledColumns columns_;
+  GoldLattice lattice_;
+  GoldErrors errors_;
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
-  Slab upsampled_;                        // what projections_ holds, in a run
-  UpsampledSlab projections_;
   For purpose_ = For::measuring;    // of this run
   std::array<GoldSpent, 2> spent_;  // by purpose
-  double arithmetic_ = 0;
-  std::shared_ptr<CellBounds> cells_;
+  std::shared_ptr<GoldSource> source_;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
 
@@ -145,6 +133,6 @@ class GoldStream {
 /// fit to those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
                       const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
-                      const Progress& progress);
+                      const Progress& progress, std::shared_ptr<GoldSource> source = nullptr);
 
 }  // namespace vdvr

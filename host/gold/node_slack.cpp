@@ -7,18 +7,13 @@
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/round_up.hpp"
+#include "host/volume/bricks.hpp"
 
 namespace vdvr {
-namespace {}  // namespace
 
-NodeSlack::NodeSlack(opencl::State& state, CellBounds& cells, const FilteredScan& scan, const FieldSups& sups,
-                     const GoldSettings& settings, double arithmetic, double rounding)
-    : state_(state),
-      cells_(cells),
-      settings_(settings),
-      arithmetic_(arithmetic),
-      rounding_(rounding),
-      remainder_(gold_remainder(scan, sups, settings.grid, settings.rate)) {}
+NodeSlack::NodeSlack(opencl::State& state, const BrickRemainder& remainder, const GoldLattice& lattice,
+                     const GoldErrors& errors, const GoldSettings& settings)
+    : state_(state), remainder_(remainder), lattice_(lattice), errors_(errors), settings_(settings) {}
 
 void NodeSlack::begin(const SlabShape& slab, std::int64_t together) {
   slab_ = slab;
@@ -66,13 +61,13 @@ void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::in
          rows_.buffer(), addend_.buffer(), cells_x, cells_y, to_int(slab_.cells_z), settings_.rate, stride,
          blocks);
   auto window = settings_.window.value_or(std::pair{0.0, 0.0});
-  window.first -= arithmetic_;
-  window.second += arithmetic_;
+  window.first -= errors_.rounding + errors_.ramp;
+  window.second += errors_.rounding + errors_.ramp;
   const std::array<std::uint64_t, 3> local = column_tuning(state_.info).local;
   cell_slack({{count((b.nz + 15) / 16), count(b.nx - 1), count((b.ny - 1) * b.count)}, local},
              cells_above_.buffer(), cells_below_.buffer(), gold.buffer(), rows_.buffer(), nx, ny, nz,
              to_int(b.halo), to_int(b.gold_stride), stride, settings_.rate, cells_x, cells_y, blocks,
-             settings_.grid_only ? 0 : 1, round_up(1.5 * rounding_), settings_.window ? 1 : 0,
+             settings_.grid_only ? 0 : 1, round_up(errors_.curved_rounding), settings_.window ? 1 : 0,
              static_cast<cl_float>(window.first), static_cast<cl_float>(window.second));
   node_slack({{count((b.nz + 15) / 16), count(b.nx), count(b.ny * b.count)}, local}, above.buffer(),
              below.buffer(), cells_above_.buffer(), cells_below_.buffer(), margin.buffer(), last.buffer(), nx,
@@ -82,14 +77,23 @@ void NodeSlack::launch(const GoldBlocks& b, const std::vector<std::array<std::in
 void NodeSlack::operator()(const GoldBlocks& blocks,
                            const std::vector<std::array<std::int64_t, 3>>& first_brick,
                            const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                           opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below,
-                           opencl::DeviceArray<float>& p) {
-  std::vector<float> of_cells, addend;
-  cells_.look_up(slab_, first_brick, settings_.rate, of_cells, addend);
-  // Second differences of computed gold miss by up to 1.5 P more than P itself (section 5).
-  for (std::size_t i = 0; i < addend.size(); ++i)
-    addend[i] = (2.5f * of_cells[i] + std::min(addend[i], round_up(remainder_))) * (1 + 0x1p-22f);
-  p.write(of_cells);
+                           opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below) {
+  // Between columns and between kept nodes gold is interpolated: at a node, and in second differences.
+  const double constant = errors_.interpolation + errors_.curved_interpolation;
+  const Bricks bricks(settings_.grid, settings_.granularity);
+  const std::int64_t g = settings_.granularity;
+  std::vector<float> addend(count(slab_.cells_x * slab_.cells_y * slab_.cells_z) * first_brick.size(), 0.0f);
+  auto next = addend.begin();
+  for (const auto& first : first_brick)
+    for (std::int64_t z = 0; z < slab_.cells_z; ++z)
+      for (std::int64_t y = 0; y < slab_.cells_y; ++y)
+        for (std::int64_t x = 0; x < slab_.cells_x; ++x, ++next) {
+          const Index3 p{first[0] + x / g, first[1] + y / g, first[2] + z / g};
+          if (p[0] >= bricks.along()[0] || p[1] >= bricks.along()[1]) continue;
+          // A row's cells of one brick have one remainder.
+          *next = x % g == 0 ? round_up(constant + static_cast<double>(remainder_.of(bricks.number(p), lattice_)))
+                             : *std::prev(next);
+        }
   addend_.write(addend);
   launch(blocks, first_brick, gold, margin, above, below);
 }

@@ -1,0 +1,175 @@
+// Launcher of kernels/gold/fourth_differences.cl.
+#include "host/gold/brick_remainder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/fbp/back_project.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
+#include "host/system/round_up.hpp"
+#include "host/volume/bricks.hpp"
+#include "shared/fourth_differences.h"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrFourthDifferences) == 36);
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Bricks of a block's side.
+constexpr std::int64_t block_bricks = 8;
+// Nodes that a fourth difference reads on either side.
+constexpr std::int64_t reach = 2;
+// fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
+constexpr double difference_rounding = 64;
+// Magnitudes of a fourth difference's weights, pure or mixed.
+constexpr double difference_norm = 16;
+
+}  // namespace
+
+BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups,
+                               const Grid& grid, int granularity)
+    : state_(state), kept_(kept), coverage_(scan.geometry), grid_(grid), granularity_(granularity) {
+  const ParallelGeometry& g = scan.geometry;
+  bricks_ = Bricks(grid, granularity).along();
+  Vec3 spacing{};
+  std::array<RemainderNorms, 3> norms;
+  Index3 stencil{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    spacing[a] = grid.spacing[a] / static_cast<double>(kept.rates()[a]);
+    const double pitch = a == 2 ? g.pitch_v : g.pitch_u;
+    norms[a] = a == 1 && spacing[1] == spacing[0] ? norms[0]
+                                                  : remainder_norms(std::min(pi / 2, pi * spacing[a] / pitch));
+    // The stencil of a point one step of gold, at 2x or finer, outside the brick.
+    const std::int64_t side = granularity * kept.rates()[a];
+    stencil[a] = norms[a].taps / 2 + std::max<std::int64_t>(1, kept.rates()[a] / 2);
+    rings_[a] = (stencil[a] + side - 1) / side;
+  }
+  const Index3 all{bricks_[0] + 2 * rings_[0], bricks_[1] + 2 * rings_[1], bricks_[2] + 2 * rings_[2]};
+  maxima_.resize(at(all[0] * all[1] * all[2]));
+  looked_at_.resize(maxima_.size());
+
+  const GoldErrors errors = kept.errors({});
+  const double node = errors.interpolation + errors.rounding;
+  const double slack = difference_norm * node + difference_rounding * unit_roundoff * sups.value;
+  const std::array<std::array<std::size_t, 3>, 6> axes{{{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}}};
+  for (std::size_t d = 0; d < 6; ++d) {
+    const auto& [i, j, k] = axes[d];
+    const double factor = d < 3 ? pure_factor(norms[i], norms[j], norms[k]) : mixed_factor(norms[i], norms[j], norms[k]),
+                 tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k]) : mixed_tail(norms[i], norms[j], norms[k]);
+    factor_[d] = round_up(factor);
+    addend_[d] = round_up(factor * slack + tail * sups.value);
+  }
+  // Columns that a stencil of a tested cell reads: the cell meets the covered region.
+  lowest_ = -(std::hypot(grid.spacing[0], grid.spacing[1]) +
+              static_cast<double>(stencil[0]) * std::hypot(spacing[0], spacing[1])) *
+            (1 + 1e-6);
+}
+
+std::size_t BrickRemainder::slot(const Index3& p) const {
+  return at(((p[2] + rings_[2]) * (bricks_[1] + 2 * rings_[1]) + p[1] + rings_[1]) * (bricks_[0] + 2 * rings_[0]) + p[0] +
+            rings_[0]);
+}
+
+void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Progress& progress) {
+  const Bricks bricks(grid_, granularity_);
+  std::vector<std::uint8_t> wanted(maxima_.size(), 0);
+  for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
+    if (!selected[at(brick)]) continue;
+    const Index3 p = bricks.position(brick);
+    for (std::int64_t z = p[2] - rings_[2]; z <= p[2] + rings_[2]; ++z)
+      for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
+        for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x) wanted[slot({x, y, z})] = 1;
+  }
+  // Blocks that hold a brick nobody has looked at, whole.
+  std::vector<std::pair<Index3, Index3>> blocks;
+  std::vector<GoldBox> boxes;
+  Index3 first{};
+  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += block_bricks)
+    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
+      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
+        Index3 size{};
+        for (std::size_t a = 0; a < 3; ++a) size[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
+        bool open = false;
+        for (std::int64_t z = 0; z < size[2] && !open; ++z)
+          for (std::int64_t y = 0; y < size[1] && !open; ++y)
+            for (std::int64_t x = 0; x < size[0] && !open; ++x) {
+              const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
+              open = wanted[i] && !looked_at_[i];
+            }
+        if (!open) continue;
+        blocks.emplace_back(first, size);
+        boxes.push_back(box_of(first, size));
+      }
+  kept_.prepare({}, boxes, progress);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    look_at(blocks[i].first, blocks[i].second);
+    report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
+  }
+}
+
+GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const {
+  GoldBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t side = granularity_ * kept_.rates()[a];
+    box.first[a] = first[a] * side - reach;
+    box.nodes[a] = bricks[a] * side + 1 + 2 * reach;
+  }
+  return box;
+}
+
+void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
+  const GoldBox box = box_of(first, bricks);
+  // Room for eight lanes that begin at the last node of the last brick.
+  const std::int64_t stride = column_stride(box.nodes[2] + 8);
+  opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "kept gold of bricks");
+  gold.fill(0.0f);
+  kept_.fill({}, box, gold, 0, stride);
+  std::vector<float> margins;
+  for (std::int64_t y = 0; y < box.nodes[1]; ++y)
+    for (std::int64_t x = 0; x < box.nodes[0]; ++x)
+      margins.push_back(static_cast<float>(
+          coverage_.margin(grid_.origin[0] + static_cast<double>(box.first[0] + x) * grid_.spacing[0] /
+                                                 static_cast<double>(kept_.rates()[0]),
+                           grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
+                                                 static_cast<double>(kept_.rates()[1]))));
+  const opencl::DeviceArray<float> margin(state_, std::span<const float>(margins), "coverage margins");
+  const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6), "fourth differences");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(state_, "gold/fourth_differences",
+                                                                                   "fourth_differences");
+  const auto side = [&](std::size_t a) { return to_int(granularity_ * kept_.rates()[a]); };
+  kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
+         margin.buffer(),
+         VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1), side(2),
+                               to_int(box.nodes[0]), to_int(stride), static_cast<float>(lowest_)});
+  const std::vector<float> found = out.to_host();
+  for (std::int64_t z = 0; z < bricks[2]; ++z)
+    for (std::int64_t y = 0; y < bricks[1]; ++y)
+      for (std::int64_t x = 0; x < bricks[0]; ++x) {
+        const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
+        std::copy_n(found.begin() + ((z * bricks[1] + y) * bricks[0] + x) * 6, 6, maxima_[i].begin());
+        looked_at_[i] = 1;
+      }
+}
+
+float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
+  const Index3 p = Bricks(grid_, granularity_).position(brick);
+  Maxima largest{};
+  for (std::int64_t z = p[2] - rings_[2]; z <= p[2] + rings_[2]; ++z)
+    for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
+      for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x)
+        for (std::size_t d = 0; d < 6; ++d) largest[d] = std::max(largest[d], maxima_[slot({x, y, z})][d]);
+  std::array<double, 3> square{};  // of gold's spacing over that of kept nodes
+  for (std::size_t a = 0; a < 3; ++a) square[a] = std::pow(static_cast<double>(lattice.step[a]) / lattice.phases[a], 2);
+  const auto sup = [&](std::size_t d) {
+    return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) + static_cast<double>(addend_[d]);
+  };
+  const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) + square[2] * square[2] * sup(2),
+               mixed = square[0] * square[1] * sup(3) + square[0] * square[2] * sup(4) + square[1] * square[2] * sup(5);
+  return round_up(0.125 * (5.0 / 24 * pure + 2.0 / 8 * mixed));
+}
+
+}  // namespace vdvr

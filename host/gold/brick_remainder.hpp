@@ -1,0 +1,48 @@
+// What T leaves out, brick by brick, from fourth differences of kept gold (docs/error-bounds.md, section 5). Called by
+// gold_stream.cpp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "host/gold/kept_gold.hpp"
+#include "host/gold/remainder_norms.hpp"
+
+namespace vdvr {
+
+/// Bounds how far an eighth of the sum of three second derivatives, times the spacings' squares, lies from the same sum
+/// of second differences of gold at the corners of its cell: (1/8) [ (5/24) sum_j X_jj + (2/8) sum_{i<j} X_ij ], X_ij at
+/// least h_i^2 h_j^2 |F_iijj| in the cell and one step around it.
+class BrickRemainder {
+ public:
+  /// Of bricks of `grid`, whose rates `kept` has. All but `granularity` is referred to.
+  BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
+                 int granularity);
+
+  /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as nobody has.
+  /// Cost: kept gold once more along z, and six differences a node.
+  void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
+
+  /// Of cells of gold on `lattice` in a brick that was required.
+  [[nodiscard]] float of(std::int64_t brick, const GoldLattice& lattice) const;
+
+ private:
+  using Maxima = std::array<float, 6>;  // xx, yy, zz, xy, xz, yz
+  [[nodiscard]] std::size_t slot(const Index3& position) const;
+  [[nodiscard]] GoldBox box_of(const Index3& first, const Index3& bricks) const;
+  void look_at(const Index3& first, const Index3& bricks);
+
+  opencl::State& state_;
+  KeptGold& kept_;
+  Coverage coverage_;
+  Grid grid_;
+  int granularity_;
+  Index3 bricks_{}, rings_{};            // of the grid, and of bricks around it
+  std::vector<Maxima> maxima_;           // with the rings
+  std::vector<std::uint8_t> looked_at_;  // alike
+  Maxima factor_{}, addend_{};           // of a difference, by which X is bounded
+  double lowest_ = 0;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,93 @@
+// Launcher of kernels/gold/interpolate.cl.
+#include "host/gold/interpolate_gold.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "host/opencl/column_tuning.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrAlongZ) == 64 && sizeof(VdvrAcross) == 72);
+
+namespace {
+
+constexpr std::int64_t taps = taps_before + 1 + taps_after, lanes_of_group = 16;
+
+opencl::Defines defines(opencl::State& state, int phases) {
+  return {{"VDVR_LANES", std::to_string(column_tuning(state.info).lanes)},
+          {"VDVR_RUN", std::to_string(AlongZ::run)},
+          {"VDVR_PHASES", std::to_string(phases)}};
+}
+
+// Whole groups of the phases that a work-item makes together.
+std::vector<float> padded(int phases, std::span<const float> weights) {
+  const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
+  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps), 0.0f);
+  std::copy(weights.begin(), weights.end(), out.begin());
+  return out;
+}
+
+}  // namespace
+
+HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs) {
+  if (inputs < 1) throw std::logic_error("height_weights: no input");
+  HeightWeights out;
+  const std::int64_t groups = (outputs + lanes_of_group - 1) / lanes_of_group;
+  std::vector<std::int64_t> low(at(groups), inputs), high(at(groups), -1);
+  for (std::int64_t i = 0; i < outputs; ++i)
+    for (std::int64_t j = 0; j < inputs; ++j)
+      if (matrix[at(i * inputs + j)] != 0) {
+        low[at(i / lanes_of_group)] = std::min(low[at(i / lanes_of_group)], j);
+        high[at(i / lanes_of_group)] = std::max(high[at(i / lanes_of_group)], j);
+      }
+  out.terms = 1;
+  for (std::int64_t group = 0; group < groups; ++group)
+    out.terms = std::max(out.terms, high[at(group)] - low[at(group)] + 1);
+  out.weights.assign(at(groups * out.terms * lanes_of_group), 0.0f);
+  for (std::int64_t group = 0; group < groups; ++group) {
+    const std::int64_t first = std::clamp<std::int64_t>(low[at(group)], 0, inputs - out.terms);
+    out.first.push_back(to_int(first));
+    for (std::int64_t lane = 0; lane < lanes_of_group && group * lanes_of_group + lane < outputs; ++lane)
+      for (std::int64_t j = 0; j < out.terms; ++j)
+        out.weights[at((group * out.terms + j) * lanes_of_group + lane)] =
+            static_cast<float>(matrix[at((group * lanes_of_group + lane) * inputs + first + j)]);
+  }
+  return out;
+}
+
+AlongZ::AlongZ(opencl::State& state, const HeightWeights& weights)
+    : weights_(state, std::span<const float>(weights.weights), "weights of heights"),
+      first_(state, std::span<const cl_int>(weights.first), "first heights"),
+      terms_(weights.terms),
+      groups_(weights.groups()) {}
+
+void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                        const opencl::DeviceArray<float>& out, VdvrAlongZ shape) const {
+  shape.terms = to_int(terms_);
+  shape.groups = to_int(groups_);
+  const auto lanes = count(column_tuning(state.info).lanes);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
+      state, "gold/interpolate", "along_z", defines(state, 1));
+  kernel({{count(groups_ * lanes_of_group) / lanes, count((shape.columns_x + 7) / 8), count(shape.columns_y)},
+          {1, 4, 1}},
+         out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), shape);
+}
+
+Across::Across(opencl::State& state, int phases, std::span<const float> weights)
+    : phases_(phases),
+      weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
+
+void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                        const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
+  const auto lanes = count(column_tuning(state.info).lanes);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "gold/interpolate", "across",
+                                                                       defines(state, phases_));
+  kernel({{count(shape.z) / lanes, count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
+         in.buffer(), weights_.buffer(), shape);
+}
+
+}  // namespace vdvr

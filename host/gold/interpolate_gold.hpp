@@ -1,0 +1,60 @@
+// Gold from fewer nodes: products along z and filters across it, on the device. Called by kept_gold.cpp and
+// brick_remainder.cpp.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/opencl/array.hpp"
+#include "shared/interpolate_gold.h"
+
+namespace vdvr {
+
+/// Heights out of heights: out[16 group + i] = sum_j weights[group][j][i] in[first[group] + j], j < terms.
+struct HeightWeights {
+  std::int64_t terms = 0;
+  std::vector<float> weights;  ///< [group][terms][16]
+  std::vector<cl_int> first;   ///< [group]
+
+  [[nodiscard]] std::int64_t groups() const { return static_cast<std::int64_t>(first.size()); }
+};
+
+/// Of float matrix[output][input] whose entries outside a band are 0: groups of 16 outputs, each over as many
+/// inputs as the widest has. Throws std::logic_error where there is no input.
+HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs);
+
+/// The same on the device.
+class AlongZ {
+ public:
+  AlongZ(opencl::State& state, const HeightWeights& weights);
+  /// The part that `shape` names, whose terms and groups are set here. Enqueues. Cost: columns * groups * 16 *
+  /// terms multiply-adds; error: that of a product in runs of `run` terms.
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
+                  VdvrAlongZ shape) const;
+
+  static constexpr int run = 16;
+
+ private:
+  opencl::DeviceArray<float> weights_;
+  opencl::DeviceArray<cl_int> first_;
+  std::int64_t terms_ = 0, groups_ = 0;
+};
+
+/// Inputs of `across` before and after the interval that it fills.
+constexpr std::int64_t taps_before = 7, taps_after = 8;
+
+/// Filters across z. `weights` float[phase - 1][16] as gold_filters.hpp has them; `phases` outputs an interval.
+class Across {
+ public:
+  Across(opencl::State& state, int phases, std::span<const float> weights);
+  /// Enqueues. Cost: 16 multiply-adds an output; error: 17 roundings of sum |weight| |input|.
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
+                  const VdvrAcross& shape) const;
+
+ private:
+  int phases_ = 1;
+  opencl::DeviceArray<float> weights_;
+};
+
+}  // namespace vdvr

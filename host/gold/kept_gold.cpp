@@ -1,0 +1,364 @@
+// Keeps tiles of back-projected columns, and interpolates boxes from them. Calls back_project.cpp and
+// interpolate_gold.cpp.
+#include "host/gold/kept_gold.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+#include "host/fbp/back_project.hpp"
+#include "host/fbp/cosine_series.hpp"
+#include "host/fbp/reconstruct.hpp"
+#include "host/system/casts.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Kept nodes of a tile's side: positions in u are relative to its middle.
+constexpr std::int64_t side = 32;
+// Bytes of the tiles that are made together, which share one allocation.
+constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
+// Rows of the detector from which gold's heights are made by way of heights at half a pixel: below, the product with
+// all rows is the cheaper.
+constexpr std::int64_t few_rows = 32;
+
+std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
+
+// Kept nodes to a cell of the grid: their spacing is at most half a pixel.
+std::int64_t rate_of(double spacing, double pitch) {
+  std::int64_t rate = 1;
+  while (spacing / static_cast<double>(rate) > 0.5 * pitch * (1 + 1e-9)) rate *= 2;
+  return rate;
+}
+
+}  // namespace
+
+KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+                   const Grid& grid, double reach, int upsampling, Interpolation interpolation)
+    : state_(state),
+      scan_(scan),
+      upsampler_(upsampler),
+      sups_(sups),
+      grid_(grid),
+      reach_(reach),
+      interpolation_(interpolation),
+      coverage_(scan.geometry) {
+  const ParallelGeometry& g = scan.geometry;
+  const double across = std::max(grid.spacing[0], grid.spacing[1]);
+  rates_ = {rate_of(across, g.pitch_u), rate_of(across, g.pitch_u), rate_of(grid.spacing[2], g.pitch_v)};
+  for (std::size_t a = 0; a < 3; ++a) spacing_[a] = grid.spacing[a] / static_cast<double>(rates_[a]);
+  // Filters read across the edge of what is kept, and nowhere may a column be clamped.
+  const double margin =
+      reach + (static_cast<double>(taps_after) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
+  reach_ = margin - g.pitch_u;
+  columns_ = upsampled_columns(g.columns, upsampling, margin / g.pitch_u);
+  stride_ = column_stride(g.rows);
+}
+
+GoldLattice KeptGold::lattice(const Grid& grid, int rate) const {
+  GoldLattice out;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto coarser = std::llround(grid.spacing[a] / grid_.spacing[a]);
+    if (coarser < 1 || std::abs(grid.spacing[a] - static_cast<double>(coarser) * grid_.spacing[a]) >
+                           1e-9 * grid.spacing[a])
+      throw std::logic_error("KeptGold: a grid of other cells");
+    const std::int64_t kept = rates_[a] * coarser;  // to a cell
+    out.phases[a] = to_int(std::max<std::int64_t>(1, rate / kept));
+    out.step[a] = to_int(std::max<std::int64_t>(1, kept / rate));
+    if (kept * out.phases[a] != std::int64_t{rate} * out.step[a])
+      throw std::logic_error("KeptGold: rates that are no powers of two");
+  }
+  return out;
+}
+
+// --- bounds ---
+
+const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
+  // x and y share theirs.
+  const std::pair key{phases, axis == 1 ? std::size_t{0} : axis};
+  if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
+  const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
+  const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
+  return filters_.emplace(key, design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch))).first->second;
+}
+
+GoldErrors KeptGold::errors(const GoldLattice& lattice) {
+  const ParallelGeometry& g = scan_.geometry;
+  const bool all_rows = g.rows <= few_rows || lattice.phases[2] == 1;
+  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
+                   &z = filter_of(all_rows ? 1 : lattice.phases[2], 2);
+  // Second differences of what is not interpolated are those of nodes, each with an error of its own.
+  const auto bend = [](const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; };
+  const double S = sups_.value;
+  // Along z, what the rows hold makes a band-limited function, whose second differences are at most (h pi / pitch)^2 of
+  // its largest value (Bernstein).
+  const double hz = spacing_[2] * lattice.step[2] / lattice.phases[2];
+  const double bend_z = g.rows > 1 ? std::min(4.0, std::pow(pi * hz / g.pitch_v, 2)) : 0.0;
+  const double nodes = x.norm * y.norm;
+  const double curved = (bend(x) * y.norm + x.norm * bend(y) + nodes * bend_z) / 8;
+  // Three second differences of nodes that each err by themselves, an eighth of them.
+  constexpr double curved_apart = 1.5;
+
+  const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
+  const double gain_v = g.rows > 1 ? lebesgue_constant(g.rows) : 1.0;
+  const double filters = ((1 + x.sup) * (1 + y.sup) * (1 + z.sup) - 1) * S;
+  GoldErrors out;
+  out.ramp = chain.ramp;
+  out.interpolation = nodes * (1 + z.sup) * chain.interpolation + filters;
+  out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
+
+  // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each height by
+  // itself, product and filter; of each node by itself, 17 roundings in either filter across z.
+  const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
+  const double between = z.rate > 1 ? product_error(taps_before + taps_after + 9, AlongZ::run) + 2 : 0.0;
+  const double heights = unit_roundoff * S * z.norm *
+                         ((g.rows > 1 ? (product_error(g.rows, AlongZ::run) + 2) * gain_v : 0.0) + between);
+  const double apart = (x.rate > 1 ? 17.0 : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
+                       (y.rate > 1 ? 17.0 : 0.0) * unit_roundoff * x.norm * y.norm * S;
+  const double curved_heights = (bend(x) * y.norm + x.norm * bend(y) + 4 * nodes) / 8;
+  out.rounding = nodes * (shared + rows + heights) + apart + chain.underflow * nodes * gain_v;
+  out.curved_rounding = curved * (shared + rows) + curved_heights * heights + curved_apart * apart;
+  return out;
+}
+
+// --- what is kept ---
+
+KeptGold::Span KeptGold::span(const GoldLattice& lattice, std::size_t axis, const GoldBox& box) const {
+  const std::int64_t phases = lattice.phases[axis], step = lattice.step[axis], first = box.first[axis],
+                     last = first + box.nodes[axis] - 1;
+  Span s;
+  const std::int64_t begin = phases > 1 ? floor_div(first, phases) : first * step;
+  s.intervals = phases > 1 ? floor_div(last, phases) - begin + 1 : box.nodes[axis];
+  s.skipped = phases > 1 ? first - begin * phases : 0;
+  s.low = begin - taps_before;
+  s.count = (s.intervals - 1) * step + taps_before + 1 + taps_after;
+  return s;
+}
+
+ColumnBlocks KeptGold::blocks_of(std::span<const TileAt> tiles) const {
+  ColumnBlocks blocks{side, side, spacing_[0], spacing_[1], {}, {}};
+  for (const auto& [y, x] : tiles)
+    blocks.first.push_back({grid_.origin[0] + static_cast<double>(x * side) * spacing_[0],
+                            grid_.origin[1] + static_cast<double>(y * side) * spacing_[1]});
+  return blocks;
+}
+
+// The largest that any of its nodes may have.
+double KeptGold::margin_of(const TileAt& tile) const {
+  const double half = 0.5 * static_cast<double>(side);
+  return coverage_.margin(grid_.origin[0] + (static_cast<double>(tile.second * side) + half) * spacing_[0],
+                          grid_.origin[1] + (static_cast<double>(tile.first * side) + half) * spacing_[1]) +
+         half * std::hypot(spacing_[0], spacing_[1]);
+}
+
+std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const {
+  std::set<TileAt> out;
+  for (const GoldBox& box : boxes) {
+    const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
+    for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
+      for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx)
+        if (!tiles_.contains({ty, tx}) && margin_of({ty, tx}) >= -reach_) out.insert({ty, tx});
+  }
+  return {out.begin(), out.end()};
+}
+
+std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const {
+  return static_cast<std::int64_t>(new_tiles(lattice, boxes).size());
+}
+
+void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress) {
+  const std::vector<TileAt> tiles = new_tiles(lattice, boxes);
+  if (tiles.empty()) return;
+  const auto start = std::chrono::steady_clock::now();
+  back_project_tiles(tiles, progress);
+  state_.queue.finish();
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Rows in runs whose upsampled columns fit beside the tiles; every run serves all tiles.
+void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress& progress) {
+  const ParallelGeometry& g = scan_.geometry;
+  const std::uint64_t tile = count(side * side * stride_);
+  const auto each = at(std::max<std::int64_t>(1, static_cast<std::int64_t>(page_bytes / (4 * tile))));
+  const std::size_t first_page = pages_.size();
+  for (std::size_t i = 0; i < tiles.size(); i += each) {
+    const std::size_t n = std::min(each, tiles.size() - i);
+    pages_.emplace_back(state_, n * tile, "gold that is kept");
+    // Columns that nobody reads are not computed: let them be finite.
+    pages_.back().fill(0.0f);
+  }
+  std::int64_t rows = static_cast<std::int64_t>(opencl::round_up(count(g.rows), 16));
+  while (rows > 16 && upsampler_.slab_bytes(columns_, rows) >
+                          std::min(state_.memory.left() / 3, state_.info.max_allocation))
+    rows = static_cast<std::int64_t>(opencl::round_up(count(rows / 2), 16));
+  for (std::int64_t first = 0; first < g.rows; first += rows) {
+    std::vector<double> heights;
+    for (std::int64_t r = first; r < std::min(g.rows, first + rows); ++r) heights.push_back(static_cast<double>(r));
+    const UpsampledSlab slab = upsampler_(columns_, heights);
+    for (std::size_t page = first_page; page < pages_.size(); ++page) {
+      const std::size_t begin = (page - first_page) * each, n = std::min(each, tiles.size() - begin);
+      ColumnBlocks blocks = blocks_of(tiles.subspan(begin, n));
+      blocks.wanted = wanted(blocks);
+      blocks.out_stride = stride_;
+      blocks.out_row = first;
+      back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
+      report(progress, "gold", (static_cast<double>(first) + static_cast<double>(heights.size()) *
+                                static_cast<double>(page - first_page + 1) / static_cast<double>(pages_.size() - first_page)) /
+                                   static_cast<double>(g.rows));
+    }
+    state_.queue.finish();  // before the next rows are allocated
+  }
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
+}
+
+// By row of each tile the first and last node that is kept: the region is convex, so that all between them are.
+std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& blocks) const {
+  std::vector<std::array<std::int32_t, 2>> out;
+  for (const auto& [x0, y0] : blocks.first)
+    for (std::int64_t y = 0; y < side; ++y) {
+      std::array<std::int32_t, 2> row{to_int(side), -1};
+      for (std::int64_t x = 0; x < side; ++x)
+        if (coverage_.margin(x0 + static_cast<double>(x) * spacing_[0], y0 + static_cast<double>(y) * spacing_[1]) >=
+            -reach_) {
+          row[0] = std::min(row[0], to_int(x));
+          row[1] = to_int(x);
+        }
+      out.push_back(row);
+    }
+  return out;
+}
+
+// --- boxes ---
+
+// Of the rows where they are few or nothing lies between heights of half a pixel, else of these.
+void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) {
+  if (heights_ && heights_->first == box.first[2] && heights_->nodes == box.nodes[2] &&
+      heights_->phases == lattice.phases[2] && heights_->step == lattice.step[2])
+    return;
+  const ParallelGeometry& g = scan_.geometry;
+  Heights h;
+  h.first = box.first[2];
+  h.nodes = box.nodes[2];
+  h.phases = lattice.phases[2];
+  h.step = lattice.step[2];
+  const bool all_rows = g.rows <= few_rows || h.phases == 1;
+  const Span s = span(lattice, 2, box);
+  const double first = all_rows ? static_cast<double>(h.first) * h.step / h.phases : static_cast<double>(s.low),
+               step = all_rows ? static_cast<double>(h.step) / h.phases : 1.0;
+  const std::int64_t made = all_rows ? h.nodes : s.count;
+  const std::vector<double> matrix = resampling_matrix(
+      g.rows, detector_rows(g, grid_.origin[2] + first * spacing_[2], step * spacing_[2], made), 0, 1.0, 0);
+  const HeightWeights from_rows = height_weights(matrix, made, g.rows);
+  h.from_rows.emplace(state_, from_rows);
+  h.stride = h.padded = 16 * from_rows.groups();
+  if (!all_rows) {
+    const GoldFilter& f = filter_of(h.phases, 2);
+    std::vector<double> between(at(h.nodes * made), 0.0);
+    for (std::int64_t n = 0; n < h.nodes; ++n) {
+      const std::int64_t position = n + s.skipped, interval = position / h.phases, phase = position % h.phases;
+      for (std::int64_t t = 0; t < f.taps; ++t)
+        between[at(n * made + interval + t)] = static_cast<double>(f.weights[at(phase * f.taps + t)]);
+    }
+    const HeightWeights weights = height_weights(between, h.nodes, made);
+    h.between.emplace(state_, weights);
+    h.padded = 16 * weights.groups();
+  }
+  heights_ = std::move(h);
+}
+
+opencl::DeviceArray<float>& KeptGold::buffer(std::size_t which, std::uint64_t size) {
+  opencl::DeviceArray<float>& b = buffers_[which];
+  if (b.size() < size) {
+    b = {};  // before the next one is allocated
+    b = opencl::DeviceArray<float>(state_, size, "gold between its nodes");
+    b.fill(0.0f);  // what is not written is read by nobody who counts, but must be finite
+  }
+  return b;
+}
+
+const Across& KeptGold::across_of(int phases, std::size_t axis) {
+  const std::pair key{phases, axis};
+  if (const auto known = across_.find(key); known != across_.end()) return known->second;
+  const GoldFilter& f = filter_of(phases, axis);
+  return across_
+      .emplace(key, Across(state_, phases, std::span<const float>(f.weights).subspan(at(std::min(f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
+      .first->second;
+}
+
+// float [y][x][stride] of the kept nodes, heights made of the rows.
+void KeptGold::take_heights(const Span& x, const Span& y) {
+  const std::int64_t stride = heights_->stride;
+  opencl::DeviceArray<float>& out = buffer(0, count(x.count * y.count * stride));
+  for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
+    for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
+      const auto tile = tiles_.find({ty, tx});
+      if (tile == tiles_.end()) continue;  // beyond reach
+      const std::int64_t x0 = std::max(x.low, tx * side), x1 = std::min(x.low + x.count, (tx + 1) * side),
+                         y0 = std::max(y.low, ty * side), y1 = std::min(y.low + y.count, (ty + 1) * side);
+      VdvrAlongZ part{};
+      part.in_first = tile->second.first + count(((y0 - ty * side) * side + x0 - tx * side) * stride_);
+      part.in_x = count(stride_);
+      part.in_y = count(side * stride_);
+      part.out_first = count(((y0 - y.low) * x.count + x0 - x.low) * stride);
+      part.out_x = count(stride);
+      part.out_y = count(x.count * stride);
+      part.columns_x = to_int(x1 - x0);
+      part.columns_y = to_int(y1 - y0);
+      (*heights_->from_rows)(state_, pages_[tile->second.page], out, part);
+    }
+}
+
+void KeptGold::fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out,
+                    std::uint64_t first, std::int64_t stride) {
+  const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
+  resample_heights(lattice, box);
+  take_heights(x, y);
+  const std::int64_t padded = heights_->padded, columns = x.count * y.count;
+  const opencl::DeviceArray<float>* heights = &buffer(0, 0);
+  if (heights_->between) {
+    opencl::DeviceArray<float>& finer = buffer(1, count(columns * padded));
+    VdvrAlongZ part{};
+    part.in_x = count(heights_->stride);
+    part.in_y = count(x.count * heights_->stride);
+    part.out_x = count(padded);
+    part.out_y = count(x.count * padded);
+    part.columns_x = to_int(x.count);
+    part.columns_y = to_int(y.count);
+    (*heights_->between)(state_, *heights, finer, part);
+    heights = &finer;
+  }
+  const opencl::DeviceArray<float>& rows = buffer(2, count(x.count * box.nodes[1] * padded));
+  VdvrAcross along_y{};
+  along_y.in_along = along_y.out_along = count(x.count * padded);
+  along_y.in_other = along_y.out_other = count(padded);
+  along_y.others = to_int(x.count);
+  along_y.z = to_int(padded);
+  along_y.intervals = to_int(y.intervals);
+  along_y.step = lattice.step[1];
+  along_y.skipped = to_int(y.skipped);
+  along_y.outputs = to_int(box.nodes[1]);
+  across_of(lattice.phases[1], 1)(state_, *heights, rows, along_y);
+  VdvrAcross along_x{};
+  along_x.in_along = count(padded);
+  along_x.in_other = count(x.count * padded);
+  along_x.out_first = first;
+  along_x.out_along = count(stride);
+  along_x.out_other = count(box.nodes[0] * stride);
+  along_x.others = to_int(box.nodes[1]);
+  along_x.z = to_int(padded);
+  along_x.intervals = to_int(x.intervals);
+  along_x.step = lattice.step[0];
+  along_x.skipped = to_int(x.skipped);
+  along_x.outputs = to_int(box.nodes[0]);
+  across_of(lattice.phases[0], 0)(state_, rows, out, along_x);
+}
+
+}  // namespace vdvr

@@ -1,0 +1,123 @@
+// Gold where it determines the field: at twice the detector's columns across z and at its rows along z, back-projected
+// once; gold at every other node is interpolated from there with a bound (docs/error-bounds.md, section 3). Called by
+// gold_stream.cpp, brick_remainder.cpp and plan.cpp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "host/bounds/projection_bounds.hpp"
+#include "host/fbp/coverage.hpp"
+#include "host/fbp/filter_projections.hpp"
+#include "host/gold/gold_filters.hpp"
+#include "host/gold/interpolate_gold.hpp"
+#include "vdvr/grid.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/rates.hpp"
+
+namespace vdvr {
+
+/// Nodes of gold against kept ones, per axis: so many for each kept one, or every so manieth of these.
+struct GoldLattice {
+  std::array<int, 3> phases{1, 1, 1}, step{1, 1, 1};
+};
+
+/// Bounds at the nodes of a lattice, in the units of the field. F^ is the field of the computed filtered samples.
+struct GoldErrors {
+  double interpolation = 0;         ///< of a node of gold from F^, by six taps in u and by the filters
+  double rounding = 0;              ///< alike, by fp32 from the upsampled columns on
+  double curved_interpolation = 0;  ///< what that adds to an eighth of the three second differences at a node
+  double curved_rounding = 0;
+  double ramp = 0;  ///< of F^ from F, anywhere
+};
+
+/// A box of nodes of a lattice: node 0 is the grid's first sample.
+struct GoldBox {
+  Index3 first{}, nodes{};
+};
+
+class KeptGold {
+ public:
+  /// Kept for nodes of a coverage margin of at least -`reach` (world units). All but the numbers is referred to. Rates of
+  /// the grid's own lattice follow from its spacing and the detector's pitch.
+  KeptGold(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups, const Grid& grid,
+           double reach, int upsampling, Interpolation interpolation);
+
+  /// Kept nodes to a cell of the grid, by axis: powers of two, so that their spacing is at most half a pixel.
+  [[nodiscard]] const Index3& rates() const { return rates_; }
+  /// Of gold at `rate` of a grid with the same origin whose cells are powers of two of this one's. Throws
+  /// std::logic_error where they are not.
+  [[nodiscard]] GoldLattice lattice(const Grid& grid, int rate) const;
+  /// Cost: milliseconds for each new ratio.
+  [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
+
+  /// Back-projects what `boxes` will read and is not kept yet. Throws ResourceError where memory does not suffice. Cost:
+  /// views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
+  void prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress);
+
+  /// float out[y][x][stride] from `first` on: gold at the nodes of a box that was prepared; its z is padded to a
+  /// multiple of 16. Nodes beyond `reach` hold anything finite. Enqueues.
+  void fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out, std::uint64_t first,
+            std::int64_t stride);
+
+  /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
+  [[nodiscard]] double seconds() const { return seconds_; }
+  [[nodiscard]] std::int64_t tiles() const { return static_cast<std::int64_t>(tiles_.size()); }
+  [[nodiscard]] std::int64_t missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
+
+ private:
+  using TileAt = std::pair<std::int64_t, std::int64_t>;  // y, x
+  struct Place {
+    std::size_t page = 0;
+    std::uint64_t first = 0;
+  };
+  // Along one axis: intervals of kept nodes, and the kept nodes that they read.
+  struct Span {
+    std::int64_t low = 0, count = 0;  // kept nodes read
+    std::int64_t intervals = 0, skipped = 0;
+  };
+  [[nodiscard]] Span span(const GoldLattice& lattice, std::size_t axis, const GoldBox& box) const;
+  [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
+  [[nodiscard]] double margin_of(const TileAt& tile) const;
+  [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
+  [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
+  void back_project_tiles(std::span<const TileAt> tiles, const Progress& progress);
+  const Across& across_of(int phases, std::size_t axis);
+  const GoldFilter& filter_of(int phases, std::size_t axis);
+  void resample_heights(const GoldLattice& lattice, const GoldBox& box);
+  void take_heights(const Span& x, const Span& y);
+  opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
+
+  opencl::State& state_;
+  const FilteredScan& scan_;
+  Upsampler& upsampler_;
+  const FieldSups& sups_;
+  Grid grid_;
+  double reach_;
+  Interpolation interpolation_;
+  Coverage coverage_;
+  UpsampledColumns columns_;
+  Index3 rates_{1, 1, 1};
+  Vec3 spacing_{};  // of kept nodes; of the heights made of the rows, along z
+  std::int64_t stride_ = 0;
+  std::vector<opencl::DeviceArray<float>> pages_;
+  std::map<TileAt, Place> tiles_;
+  std::map<std::pair<int, std::size_t>, GoldFilter> filters_;
+  std::map<std::pair<int, std::size_t>, Across> across_;
+  // Heights of the last box: blocks of a slab share them.
+  struct Heights {
+    std::int64_t first = 0, nodes = 0;
+    int phases = 1, step = 1;
+    std::optional<AlongZ> from_rows, between;
+    std::int64_t stride = 0, padded = 0;  // of columns of heights made of rows, and of gold's
+  };
+  std::optional<Heights> heights_;
+  std::array<opencl::DeviceArray<float>, 3> buffers_;
+  double seconds_ = 0;
+};
+
+}  // namespace vdvr
