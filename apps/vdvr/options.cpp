@@ -114,7 +114,7 @@ GridOptions grid_options(const Arguments& args, const std::string& size_option) 
 void add_rates(Arguments& args) {
   args.group("Rates")
       .value("upsampling", "auto|N", "of the filtered projections in u, a power of two")
-      .value("u-filter", "auto|linear|cubic", "interpolation of the upsampled projections")
+      .value("u-filter", "auto|linear|cubic|six-taps", "interpolation of the upsampled projections")
       .value("gold", "auto|N", "oversampling of the gold standard, a power of two");
 }
 
@@ -127,7 +127,7 @@ int upsampling_option(const Arguments& args) {
 RateOptions rate_options(const Arguments& args) {
   RateOptions rates;
   rates.upsampling = rate(args, "upsampling", 64);
-  rates.interpolation = interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic"}, "auto"));
+  rates.interpolation = interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic", "six-taps"}, "auto"));
   rates.gold = rate(args, "gold", 64);
   if (args.has("paper")) {
     if (!args.has("upsampling")) rates.upsampling = 8;

@@ -272,9 +272,10 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
   }
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {measured.slack.gold, "curvature: signed second differences of gold, with remainder"};
-  c.budget.projection = {measured.slack.projection, plan.rates.interpolation == Interpolation::cubic
-                                                        ? "curvature: signed sums of |q_uuuu| maxima"
-                                                        : "curvature: signed sums of |q_uu| maxima"};
+  c.budget.projection = {measured.slack.projection,
+                         plan.rates.interpolation == Interpolation::six_taps
+                             ? "sups of |q|: six taps in u, 16 taps from kept gold"
+                             : "sups of |q_uu| and of |q|: interpolation in u, 16 taps from kept gold"};
   c.budget.arithmetic = {in.arithmetic, "rounding in fp32 from the ramp filter to back-projection"};
   c.budget.sampler = sampler;
   c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;

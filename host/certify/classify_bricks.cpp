@@ -131,7 +131,7 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
               std::vector<Levels> levels;
               for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
                 levels.push_back({m, {}, false, {}});
-              return record(batch, std::move(levels), {}, {});
+              return record(levels, {}, {});
             },
             [&](ByteReader in) { read(in, visit); }},
            progress_, stage);
@@ -159,7 +159,7 @@ void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, doubl
            tiles.emplace_back(c.base.brick, c.level);
            samples.insert(samples.end(), c.tile.begin(), c.tile.end());
          }
-         return record(batch, std::move(levels), tiles, samples);
+         return record(levels, tiles, samples);
        },
        [&](ByteReader in) {
          read(in, [&](const Levels& l) {
@@ -187,8 +187,8 @@ void ClassifyBricks::take(const Levels& l) {
   bounds_.gold = std::max(bounds_.gold, slack - bounds_.projection);
 }
 
-Bytes ClassifyBricks::record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
-                             const std::vector<float>& samples) const {
+Bytes ClassifyBricks::record(const std::vector<Levels>& levels, const Tiles& tiles,
+                             const std::vector<float>& samples) {
   ByteWriter out;
   out.put(static_cast<std::uint64_t>(levels.size()));
   for (std::size_t i = 0; i < levels.size(); ++i) {

@@ -108,8 +108,7 @@ class ClassifyBricks {
   void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
-  Bytes record(GoldStream::Batch& batch, std::vector<Levels> levels, const Tiles& tiles,
-               const std::vector<float>& samples) const;
+  static Bytes record(const std::vector<Levels>& levels, const Tiles& tiles, const std::vector<float>& samples);
   static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
   void take(const Levels& levels);
   static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);

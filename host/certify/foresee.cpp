@@ -84,19 +84,6 @@ std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n)
   return selected;
 }
 
-// Seconds per upsampled row and per gold sample.
-struct Pace {
-  double row = 0, sample = 0;
-  [[nodiscard]] double operator()(const GoldWork& work) const {
-    return work.rows * row + work.samples * sample;
-  }
-};
-
-Pace pace_of(const GoldSpent& s) {
-  return {(s.slab_seconds + s.table_seconds) / std::max(1.0, s.work.rows),
-          s.block_seconds / std::max(1.0, s.work.samples)};
-}
-
 // How fast each stream was at each purpose; where one had nothing to do, nothing is foreseen for it either.
 class Paces {
  public:
@@ -112,7 +99,7 @@ class Paces {
     if (!s) return 0;
     GoldSpent spent = s->spent(purpose);
     spent -= before_[{fine, purpose}];
-    return pace_of(spent)(s->work(bricks, purpose));
+    return spent.seconds / std::max(1.0, spent.samples) * s->samples(bricks, purpose);
   }
 
  private:
@@ -236,7 +223,12 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   out.samples_ratio =
       (static_cast<double>(stored.size()) + static_cast<double>(near.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
-  out.seconds = first_pass;
+  // What will be kept and was not needed so far.
+  const KeptGold& kept = gold.fine().source()->kept;
+  const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
+  out.seconds =
+      first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
+                       static_cast<double>(kept.tiles() + missing);
   const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {
     out.seconds += small.seconds(fine, purpose, bricks[fate]);
   };

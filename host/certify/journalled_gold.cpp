@@ -34,7 +34,6 @@ Bytes JournalledGold::record(std::int64_t pass, const GoldStream::Batch& batch, 
        {std::int64_t{gold_.settings().rate}, pass, first.front()[2], size[0], size[1], size[2],
         first.front()[0], first.front()[1], static_cast<std::int64_t>(first.size())})
     out.put(n);
-  out.put(gold_.cells() ? gold_.cells()->new_cells(batch.slab(), first) : std::vector<float>{});
   Bytes bytes = out.take();
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   return bytes;
@@ -52,11 +51,6 @@ std::size_t JournalledGold::replay(std::int64_t pass, const GoldStream::Work& wo
     throw InputError(
         "the journal's next record is of other blocks than this build asks for; start again without "
         "`resume`");
-  std::vector<std::array<std::int64_t, 3>> first;
-  for (std::size_t i = from; i < from + static_cast<std::size_t>(n); ++i)
-    first.push_back({work.first[i][0], work.first[i][1], work.z});
-  const auto cells = in.get_vector<float>();
-  if (gold_.cells()) gold_.cells()->restore(gold_.slab_of(work), first, cells);
   apply(in);
   return static_cast<std::size_t>(n);
 }

@@ -18,29 +18,20 @@ namespace {
 constexpr int granularity = 4, finer = 4;
 constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
 
-// Bounds of every brick that may hold a covered node.
-struct BrickBounds {
-  std::vector<float> slack, p;
-};
-
-BrickBounds brick_bounds(opencl::State& state, GoldStream& stream, const Volume& base,
+// What T may be in every brick that may hold a covered node; negative elsewhere.
+std::vector<float> brick_bounds(opencl::State& state, GoldStream& stream, const Volume& base,
                          const Progress& progress) {
   const auto near = stream.bricks_near_coverage();
   const DeviceField field(state, as_mixed(base, granularity));
   const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
-  BrickBounds out{std::vector<float>(near.size(), -1), std::vector<float>(near.size(), -1)};
+  std::vector<float> out(near.size(), -1);
+  // Beside interpolation and rounding.
+  const auto other = static_cast<float>(stream.projection_in_slack() + stream.rounding_in_slack());
   stream.run(
       near,
       [&](GoldStream::Batch& batch) {
-        const auto p = batch.largest_p();
-        const auto m = batch.measure(field, INFINITY, selected);
-        for (std::size_t i = 0; i < m.size(); ++i) {
-          if (m[i].total < 0) continue;
-          // What P and rounding add to a cell's slack; P of the cell at hand is at least the brick's least.
-          out.slack[at(m[i].brick)] =
-              m[i].slack - 2.5f * p[i].second - static_cast<float>(stream.rounding_in_slack());
-          out.p[at(m[i].brick)] = p[i].first;
-        }
+        for (const BrickMeasure& m : batch.measure(field, INFINITY, selected))
+          if (m.total >= 0) out[at(m.brick)] = m.slack - other;
       },
       progress, "bounds");
   return out;
@@ -124,21 +115,19 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
                       {grid, granularity, r.gold, r.upsampling, r.interpolation, {}});
   };
   const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, Interpolation::cubic, {});
-  GoldStream sharp = stream_at({16, Interpolation::cubic, rates.gold}), given = stream_at(rates),
-             truth = stream_at({16, Interpolation::cubic, rates.gold * finer});
-  const BrickBounds t = brick_bounds(state, sharp, base, progress),
-                    p = brick_bounds(state, given, base, progress);
+  GoldStream sharp = stream_at({16, Interpolation::six_taps, rates.gold}), given = stream_at(rates),
+             truth = stream_at({16, Interpolation::six_taps, rates.gold * finer});
+  const std::vector<float> t = brick_bounds(state, sharp, base, progress);
 
   Tightness out;
   out.arithmetic = given.arithmetic();
   std::vector<std::int64_t> chosen, covered;
-  add_largest(chosen, t.slack);
-  add_largest(chosen, p.p);
-  for (std::size_t i = 0; i < t.slack.size(); ++i) {
-    if (t.slack[i] < 0) continue;
+  out.projection_bound = given.projection();
+  add_largest(chosen, t);
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    if (t[i] < 0) continue;
     covered.push_back(static_cast<std::int64_t>(i));
-    out.gold_bound = std::max(out.gold_bound, static_cast<double>(t.slack[i]));
-    out.projection_cells = std::max(out.projection_cells, static_cast<double>(p.p[i]));
+    out.gold_bound = std::max(out.gold_bound, static_cast<double>(t[i]));
   }
   std::mt19937 random(1);
   std::shuffle(covered.begin(), covered.end(), random);
@@ -148,22 +137,17 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   out.bricks = static_cast<std::int64_t>(chosen.size());
 
-  const Bricks bricks(grid, granularity);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const std::int64_t id = chosen[i];
-    const BrickGold fine = brick_gold(truth, id, t.slack.size()),
-                    exact = brick_gold(sharp, id, t.slack.size()),
-                    computed = brick_gold(given, id, t.slack.size());
+    const BrickGold fine = brick_gold(truth, id, t.size()),
+                    exact = brick_gold(sharp, id, t.size()),
+                    computed = brick_gold(given, id, t.size());
     out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
-    const Index3 first = bricks.first_cell(bricks.position(id));
-    const auto bound = projection_bound_at_nodes(state, upsampler, filtered, grid, rates.upsampling,
-                                                 rates.interpolation, rates.gold, first, computed.side);
     for (std::int64_t z = 0; z < computed.side[2]; ++z)
       for (std::int64_t y = 0; y < computed.side[1]; ++y)
         for (std::int64_t x = 0; x < computed.side[0]; ++x) {
           const std::size_t node = computed.index(x, y, z);
           if (computed.slack[node] < 0) continue;
-          out.projection_nodes = std::max(out.projection_nodes, static_cast<double>(bound[node]));
           out.projection_error =
               std::max(out.projection_error,
                        std::abs(static_cast<double>(computed.gold[node]) -
@@ -180,8 +164,7 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
                             const FieldOptions& field, const Rates& rates, const Progress& progress) {
   const Units units = units_of(scan);
   Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, rates, progress);
-  for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_nodes, &t.projection_cells,
-                        &t.projection_error, &t.arithmetic})
+  for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_bound, &t.projection_error, &t.arithmetic})
     *value = to_world(*value, units);
   return t;
 }

@@ -37,16 +37,13 @@ constexpr double share = 0.5, patient_share = 0.65;
 // The same for P alone: a finer cubic interpolation costs memory only.
 constexpr double linear_share = 0.1, cubic_share = 0.03;
 
-// Cheapest first: gold costs eight times per doubling, cubic in u twice the linear, upsampling memory only.
+// Cheapest first: gold costs eight times per doubling. Six taps need columns at 8x; where fewer are asked for, four.
 std::vector<Rates> candidates(const RateOptions& wanted) {
+  const auto interpolation = wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;
   std::vector<Rates> all;
   for (const int gold : {8, 16, 32})
-    for (const auto& [upsampling, interpolation] : {std::pair{8, Interpolation::linear},
-                                                    {16, Interpolation::linear},
-                                                    {8, Interpolation::cubic},
-                                                    {16, Interpolation::cubic},
-                                                    {32, Interpolation::cubic}})
-      all.push_back({upsampling, interpolation, gold});
+    for (const int upsampling : {8, 16, 32})
+      all.push_back({upsampling, wanted.interpolation.value_or(interpolation), gold});
   for (Rates& r : all) {
     if (wanted.upsampling) r.upsampling = *wanted.upsampling;
     if (wanted.gold) r.gold = *wanted.gold;
@@ -54,12 +51,16 @@ std::vector<Rates> candidates(const RateOptions& wanted) {
   std::vector<Rates> out;
   for (const Rates& r : all) {
     const bool same = std::find(out.begin(), out.end(), r) != out.end();
-    if (!same && wanted.interpolation.value_or(r.interpolation) == r.interpolation) out.push_back(r);
+    // Six taps are as good at 8x as at any rate above.
+    const bool finer = r.interpolation == Interpolation::six_taps && r.upsampling > wanted.upsampling.value_or(8);
+    if (!same && !finer) out.push_back(r);
   }
   return out;
 }
 
 void check_rates(const RateOptions& rates) {
+  if (rates.interpolation == Interpolation::six_taps && rates.upsampling && *rates.upsampling < 8)
+    throw InputError(fmt::format("`u_filter` six-taps needs an `upsampling` of at least 8, not {}", *rates.upsampling));
   const auto power = [](int n, int low) {
     return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n));
   };
@@ -118,7 +119,6 @@ std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan,
 // What a trial of some blocks at given rates shows.
 struct Trial {
   double slack = 0, projection = 0, gold = 0, arithmetic = 0;
-  std::int64_t brick = -1;  // where P is largest
 };
 
 // A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
@@ -145,8 +145,8 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   return selected;
 }
 
-// Whether the grid keeps enough of the tolerance. Cubic interpolation in u costs twice the time and hardly
-// any of the tolerance: linear must not cost much more, or the volume pays for it.
+// Whether the grid keeps enough of the tolerance. Better interpolation in u costs little: what it leaves must not cost
+// much of the tolerance, or the volume pays for it.
 bool fits(const Rates& r, const Trial& t, double epsilon) {
   if (2.5 * t.projection > (r.interpolation == Interpolation::linear ? linear_share : cubic_share) * epsilon)
     return false;
@@ -162,11 +162,12 @@ double least_needed(const Trial& t, const Volume& base) {
   return t.slack + t.arithmetic + std::min(2 * t.arithmetic, 0x1p-15 * largest);
 }
 
-Trial try_rates(opencl::State& state, GoldStream& stream, double arithmetic, const Volume& base,
-                double epsilon) {
+Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, double epsilon) {
+  GoldStream& stream = gold.fine();
   const GoldSettings& settings = stream.settings();
   Trial t;
-  t.arithmetic = arithmetic;
+  t.arithmetic = gold.arithmetic();
+  t.projection = gold.projection();
   const DeviceField field(state, as_mixed(base, settings.granularity));
   const auto selected = trial_bricks(settings.grid, settings.granularity, settings.rate);
   const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
@@ -174,45 +175,17 @@ Trial try_rates(opencl::State& state, GoldStream& stream, double arithmetic, con
   stream.run(
       selected,
       [&](GoldStream::Batch& batch) {
-        const auto measures = batch.measure(field, static_cast<float>(epsilon), device_selected);
-        const auto p = batch.largest_p();
-        for (std::size_t i = 0; i < measures.size(); ++i) {
-          const BrickMeasure& m = measures[i];
-          if (m.total < 0) continue;
-          t.slack = std::max(t.slack, static_cast<double>(m.slack));
-          if (t.brick < 0 || static_cast<double>(p[i].first) > t.projection) {
-            t.projection = static_cast<double>(p[i].first);
-            t.brick = m.brick;
-          }
-          t.gold = std::max(t.gold, static_cast<double>(m.slack) - static_cast<double>(p[i].second));
-        }
+        for (const BrickMeasure& m : batch.measure(field, static_cast<float>(epsilon), device_selected))
+          if (m.total >= 0) t.slack = std::max(t.slack, static_cast<double>(m.slack));
       },
       {}, "trial");
+  t.gold = std::max(0.0, t.slack - t.projection);
   return t;
 }
 
-// P node by node in the brick where its dilated form is largest.
-double worst_node_bound(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
-                        const GoldSettings& s, std::int64_t brick) {
-  if (brick < 0) return 0;
-  const Bricks bricks(s.grid, s.granularity);
-  const Index3 position = bricks.position(brick), first = bricks.first_cell(position);
-  Index3 nodes = bricks.cells(position);
-  for (std::int64_t& n : nodes) n = n * s.rate + 1;
-  const auto p = projection_bound_at_nodes(state, upsampler, scan, s.grid, s.upsampling, s.interpolation,
-                                           s.rate, first, nodes);
-  return static_cast<double>(*std::max_element(p.begin(), p.end()));
-}
-
-void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t, double node_by_node) {
-  bounds.push_back(
-      {"projection",
-       std::string("signed curvature, node by node, ") + text_of(r.interpolation) + " in u (trial)",
-       r.upsampling, node_by_node, true});
-  bounds.push_back(
-      {"projection",
-       std::string("signed curvature, by base cell, ") + text_of(r.interpolation) + " in u (trial)",
-       r.upsampling, t.projection, true});
+void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t) {
+  bounds.push_back({"projection", fmt::format("sups, {} in u, 16 taps between kept gold", text_of(r.interpolation)),
+                    r.upsampling, t.projection, true});
   bounds.push_back({"gold",
                     fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling,
                                 text_of(r.interpolation)),
@@ -352,12 +325,18 @@ class Planner {
     return s;
   }
 
+  // Rates that differ in gold alone share what they read.
+  std::shared_ptr<GoldSource> source_at(const Rates& r) {
+    if (!source_ || source_rates_.upsampling != r.upsampling || source_rates_.interpolation != r.interpolation)
+      source_ = std::make_shared<GoldSource>(state_, filtered_, *upsampler_, sups_, settings_at(r));
+    source_rates_ = r;
+    return source_;
+  }
+
   Trial try_out(const Rates& r) {
-    GoldStream stream(state_, filtered_, *upsampler_, sups_, settings_at(r));
-    const double arithmetic = GoldRates::arithmetic(state_, filtered_, *upsampler_, sups_, stream);
-    const Trial t = try_rates(state_, stream, arithmetic, plan_.base, plan_.epsilon_abs);
-    add_trial_bounds(plan_.bounds, r, t,
-                     worst_node_bound(state_, *upsampler_, filtered_, stream.settings(), t.brick));
+    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(r), source_at(r));
+    const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs);
+    add_trial_bounds(plan_.bounds, r, t);
     return t;
   }
 
@@ -420,13 +399,14 @@ class Planner {
     if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
     preparation_ += seconds_of([&] {
       plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
-      fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {});
+      fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {},
+                       source_at(plan_.rates));
     });
   }
 
   // Storage, memory and time.
   void foresee(const Trial& t) {
-    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates));
+    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), source_at(plan_.rates));
     const Foreseen foreseen =
         foresee_build(state_, gold, plan_.base,
                       plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,
@@ -449,6 +429,8 @@ class Planner {
   std::optional<Upsampler> upsampler_;
   std::optional<Coverage> coverage_;
   FieldSups sups_;
+  std::shared_ptr<GoldSource> source_;
+  Rates source_rates_;
   double preparation_ = 0;  // seconds that build will take again
 };
 

@@ -10,9 +10,13 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrColumnBlocks) == 32);
+static_assert(sizeof(VdvrColumnBlocks) == 36);
 
 namespace {
+
+int taps_of(Interpolation interpolation) {
+  return interpolation == Interpolation::six_taps ? 6 : interpolation == Interpolation::cubic ? 4 : 2;
+}
 
 struct ViewStep {
   double along_x, along_y;
@@ -92,7 +96,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrColumnBlocks> kernel(
       state, "fbp/back_project", "back_project",
-      {{"VDVR_CUBIC", interpolation == Interpolation::cubic ? "1" : "0"},
+      {{"VDVR_TAPS", std::to_string(taps_of(interpolation))},
        {"VDVR_RUN", std::to_string(view_run(interpolation))},
        {"VDVR_LANES", std::to_string(tuning.lanes)},
        {"VDVR_TILE", std::to_string(tuning.tile)},
@@ -102,11 +106,12 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   const VdvrColumnBlocks shape{.views = ints(slab.views),
                                .columns = ints(slab.columns.count),
                                .z_padded = ints(padded),
-                               .out_stride = ints(column_stride(rows_wanted)),
+                               .out_stride = ints(blocks.out_stride > 0 ? blocks.out_stride : column_stride(rows_wanted)),
                                .nx = ints(blocks.nx),
                                .ny = ints(blocks.ny),
                                .blocks = ints(n),
-                               .first_chunk = ints(blocks.first_row / 16)};
+                               .first_chunk = ints(blocks.first_row / 16),
+                               .out_row = ints(blocks.out_row)};
   kernel({{count((padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},

@@ -84,42 +84,16 @@ void compare_range(Differences& out, Filtered& f, const ExactField& exact, const
                               f.world(c.reference_range), f.world(F[1] - F[0])));
 }
 
-// Blocks are cut to the memory there is: from one brick to 128 gold cells, with a halo.
-void compare_arithmetic(Differences& out, Filtered& f, const Grid& base, const MixedVolume& v,
-                        const Certificate& c, bool same_device) {
-  const auto brick = [&](int rate) { return static_cast<double>(v.granularity * rate); };
-  const auto block = [&](int rate) {
-    return std::max(1.0, std::floor(128 / brick(rate))) * brick(rate) + 3 + 2 * level_fit_steps * rate;
-  };
-  const auto bound = [&](int rate, double side, double ramp_error) {
-    Vec3 gold = v.grid.spacing;
-    for (double& h : gold) h /= rate;
-    const double own = std::exchange(f.scan.ramp_error, ramp_error);
-    const double all = arithmetic_of(f, base, gold, side, c.rates.upsampling, c.rates.interpolation);
-    f.scan.ramp_error = own;
-    return all;
-  };
-  // The filter's own error is measured, and another device's may be smaller.
-  const double low = bound(v.rate, brick(v.rate) + 3, same_device ? f.scan.ramp_error : 0);
-  // Gold at half the rate has blocks as wide, of twice the spacing.
-  double high = bound(v.rate, block(v.rate), f.scan.ramp_error);
-  if (v.rate >= 4) high = std::max(high, bound(v.rate / 2, block(v.rate / 2), f.scan.ramp_error));
-  const double value = c.budget.arithmetic.value;
-  if (!(value >= low * (1 - table_rounding)))
-    out.push_back(fmt::format("the arithmetic term is {}, below {}", f.world(value), f.world(low)));
-  if (same_device && !(value <= high * (1 + table_rounding)))
-    out.push_back(fmt::format("the arithmetic term is {}, above {}", f.world(value), f.world(high)));
-}
-
 /// |V - gold| + T + P of the selected bricks, as build measures them.
 class Totals {
  public:
-  Totals(Filtered& f, const MixedVolume& v, const Certificate& c)
+  Totals(Filtered& f, const MixedVolume& v, const Certificate& c, bool same_device)
       : f_(f),
         volume_(v),
         stored_(c),
         field_(f.state, v),
-        gold_(f.state, f.scan, f.upsampler, f.sups, settings(v, c)) {}
+        gold_(f.state, f.scan, f.upsampler, f.sups, settings(v, c)),
+        same_device_(same_device) {}
 
   void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,
                const Progress& progress) {
@@ -146,7 +120,7 @@ class Totals {
       if (!agrees(m)) low.push_back(m);
     });
     compare_alone(out, std::move(low), progress);
-    compare_projection(out, exhaustive);
+    compare_constants(out);
     compare_largest(out, exhaustive);
   }
 
@@ -165,16 +139,9 @@ class Totals {
     gold.run(
         selected,
         [&](GoldStream::Batch& batch) {
-          const auto measures = batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device);
-          const auto p = batch.largest_p();
-          for (std::size_t i = 0; i < measures.size(); ++i) {
-            visit(measures[i]);
-            // Of bricks that build tested: coarse gold has nodes further outside the covered region.
-            const std::size_t brick = at(measures[i].brick);
-            if (measures[i].total >= 0 && brick < stored_.brick_totals.size() &&
-                stored_.brick_totals[brick] >= 0)
-              projection_ = std::max(projection_, static_cast<double>(p[i].first));
-          }
+          for (const BrickMeasure& m :
+               batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device))
+            visit(m);
         },
         progress, "totals");
   }
@@ -227,13 +194,18 @@ class Totals {
     return stored >= 0 && stored >= static_cast<double>(m.total) - tolerance(m);
   }
 
-  void compare_projection(Differences& out, bool exhaustive) const {
+  // What follows from sups alone. The filter's own error is measured, and another device's may be smaller.
+  void compare_constants(Differences& out) const {
     if (stored_.brick_totals.empty()) return;
-    const double value = stored_.budget.projection.value;
-    if (!(value >= projection_ * (1 - table_rounding)) ||
-        (exhaustive && !(value <= projection_ * (1 + table_rounding))))
-      out.push_back(fmt::format("the projection term is {}, not {}{}", f_.world(value),
-                                exhaustive ? "" : "at least ", f_.world(projection_)));
+    const double projection = gold_.fine().projection(), found = stored_.budget.projection.value;
+    if (!(std::abs(found - projection) <= table_rounding * projection))
+      out.push_back(fmt::format("the projection term is {}, not {}", f_.world(found), f_.world(projection)));
+    const double arithmetic = gold_.arithmetic(), value = stored_.budget.arithmetic.value;
+    const double least = same_device_ ? arithmetic : arithmetic - gold_.fine().source()->kept.errors({}).ramp;
+    if (!(value >= least * (1 - table_rounding)))
+      out.push_back(fmt::format("the arithmetic term is {}, below {}", f_.world(value), f_.world(least)));
+    if (same_device_ && !(value <= arithmetic * (1 + table_rounding)))
+      out.push_back(fmt::format("the arithmetic term is {}, above {}", f_.world(value), f_.world(arithmetic)));
   }
 
   void compare_largest(Differences& out, bool exhaustive) const {
@@ -248,7 +220,7 @@ class Totals {
   const Certificate& stored_;
   DeviceField field_;
   GoldRates gold_;
-  double projection_ = 0;  // largest seen
+  bool same_device_;
   double error_ = 0;       // largest seen on the gold that certifies
   double most_ = 0;        // what measured_max can be
 };
@@ -260,10 +232,9 @@ void compare_in_units(Differences& out, Device& device, const ProjectionSet& sca
   Filtered f(device.state(), scan, units, stored.field, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
   compare_range(out, f, exact, volume, stored, progress);
-  compare_arithmetic(out, f, coarsened(volume.grid, volume.coarsening), volume, stored, same_device);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
     out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
-  Totals(f, volume, stored).compare(out, selected, exhaustive, progress);
+  Totals(f, volume, stored, same_device).compare(out, selected, exhaustive, progress);
 }
 
 }  // namespace

@@ -12,9 +12,10 @@
 
 #include "device/lanes.h"
 #include "shared/back_project.h"
+#include "shared/six_taps.h"
 
-#ifndef VDVR_CUBIC
-#error "VDVR_CUBIC must be 0 (linear in u) or 1 (4-point cubic in u)"
+#ifndef VDVR_TAPS
+#error "VDVR_TAPS must be 2 (linear in u), 4 (cubic) or 6"
 #endif
 #ifndef VDVR_RUN
 #error "VDVR_RUN must be the views of a run"
@@ -69,7 +70,18 @@
 #else
 #define INTO(sum, w, q) sum##_low = fma((VEC)(w), LOAD(q), sum##_low);
 #endif
-#if VDVR_CUBIC
+#if VDVR_TAPS == 6
+#define ADD(sum, i, c, r)                          \
+  {                                                \
+    __global const float* q = plane + LANE(at, i); \
+    INTO(sum, LANE(w0, i), q)                      \
+    INTO(sum, LANE(w1, i), q + 16)                 \
+    INTO(sum, LANE(w2, i), q + 32)                 \
+    INTO(sum, LANE(w3, i), q + 48)                 \
+    INTO(sum, LANE(w4, i), q + 64)                 \
+    INTO(sum, LANE(w5, i), q + 80)                 \
+  }
+#elif VDVR_TAPS == 4
 #define ADD(sum, i, c, r)                          \
   {                                                \
     __global const float* q = plane + LANE(at, i); \
@@ -133,8 +145,19 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
     const TILE s = fma((TILE)(step.x), tile_x, fma((TILE)(step.y), tile_y, (TILE)(step.z)));
     // Truncated, and one less where that is above: CPUs do it faster than floor.
     const ITILE cut = TO_ITILE(s), below = cut + IS_LESS(s, TO_TILE(cut));
-    const TILE f = s - TO_TILE(below), g = 1.0f - f;
-#if VDVR_CUBIC
+    const TILE f = s - TO_TILE(below);
+#if VDVR_TAPS != 6
+    const TILE g = 1.0f - f;
+#endif
+#if VDVR_TAPS == 6
+    const TILE m = f - 0.5f, square = m * m;
+    const TILE even_a = VDVR_SIX_EVEN_A(square), odd_a = m * VDVR_SIX_ODD_A(square),
+               even_b = VDVR_SIX_EVEN_B(square), odd_b = m * VDVR_SIX_ODD_B(square),
+               even_c = VDVR_SIX_EVEN_C(square), odd_c = m * VDVR_SIX_ODD_C(square);
+    const TILE w0 = even_a + odd_a, w1 = even_b + odd_b, w2 = even_c + odd_c, w3 = even_c - odd_c,
+               w4 = even_b - odd_b, w5 = even_a - odd_a;
+    const ITILE at = (clamp((int)step.w + below, (ITILE)2, (ITILE)(columns - 4)) - 2) * 16;
+#elif VDVR_TAPS == 4
     // Lagrange weights on the nodes -1, 0, 1, 2.
     const TILE h = 2.0f - f, e = 1.0f + f, outer = f * g * (-1.0f / 6.0f), inner = e * h * 0.5f;
     const TILE w0 = outer * h, w1 = inner * g, w2 = inner * f, w3 = outer * e;
@@ -151,6 +174,6 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
     }
   }
   FOR_TILE(TOTAL)
-  __global float* target = out + (((size_t)block * ny + y) * nx + x) * out_stride + z;
+  __global float* target = out + (((size_t)block * ny + y) * nx + x) * out_stride + shape.out_row + z;
   FOR_TILE(PUT)
 }

@@ -285,10 +285,8 @@ int bench_bounds(Arguments& args) {
   line["gold"] = {
       {"bound", t.gold_bound}, {"error", t.gold_error}, {"ratio", ratio(t.gold_bound, t.gold_error)}};
   line["projection"] = {{"error", t.projection_error},
-                        {"node_wise", t.projection_nodes},
-                        {"node_wise_ratio", ratio(t.projection_nodes, t.projection_error)},
-                        {"dilated", t.projection_cells},
-                        {"dilated_ratio", ratio(t.projection_cells, t.projection_error)}};
+                        {"bound", t.projection_bound},
+                        {"ratio", ratio(t.projection_bound, t.projection_error)}};
   line["arithmetic"] = t.arithmetic;
   print_line(line);
   return 0;
