@@ -12,9 +12,9 @@ namespace vdvr {
 /// holds for the weights as rounded to fp32, evaluated exactly. Evaluated in fp32, a value errs by
 /// (taps / 2 + 1) u norm times the largest |f| more.
 struct GoldFilter {
-  int rate = 1;              // positions to a node, phase 0 included
-  int taps = 2;              // even
-  double band = 0;           // radians a node, at most pi / 2
+  int rate = 1;                // positions to a node, phase 0 included
+  int taps = 2;                // even
+  double band = 0;             // radians a node, at most pi / 2
   std::vector<float> weights;  // [phase][taps]
   /// E: largest error of a wave |kappa| <= band, of its amplitude.
   double error = 0;
@@ -31,11 +31,11 @@ struct GoldFilter {
 };
 
 /// Nearly minimax over the band (iteratively reweighted least squares), in double precision, then rounded.
-/// The weights add to 1 but for `error`. A narrow band needs fewer taps than it is given: of all weights
-/// that are as good, those of the smallest sum of squares are taken. `rate` 1 is a copy: error and sup 0.
-/// Throws InputError unless rate is 1, 2, 4, 8, 16 or 32, 0 < band <= pi / 2, and taps is even, 2 .. 32 (a
-/// single tap could not be mirrored; two are about linear interpolation). Cost: about 1 ms a phase with 16
-/// taps.
+/// The weights add to 1 but for `error`. A band that fewer taps would do is widened to what these do with
+/// 1e-8, before rounding: then `error` is that of the rounding, some 3e-8, and fewer taps have a smaller
+/// norm. `rate` 1 is a copy: error and sup 0. Throws InputError unless rate is 1, 2, 4, 8, 16 or 32, 0 < band
+/// <= pi / 2, and taps is even, 2 .. 32 (a single tap could not be mirrored; two are about linear
+/// interpolation). Cost: about 1 ms a phase with 16 taps.
 GoldFilter design_gold_filter(int rate, double band, int taps = 16);
 
 /// At least the error of the wave kappa, of its amplitude, at any phase; |kappa| <= filter.band.

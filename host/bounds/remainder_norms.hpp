@@ -20,10 +20,11 @@ struct RemainderNorms {
   double value_sup = 0, second_sup = 0, fourth_sup = 0;
 };
 
-/// For every position: designed at 33 to 65 in [0, 1/2], the taps interpolated linearly between them. Least sums of
-/// magnitudes with an error of `eta` (log barrier); `eta` of the result is what was reached, at most the one
-/// asked for unless `taps` cannot, then a little above the least they can. Throws InputError unless 0 < band
-/// <= pi / 2, taps is even, 4 .. 32, and 1e-6 <= eta <= .1. Cost: some tenths of a second.
+/// For every position: designed at 33 to 65 in [0, 1/2], the taps interpolated linearly between them. Least
+/// sums of magnitudes with an error of `eta` (log barrier); `eta` of the result is what was reached, at most
+/// the one asked for unless `taps` cannot, then a little above the least they can. Throws InputError unless 0
+/// < band
+/// <= pi / 2, taps is even, 4 .. 32, and 1e-5 <= eta <= .1. Cost: some tenths of a second.
 RemainderNorms remainder_norms(double band, int taps = 16, double eta = 1e-4);
 
 // At every point x, with the maxima over all nodes of the stencils,
