@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "host/gold/kept_gold.hpp"
-#include "host/gold/remainder_norms.hpp"
+#include "host/bounds/remainder_norms.hpp"
 
 namespace vdvr {
 
