@@ -157,7 +157,7 @@ double symbol_error(const NodeFunctional& functional, double kappa) {
 }
 
 double largest_symbol_error(const NodeFunctional& functional, double band) {
-  return largest_derivatives(functional, 0, band, 256)[0];
+  return largest_derivatives(functional, 0, band, 512)[0];
 }
 
 // A narrow fall is the better where e grows beyond the band, a wide one where it does not.

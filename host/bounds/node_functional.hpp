@@ -21,7 +21,7 @@ struct NodeFunctional {
 double symbol_error(const NodeFunctional& functional, double kappa);
 
 /// At least |e| on |kappa| <= band: the largest on a grid of frequencies, and what derivatives of e allow
-/// between them. Cost: some 5,000 operations a tap.
+/// between them. Cost: some 20,000 operations a tap.
 double largest_symbol_error(const NodeFunctional& functional, double band);
 
 /// A c with |error| <= c sup |f| for every bounded f of frequencies |kappa| <= band, however many: the sum of

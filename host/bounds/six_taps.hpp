@@ -23,7 +23,7 @@ struct SixTaps {
   [[nodiscard]] double error_at(double w) const;
 };
 
-/// Computed at the first call (some ms), then kept.
+/// Computed at the first call (some 50 ms), then kept.
 const SixTaps& six_tap_facts();
 
 }  // namespace vdvr

@@ -20,8 +20,8 @@ struct TapTask {
 /// of frequencies. Cost: about 2 ms for 16 taps, less if something is enough.
 std::vector<double> least_error_taps(const TapTask& task, double enough = 0);
 
-/// Least sum |h_n| with |r| <= eta on a grid of frequencies, from `start`, whose |r| is below eta; by
-/// Newton's method on a logarithmic barrier. Cost: about 1 ms for 16 taps.
+/// Least sum |h_n|, to .01, with |r| <= eta on a grid of frequencies, from `start`, whose |r| is below eta;
+/// by Newton's method on a logarithmic barrier. Cost: about 1 ms for 16 taps.
 std::vector<double> least_norm_taps(const TapTask& task, double eta, const std::vector<double>& start);
 
 /// At least |r| of taps on the whole band: the largest on a grid, and what its second derivative allows

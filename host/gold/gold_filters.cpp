@@ -62,7 +62,8 @@ double difference_norm(const GoldFilter& filter, std::span<const double> differe
       for (int i = 0; i < filter.taps; ++i)
         sum[static_cast<std::size_t>(place / filter.rate + i)] +=
             difference[static_cast<std::size_t>(k + reach)] *
-            filter.weights[static_cast<std::size_t>(place % filter.rate * filter.taps + i)];
+            static_cast<double>(
+                filter.weights[static_cast<std::size_t>(place % filter.rate * filter.taps + i)]);
     }
     double norm = 0;
     for (const double s : sum) norm += std::abs(s);

@@ -151,9 +151,9 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
 #endif
 #if VDVR_TAPS == 6
     const TILE m = f - 0.5f, square = m * m;
-    const TILE even_a = VDVR_SIX_EVEN_A(square), odd_a = m * VDVR_SIX_ODD_A(square),
-               even_b = VDVR_SIX_EVEN_B(square), odd_b = m * VDVR_SIX_ODD_B(square),
-               even_c = VDVR_SIX_EVEN_C(square), odd_c = m * VDVR_SIX_ODD_C(square);
+    const TILE even_a = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_A), odd_a = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_A),
+               even_b = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_B), odd_b = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_B),
+               even_c = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_C), odd_c = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_C);
     const TILE w0 = even_a + odd_a, w1 = even_b + odd_b, w2 = even_c + odd_c, w3 = even_c - odd_c,
                w4 = even_b - odd_b, w5 = even_a - odd_a;
     const ITILE at = (clamp((int)step.w + below, (ITILE)2, (ITILE)(columns - 4)) - 2) * 16;

@@ -95,7 +95,7 @@ BOOST_AUTO_TEST_CASE(the_flattest_functions_stay_below_the_sup_constant_and_come
       BOOST_TEST_MESSAGE("band " << band << ", " << taps << " taps: " << reached << " of " << filter.sup);
       BOOST_TEST(reached <= filter.sup);
       BOOST_TEST(reached >= filter.sup / 3);
-      BOOST_TEST(reached > filter.error);
+      if (band > 1) BOOST_TEST(reached > filter.error);  // so E alone would be no bound by sups
     }
 }
 
@@ -213,9 +213,13 @@ BOOST_AUTO_TEST_CASE(the_bounds_of_a_printed_filter_are_those_of_the_text) {
                         -0.03029087F,     0.0735253766F,   -0.17460382F,    0.623059452F};
   NodeFunctional f{{half.begin(), half.end()}, -7.5, 0};
   f.taps.insert(f.taps.end(), half.rbegin(), half.rend());
-  const double error = largest_symbol_error(f, pi / 2);
+  double error = 0;
+  for (int i = 0; i <= 4000; ++i) error = std::max(error, wave_error(f.taps, f.first, 0, pi / 2 * i / 4000));
+  BOOST_TEST_MESSAGE(error << " " << largest_symbol_error(f, pi / 2));
   BOOST_TEST((error > 3.45e-7 && error < 3.55e-7));  // printed: 3.5e-7
-  BOOST_TEST(sup_constant(f, pi / 2) < 3.15e-6);     // printed, with another cut: 3.1e-6
+  BOOST_TEST(largest_symbol_error(f, pi / 2) >= error);
+  BOOST_TEST(largest_symbol_error(f, pi / 2) <= 1.02 * error);
+  BOOST_TEST(sup_constant(f, pi / 2) < 3.15e-6);  // printed, with another cut: 3.1e-6
 }
 
 BOOST_AUTO_TEST_CASE(filters_that_cannot_be_are_refused) {

@@ -59,20 +59,18 @@ BOOST_AUTO_TEST_CASE(the_relative_error_of_taps_is_that_of_their_worst_wave) {
       const std::vector<double> h = least_norm_taps(task, 1e-3, least_error_taps(task)),
                                 taps = on_nodes(h, order);
       double reached = 0;
-      for (int s = 1; s <= 3000; ++s) {
+      for (int s = 150; s <= 3000; ++s) {  // below, the quotient is of two numbers that rounding makes
         const double kappa = task.band * s / 3000;
         reached = std::max(
             reached, wave_error(taps, 1 - 12 / 2 - order / 2 - place, order, kappa) / std::pow(kappa, order));
       }
       const double error = relative_error(task, h);
-      // Near kappa = 0 the quotient of two small numbers is rounded the most: kappa^4 = 7.5e-14 of a sum
-      // of 16. It is not largest there, but may be above the rest by its rounding.
-      BOOST_TEST(reached <= error * (1 + 1e-3));
+      BOOST_TEST(reached <= error);
       BOOST_TEST(reached >= 0.9 * error);
       double norm = 0, start = 0;
       for (const double x : h) norm += std::abs(x);
       for (const double x : least_error_taps(task)) start += std::abs(x);
-      BOOST_TEST(norm <= start);
+      BOOST_TEST(norm <= start + 0.01);  // what least_norm_taps is content with
     }
 }
 

@@ -3,6 +3,7 @@
 #include "host/bounds/six_taps.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <numbers>
@@ -84,15 +85,16 @@ BOOST_AUTO_TEST_CASE(weights_in_fp32_err_by_their_rounding_and_mirror_each_other
     const float f = s % 2 == 0 ? static_cast<float>(s) / 4096 : std::sin(static_cast<float>(s)) * 0.5F + 0.5F;
     const float g = f - 0.5F, square = g * g;
     const auto exact = six_taps(f), mirrored = six_taps(1 - static_cast<double>(f));
-#define VDVR_PAIR(n)                                                                                      \
-  {                                                                                                       \
-    VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_##n) + g *VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_##n),    \
-        VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_##n) - g *VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_##n) \
-  }
-    const float pairs[3][2] = {VDVR_PAIR(A), VDVR_PAIR(B), VDVR_PAIR(C)};
+    const std::array even{VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_A),
+                          VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_B),
+                          VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_C)};
+    const std::array odd{VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_A),
+                         VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_B),
+                         VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_C)};
     double error = 0;
     for (std::size_t n = 0; n < 3; ++n) {
-      error += std::abs(pairs[n][0] - exact[n]) + std::abs(pairs[n][1] - exact[5 - n]);
+      const float left = even[n] + g * odd[n], right = even[n] - g * odd[n];
+      error += std::abs(double{left} - exact[n]) + std::abs(double{right} - exact[5 - n]);
       BOOST_TEST(std::abs(exact[n] - mirrored[5 - n]) <= tolerance::fp64_sum(20, 2));
     }
     BOOST_TEST(error <= six_tap_facts().rounding);
