@@ -51,8 +51,8 @@ std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int 
 
 }  // namespace
 
-// A term is rounded within its run, the sum at its end, and the m roundings that were kept are summed with m u of
-// themselves.
+// A term is rounded within its run, the sum at its end, and the m roundings that were kept are summed with m
+// u of themselves.
 double product_error(std::int64_t n, int run) {
   const double runs = std::ceil(static_cast<double>(n) / run);
   return run + 2 + 1.01 * runs * runs * unit_roundoff;
@@ -167,15 +167,19 @@ struct Weights {
 
 Weights weights_of(Interpolation interpolation) {
   switch (interpolation) {
-    case Interpolation::linear: return {2, 1, 1, 0, 0};
-    case Interpolation::cubic: return {4, 1.25, 4.0 / 3, 0, 0};
-    case Interpolation::six_taps: break;
+    case Interpolation::linear:
+      return {2, 1, 1, 0, 0};
+    case Interpolation::cubic:
+      return {4, 1.25, 4.0 / 3, 0, 0};
+    case Interpolation::six_taps:
+      break;
   }
   const SixTaps& six = six_tap_facts();
   return {6, six.norm, six.slope, six.slope_sum, six.rounding};
 }
 
-double interpolation_error(const ParallelGeometry& g, const FieldSups& sups, int rate, Interpolation interpolation) {
+double interpolation_error(const ParallelGeometry& g, const FieldSups& sups, int rate,
+                           Interpolation interpolation) {
   const double step = g.pitch_u / rate;
   if (interpolation == Interpolation::linear) return step * step / 8 * sups.second_u;
   if (interpolation == Interpolation::cubic)
@@ -186,7 +190,8 @@ double interpolation_error(const ParallelGeometry& g, const FieldSups& sups, int
 }  // namespace
 
 ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
-                         const UpsampledColumns& columns, const ColumnBlocks& blocks, Interpolation interpolation) {
+                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
+                         Interpolation interpolation) {
   const ParallelGeometry& g = scan.geometry;
   const double gain_u = gain_anywhere(upsampler, columns);
   double samples = 0;
@@ -197,13 +202,20 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   const double largest = std::min(gain_u * samples, sups.value);
   ChainErrors out;
   out.ramp = filter_error_bound(upsampler, scan, columns);
-  out.columns = w.gain * unit_roundoff * (product_error(g.columns, column_run) + 2) * gain_u * samples;
-  out.summation = unit_roundoff * (w.taps * run + std::ceil(views / run) + 8) * w.gain * largest + w.rounding * largest;
+  out.columns = w.gain * unit_roundoff * (product_error(g.columns, upsampler.run()) + 2) * gain_u * samples;
+  // Six taps: in compensated runs, and their own roundings known; else a rounding for each run, and eight for
+  // weights.
+  const double terms = interpolation == Interpolation::six_taps
+                           ? product_error(6 * g.views(), to_int(std::llround(w.taps * run)))
+                           : w.taps * run + std::ceil(views / run) + 8;
+  out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
-  // A wrong position moves along the interpolant, and where its intervals meet may jump by twice what it errs.
+  // A wrong position moves along the interpolant, and where its intervals meet may jump by twice what it
+  // errs.
   const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
   const double moved = position_error(g, columns, blocks);
-  out.position = moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) + 2 * out.interpolation;
+  out.position =
+      moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) + 2 * out.interpolation;
   out.underflow = views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
   return out;
 }
@@ -225,9 +237,9 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
   const double runs =
-                   std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(interpolation)));
+      std::ceil(static_cast<double>(g.views()) / static_cast<double>(view_run(interpolation)));
   const double summation = unit_roundoff *
-                           (w.taps * static_cast<double>(view_run(interpolation)) + runs + 8) *
+                               (w.taps * static_cast<double>(view_run(interpolation)) + runs + 8) *
                                weight_gain * sups.value +
                            w.rounding * sups.value;
   // A wrong position moves along the interpolant, whose slope is at most 4/3 of the signal's (cubic); that is

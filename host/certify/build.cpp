@@ -352,7 +352,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   Upsampler upsampler(state, filtered);
   watch.lap("filter");
   const FieldSups sups = field_sups(state, upsampler, filtered);
-  GoldRates gold(state, filtered, upsampler, sups, gold_settings(plan, options, base.lattice));
+  GoldRates gold(state, filtered, sups, gold_settings(plan, options, base.lattice));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
   const SamplerProbe probe = probe_sampler(device);

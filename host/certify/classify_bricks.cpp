@@ -52,13 +52,13 @@ GoldSettings with_coarse(GoldSettings settings) {
 
 }  // namespace
 
-GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                     const FieldSups& sups, GoldSettings settings, std::shared_ptr<GoldSource> source) {
+GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                     GoldSettings settings, std::shared_ptr<GoldSource> source) {
   settings = with_coarse(settings);
-  fine_.emplace(state, scan, upsampler, sups, settings, std::move(source));
+  fine_.emplace(state, scan, sups, settings, std::move(source));
   if (settings.coarse_rate == 0) return;
   settings.rate = std::exchange(settings.coarse_rate, 0);
-  coarse_.emplace(state, scan, upsampler, sups, settings, fine_->source());
+  coarse_.emplace(state, scan, sups, settings, fine_->source());
 }
 
 Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {

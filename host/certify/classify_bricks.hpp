@@ -21,8 +21,8 @@ namespace vdvr {
 /// within the tolerance by the coarse test is so by the theorem of that rate, for an eighth of the work.
 class GoldRates {
  public:
-  GoldRates(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
-            GoldSettings settings, std::shared_ptr<GoldSource> source = nullptr);
+  GoldRates(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, GoldSettings settings,
+            std::shared_ptr<GoldSource> source = nullptr);
   [[nodiscard]] GoldStream& fine() { return *fine_; }
   [[nodiscard]] const GoldStream& fine() const { return *fine_; }
   /// None where rate < 4, where slack does not count or where a window is given.
@@ -108,7 +108,8 @@ class ClassifyBricks {
   void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
-  static Bytes record(const std::vector<Levels>& levels, const Tiles& tiles, const std::vector<float>& samples);
+  static Bytes record(const std::vector<Levels>& levels, const Tiles& tiles,
+                      const std::vector<float>& samples);
   static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
   void take(const Levels& levels);
   static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);

@@ -20,7 +20,7 @@ constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
 
 // What T may be in every brick that may hold a covered node; negative elsewhere.
 std::vector<float> brick_bounds(opencl::State& state, GoldStream& stream, const Volume& base,
-                         const Progress& progress) {
+                                const Progress& progress) {
   const auto near = stream.bricks_near_coverage();
   const DeviceField field(state, as_mixed(base, granularity));
   const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
@@ -111,8 +111,7 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
   Upsampler upsampler(state, filtered);
   const FieldSups sups = field_sups(state, upsampler, filtered);
   const auto stream_at = [&](const Rates& r) {
-    return GoldStream(state, filtered, upsampler, sups,
-                      {grid, granularity, r.gold, r.upsampling, r.interpolation, {}});
+    return GoldStream(state, filtered, sups, {grid, granularity, r.gold, r.upsampling, r.interpolation, {}});
   };
   const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, Interpolation::cubic, {});
   GoldStream sharp = stream_at({16, Interpolation::six_taps, rates.gold}), given = stream_at(rates),
@@ -139,8 +138,7 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
 
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const std::int64_t id = chosen[i];
-    const BrickGold fine = brick_gold(truth, id, t.size()),
-                    exact = brick_gold(sharp, id, t.size()),
+    const BrickGold fine = brick_gold(truth, id, t.size()), exact = brick_gold(sharp, id, t.size()),
                     computed = brick_gold(given, id, t.size());
     out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
     for (std::int64_t z = 0; z < computed.side[2]; ++z)
@@ -164,7 +162,8 @@ Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Gri
                             const FieldOptions& field, const Rates& rates, const Progress& progress) {
   const Units units = units_of(scan);
   Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, rates, progress);
-  for (double* value : {&t.gold_bound, &t.gold_error, &t.projection_bound, &t.projection_error, &t.arithmetic})
+  for (double* value :
+       {&t.gold_bound, &t.gold_error, &t.projection_bound, &t.projection_error, &t.arithmetic})
     *value = to_world(*value, units);
   return t;
 }

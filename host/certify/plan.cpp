@@ -37,9 +37,11 @@ constexpr double share = 0.5, patient_share = 0.65;
 // The same for P alone: a finer cubic interpolation costs memory only.
 constexpr double linear_share = 0.1, cubic_share = 0.03;
 
-// Cheapest first: gold costs eight times per doubling. Six taps need columns at 8x; where fewer are asked for, four.
+// Cheapest first: gold costs eight times per doubling. Six taps need columns at 8x; where fewer are asked
+// for, four.
 std::vector<Rates> candidates(const RateOptions& wanted) {
-  const auto interpolation = wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;
+  const auto interpolation =
+      wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;
   std::vector<Rates> all;
   for (const int gold : {8, 16, 32})
     for (const int upsampling : {8, 16, 32})
@@ -52,7 +54,8 @@ std::vector<Rates> candidates(const RateOptions& wanted) {
   for (const Rates& r : all) {
     const bool same = std::find(out.begin(), out.end(), r) != out.end();
     // Six taps are as good at 8x as at any rate above.
-    const bool finer = r.interpolation == Interpolation::six_taps && r.upsampling > wanted.upsampling.value_or(8);
+    const bool finer =
+        r.interpolation == Interpolation::six_taps && r.upsampling > wanted.upsampling.value_or(8);
     if (!same && !finer) out.push_back(r);
   }
   return out;
@@ -60,7 +63,8 @@ std::vector<Rates> candidates(const RateOptions& wanted) {
 
 void check_rates(const RateOptions& rates) {
   if (rates.interpolation == Interpolation::six_taps && rates.upsampling && *rates.upsampling < 8)
-    throw InputError(fmt::format("`u_filter` six-taps needs an `upsampling` of at least 8, not {}", *rates.upsampling));
+    throw InputError(
+        fmt::format("`u_filter` six-taps needs an `upsampling` of at least 8, not {}", *rates.upsampling));
   const auto power = [](int n, int low) {
     return n >= low && n <= 64 && std::has_single_bit(static_cast<unsigned>(n));
   };
@@ -145,8 +149,8 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
   return selected;
 }
 
-// Whether the grid keeps enough of the tolerance. Better interpolation in u costs little: what it leaves must not cost
-// much of the tolerance, or the volume pays for it.
+// Whether the grid keeps enough of the tolerance. Better interpolation in u costs little: what it leaves must
+// not cost much of the tolerance, or the volume pays for it.
 bool fits(const Rates& r, const Trial& t, double epsilon) {
   if (2.5 * t.projection > (r.interpolation == Interpolation::linear ? linear_share : cubic_share) * epsilon)
     return false;
@@ -184,7 +188,8 @@ Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, doubl
 }
 
 void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t) {
-  bounds.push_back({"projection", fmt::format("sups, {} in u, 16 taps between kept gold", text_of(r.interpolation)),
+  bounds.push_back({"projection",
+                    fmt::format("sups, {} in u, 16 taps between kept gold", text_of(r.interpolation)),
                     r.upsampling, t.projection, true});
   bounds.push_back({"gold",
                     fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling,
@@ -232,11 +237,11 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
 
 // The largest |F| that gold shows, between base samples too: what the paper takes its thresholds of. Cost: a
 // pass of gold.
-double largest_of_gold(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
-                       const FieldSups& sups, const Grid& grid, const Rates& r) {
+double largest_of_gold(opencl::State& state, const FilteredScan& filtered, const FieldSups& sups,
+                       const Grid& grid, const Rates& r) {
   GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.interpolation};
   settings.base_only = true;
-  GoldStream stream(state, filtered, upsampler, sups, settings);
+  GoldStream stream(state, filtered, sups, settings);
   float largest = 0;
   stream.run(
       stream.bricks_near_coverage(),
@@ -286,7 +291,7 @@ class Planner {
     sups_ = field_sups(state_, *upsampler_, filtered_);
     set_epsilon(plan_, tolerance,
                 plan_.settings.comparison.epsilon_of_max
-                    ? largest_of_gold(state_, filtered_, *upsampler_, sups_, plan_.grid, all.front())
+                    ? largest_of_gold(state_, filtered_, sups_, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
     plan_.bounds = global_bounds(state_, filtered_, sups_, plan_.base, plan_.settings.foresee);
@@ -327,14 +332,15 @@ class Planner {
 
   // Rates that differ in gold alone share what they read.
   std::shared_ptr<GoldSource> source_at(const Rates& r) {
-    if (!source_ || source_rates_.upsampling != r.upsampling || source_rates_.interpolation != r.interpolation)
-      source_ = std::make_shared<GoldSource>(state_, filtered_, *upsampler_, sups_, settings_at(r));
+    if (!source_ || source_rates_.upsampling != r.upsampling ||
+        source_rates_.interpolation != r.interpolation)
+      source_ = std::make_shared<GoldSource>(state_, filtered_, sups_, settings_at(r));
     source_rates_ = r;
     return source_;
   }
 
   Trial try_out(const Rates& r) {
-    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(r), source_at(r));
+    GoldRates gold(state_, filtered_, sups_, settings_at(r), source_at(r));
     const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs);
     add_trial_bounds(plan_.bounds, r, t);
     return t;
@@ -399,14 +405,14 @@ class Planner {
     if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
     preparation_ += seconds_of([&] {
       plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
-      fit_base_samples(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), plan_.fitted, {},
+      fit_base_samples(state_, filtered_, sups_, settings_at(plan_.rates), plan_.fitted, {},
                        source_at(plan_.rates));
     });
   }
 
   // Storage, memory and time.
   void foresee(const Trial& t) {
-    GoldRates gold(state_, filtered_, *upsampler_, sups_, settings_at(plan_.rates), source_at(plan_.rates));
+    GoldRates gold(state_, filtered_, sups_, settings_at(plan_.rates), source_at(plan_.rates));
     const Foreseen foreseen =
         foresee_build(state_, gold, plan_.base,
                       plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,

@@ -21,13 +21,13 @@ struct ColumnBlocks {
   std::vector<std::array<std::int32_t, 2>> wanted{};
   /// Of the slab's rows, a multiple of 16 first; -1: all.
   std::int64_t first_row = 0, rows = -1;
-  /// Floats from one column of `out` to the next, and where in a column the first row goes, a multiple of 16; 0:
-  /// column_stride(rows).
+  /// Floats from one column of `out` to the next, and where in a column the first row goes, a multiple of 16;
+  /// 0: column_stride(rows).
   std::int64_t out_stride = 0, out_row = 0;
 };
 
-/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). Enqueues; does not
-/// wait. Cost: blocks * ny * nx * z * views updates.
+/// float out[block][y][x][column_stride(rows)] = sum over the slab's views of q at t(x, y). Enqueues; does
+/// not wait. Cost: blocks * ny * nx * z * views updates.
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
                   const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out);
 
@@ -36,10 +36,10 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                   const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out,
                   const ColumnTuning& tuning);
 
-/// Views that are summed before their sum is added to the others': 64 multiply-adds, or 48 where what follows multiplies
-/// roundings.
+/// Views that are summed before their sum is added to the others': 64 multiply-adds. With six taps, whose
+/// roundings what follows multiplies, 12, and what the additions round off is summed beside them.
 inline std::int64_t view_run(Interpolation interpolation) {
-  return interpolation == Interpolation::six_taps ? 8 : interpolation == Interpolation::cubic ? 16 : 32;
+  return interpolation == Interpolation::six_taps ? 2 : interpolation == Interpolation::cubic ? 16 : 32;
 }
 
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not

@@ -259,7 +259,7 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
                      .terms = g.columns,
                      .z_padded = slab.rows_padded,
                      .batches = n,
-                     .run = column_run,
+                     .run = run_,
                      .out_first = count(first * columns.count * 16),
                      .out_batch = count(columns.count * 16),
                      .out_chunk = count(views * columns.count * 16),

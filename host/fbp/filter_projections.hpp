@@ -94,7 +94,10 @@ constexpr int row_run = 4, column_run = 16;
 /// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.
 class Upsampler {
  public:
-  Upsampler(opencl::State& state, const FilteredScan& scan) : state_(&state), scan_(&scan) {}
+  /// Products along columns in runs of `run` terms: the shorter, the slower and the more exact.
+  Upsampler(opencl::State& state, const FilteredScan& scan, int run = column_run)
+      : state_(&state), scan_(&scan), run_(run) {}
+  [[nodiscard]] int run() const { return run_; }
 
   /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0:
   /// the rows are multiples of 1 / row_lattice. Views [first_view, first_view + views). Cost: views * rows *
@@ -122,6 +125,7 @@ class Upsampler {
 
   opencl::State* state_;
   const FilteredScan* scan_;
+  int run_;
   std::map<std::tuple<int, std::int64_t, std::int64_t, int>, Matrix> matrices_;
 };
 

@@ -10,9 +10,10 @@ double gold_reach(const GoldSettings& settings) {
          2 * std::hypot(settings.grid.spacing[0], settings.grid.spacing[1]);
 }
 
-GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
                        const GoldSettings& settings)
-    : kept(state, scan, upsampler, sups, settings.grid, gold_reach(settings), settings.upsampling, settings.interpolation) {
+    : kept(state, scan, sups, settings.grid, gold_reach(settings), settings.upsampling,
+           settings.interpolation) {
   if (!settings.base_only) remainder.emplace(state, kept, scan, sups, settings.grid, settings.granularity);
 }
 

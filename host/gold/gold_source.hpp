@@ -1,5 +1,5 @@
-// What streams of gold of one scan and grid share: the kept nodes and what T leaves out, brick by brick. Called by
-// gold_stream.cpp.
+// What streams of gold of one scan and grid share: the kept nodes and what T leaves out, brick by brick.
+// Called by gold_stream.cpp.
 #pragma once
 
 #include "host/gold/brick_remainder.hpp"
@@ -10,15 +10,15 @@ namespace vdvr {
 
 struct GoldSource {
   /// All but the settings is referred to.
-  GoldSource(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+  GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
              const GoldSettings& settings);
 
   KeptGold kept;
   std::optional<BrickRemainder> remainder;  ///< none where only base samples are asked for
 };
 
-/// How far beyond the covered region nodes of gold are wanted, in world units: those that may be stored, and those around
-/// the cells that are tested.
+/// How far beyond the covered region nodes of gold are wanted, in world units: those that may be stored, and
+/// those around the cells that are tested.
 double gold_reach(const GoldSettings& settings);
 
 }  // namespace vdvr

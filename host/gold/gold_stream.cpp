@@ -42,11 +42,11 @@ class Stopwatch {
 
 }  // namespace
 
-GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                       const FieldSups& sups, const GoldSettings& settings, std::shared_ptr<GoldSource> source)
+GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                       const GoldSettings& settings, std::shared_ptr<GoldSource> source)
     : state_(state), settings_(settings), coverage_(scan.geometry), source_(std::move(source)) {
   const std::int64_t g = settings.granularity;
-  if (!source_) source_ = std::make_shared<GoldSource>(state, scan, upsampler, sups, settings);
+  if (!source_) source_ = std::make_shared<GoldSource>(state, scan, sups, settings);
   lattice_ = source_->kept.lattice(settings.grid, settings.rate);
   errors_ = source_->kept.errors(lattice_);
   // Second differences look one node beyond a block, fits further.
@@ -80,8 +80,9 @@ double GoldStream::samples(std::int64_t width_x, std::int64_t width_y, std::int6
 // Equal blocks together, layer by layer.
 std::vector<GoldStream::Work> GoldStream::partition(const std::vector<std::uint8_t>& selected) const {
   std::vector<Work> works;
-  for (const BrickBox& box : cover_bricks(Bricks(settings_.grid, settings_.granularity).along(), selected, block_bricks(),
-                                          [&](const Index3& n) { return samples(n[0], n[1], n[2]); })) {
+  for (const BrickBox& box :
+       cover_bricks(Bricks(settings_.grid, settings_.granularity).along(), selected, block_bricks(),
+                    [&](const Index3& n) { return samples(n[0], n[1], n[2]); })) {
     if (works.empty() || works.back().z != box.first[2] || works.back().size() != box.size)
       works.push_back({box.first[2], box.size[2], box.size[0], box.size[1], {}});
     works.back().first.push_back({box.first[0], box.first[1]});
@@ -298,21 +299,24 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     batch.margins_ = margins(columns);
     batch.margin_.write(batch.margins_);
     for (std::size_t b = 0; b < n; ++b)
-      source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block, batch.shape_.gold_stride);
+      source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block,
+                         batch.shape_.gold_stride);
     if (node_slack_)
-      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_, batch.below_);
+      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_,
+                     batch.below_);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
-      spent.samples += samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
+      spent.samples +=
+          samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
     tick(static_cast<double>(n));
   }
   spent.seconds += watch.lap();
   if (node_slack_) node_slack_->end();
 }
 
-void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                      const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
-                      const Progress& progress, std::shared_ptr<GoldSource> source) {
+void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                      GoldSettings settings, std::vector<float>& base, const Progress& progress,
+                      std::shared_ptr<GoldSource> source) {
   // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
   settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
@@ -320,7 +324,7 @@ void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler&
   settings.granularity = fitting_granularity(settings.granularity, settings.grid);
   settings.coarsening = {};
   settings.midrange = settings.base_only = true;
-  GoldStream stream(state, scan, upsampler, sups, settings, std::move(source));
+  GoldStream stream(state, scan, sups, settings, std::move(source));
   stream.run(
       stream.bricks_near_coverage(), [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
       GoldStream::For::samples);

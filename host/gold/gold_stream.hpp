@@ -48,7 +48,7 @@ class GoldBatch;  // gold_batch.hpp
 class GoldStream {
  public:
   /// `source`: of another stream of the same scan, grid and interpolation in u; none: its own.
-  GoldStream(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+  GoldStream(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
              const GoldSettings& settings, std::shared_ptr<GoldSource> source = nullptr);
   ~GoldStream();
 
@@ -122,8 +122,8 @@ class GoldStream {
   GoldErrors errors_;
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
-  For purpose_ = For::measuring;    // of this run
-  std::array<GoldSpent, 2> spent_;  // by purpose
+  For purpose_ = For::measuring;          // of this run
+  std::array<GoldSpent, 2> spent_;        // by purpose
   std::shared_ptr<GoldSource> source_;
   std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
@@ -131,8 +131,8 @@ class GoldStream {
 /// Base samples fitted to the trilinear filter where they are kept; elsewhere `base` stays. Gold at 2x their
 /// own rate serves: the error between base samples peaks near the middles of edges, faces and cells, and a
 /// fit to those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
-void fit_base_samples(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
-                      const FieldSups& sups, GoldSettings settings, std::vector<float>& base,
-                      const Progress& progress, std::shared_ptr<GoldSource> source = nullptr);
+void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                      GoldSettings settings, std::vector<float>& base, const Progress& progress,
+                      std::shared_ptr<GoldSource> source = nullptr);
 
 }  // namespace vdvr

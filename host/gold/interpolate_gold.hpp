@@ -28,12 +28,12 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
 class AlongZ {
  public:
   AlongZ(opencl::State& state, const HeightWeights& weights);
-  /// The part that `shape` names, whose terms and groups are set here. Enqueues. Cost: columns * groups * 16 *
-  /// terms multiply-adds; error: that of a product in runs of `run` terms.
-  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
-                  VdvrAlongZ shape) const;
+  /// The part that `shape` names, whose terms and groups are set here. Enqueues. Cost: columns * groups * 16
+  /// * terms multiply-adds; error: that of a product in runs of `run` terms.
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                  const opencl::DeviceArray<float>& out, VdvrAlongZ shape) const;
 
-  static constexpr int run = 16;
+  static constexpr int run = 8;
 
  private:
   opencl::DeviceArray<float> weights_;
@@ -44,13 +44,14 @@ class AlongZ {
 /// Inputs of `across` before and after the interval that it fills.
 constexpr std::int64_t taps_before = 7, taps_after = 8;
 
-/// Filters across z. `weights` float[phase - 1][16] as gold_filters.hpp has them; `phases` outputs an interval.
+/// Filters across z. `weights` float[phase - 1][16] as gold_filters.hpp has them; `phases` outputs an
+/// interval.
 class Across {
  public:
   Across(opencl::State& state, int phases, std::span<const float> weights);
   /// Enqueues. Cost: 16 multiply-adds an output; error: 17 roundings of sum |weight| |input|.
-  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
-                  const VdvrAcross& shape) const;
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                  const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const;
 
  private:
   int phases_ = 1;

@@ -25,9 +25,12 @@ constexpr double pi = std::numbers::pi;
 constexpr std::int64_t side = 32;
 // Bytes of the tiles that are made together, which share one allocation.
 constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
-// Rows of the detector from which gold's heights are made by way of heights at half a pixel: below, the product with
-// all rows is the cheaper.
+// Rows of the detector from which gold's heights are made by way of heights at half a pixel: below, the
+// product with all rows is the cheaper.
 constexpr std::int64_t few_rows = 32;
+
+// Terms of a run of the upsampled columns, whose errors what follows multiplies.
+constexpr int exact_run = 4;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
@@ -38,13 +41,32 @@ std::int64_t rate_of(double spacing, double pitch) {
   return rate;
 }
 
+// How much errors of rows by themselves can grow anywhere between them and beyond: the largest sum of
+// magnitudes at eighths of a row, and what a cosine series can rise to between these (Ehlich, Zeller).
+double row_gain(std::int64_t rows) {
+  if (rows == 1) return 1;
+  constexpr std::int64_t density = 8;
+  // By symmetry half of them will do; a product with a sign pattern is a series of `rows` terms.
+  std::vector<double> positions;
+  for (std::int64_t i = 0; i <= (density * rows + 1) / 2; ++i)
+    positions.push_back(-0.5 + static_cast<double>(i) / static_cast<double>(density));
+  const std::vector<double> matrix = resampling_matrix(rows, positions, 0, 1.0, 2 * density);
+  double largest = 0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    double sum = 0;
+    for (std::int64_t r = 0; r < rows; ++r) sum += std::abs(matrix[i * at(rows) + at(r)]);
+    largest = std::max(largest, sum);
+  }
+  return largest / std::cos(pi / (2.0 * density));
+}
+
 }  // namespace
 
-KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
-                   const Grid& grid, double reach, int upsampling, Interpolation interpolation)
+KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
+                   double reach, int upsampling, Interpolation interpolation)
     : state_(state),
       scan_(scan),
-      upsampler_(upsampler),
+      upsampler_(state, scan, exact_run),
       sups_(sups),
       grid_(grid),
       reach_(reach),
@@ -66,8 +88,8 @@ GoldLattice KeptGold::lattice(const Grid& grid, int rate) const {
   GoldLattice out;
   for (std::size_t a = 0; a < 3; ++a) {
     const auto coarser = std::llround(grid.spacing[a] / grid_.spacing[a]);
-    if (coarser < 1 || std::abs(grid.spacing[a] - static_cast<double>(coarser) * grid_.spacing[a]) >
-                           1e-9 * grid.spacing[a])
+    if (coarser < 1 ||
+        std::abs(grid.spacing[a] - static_cast<double>(coarser) * grid_.spacing[a]) > 1e-9 * grid.spacing[a])
       throw std::logic_error("KeptGold: a grid of other cells");
     const std::int64_t kept = rates_[a] * coarser;  // to a cell
     out.phases[a] = to_int(std::max<std::int64_t>(1, rate / kept));
@@ -86,7 +108,8 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
   const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
-  return filters_.emplace(key, design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch))).first->second;
+  return filters_.emplace(key, design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch)))
+      .first->second;
 }
 
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {
@@ -97,8 +120,8 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   // Second differences of what is not interpolated are those of nodes, each with an error of its own.
   const auto bend = [](const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; };
   const double S = sups_.value;
-  // Along z, what the rows hold makes a band-limited function, whose second differences are at most (h pi / pitch)^2 of
-  // its largest value (Bernstein).
+  // Along z, what the rows hold makes a band-limited function, whose second differences are at most (h pi /
+  // pitch)^2 of its largest value (Bernstein).
   const double hz = spacing_[2] * lattice.step[2] / lattice.phases[2];
   const double bend_z = g.rows > 1 ? std::min(4.0, std::pow(pi * hz / g.pitch_v, 2)) : 0.0;
   const double nodes = x.norm * y.norm;
@@ -107,15 +130,15 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   constexpr double curved_apart = 1.5;
 
   const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
-  const double gain_v = g.rows > 1 ? lebesgue_constant(g.rows) : 1.0;
+  const double gain_v = row_gain(g.rows);
   const double filters = ((1 + x.sup) * (1 + y.sup) * (1 + z.sup) - 1) * S;
   GoldErrors out;
   out.ramp = chain.ramp;
   out.interpolation = nodes * (1 + z.sup) * chain.interpolation + filters;
   out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
 
-  // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each height by
-  // itself, product and filter; of each node by itself, 17 roundings in either filter across z.
+  // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
+  // height by itself, product and filter; of each node by itself, 17 roundings in either filter across z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
   const double between = z.rate > 1 ? product_error(taps_before + taps_after + 9, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *
@@ -158,7 +181,8 @@ double KeptGold::margin_of(const TileAt& tile) const {
          half * std::hypot(spacing_[0], spacing_[1]);
 }
 
-std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const {
+std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
+                                                  const std::vector<GoldBox>& boxes) const {
   std::set<TileAt> out;
   for (const GoldBox& box : boxes) {
     const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
@@ -173,7 +197,8 @@ std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<Gol
   return static_cast<std::int64_t>(new_tiles(lattice, boxes).size());
 }
 
-void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress) {
+void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes,
+                       const Progress& progress) {
   const std::vector<TileAt> tiles = new_tiles(lattice, boxes);
   if (tiles.empty()) return;
   const auto start = std::chrono::steady_clock::now();
@@ -200,7 +225,8 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     rows = static_cast<std::int64_t>(opencl::round_up(count(rows / 2), 16));
   for (std::int64_t first = 0; first < g.rows; first += rows) {
     std::vector<double> heights;
-    for (std::int64_t r = first; r < std::min(g.rows, first + rows); ++r) heights.push_back(static_cast<double>(r));
+    for (std::int64_t r = first; r < std::min(g.rows, first + rows); ++r)
+      heights.push_back(static_cast<double>(r));
     const UpsampledSlab slab = upsampler_(columns_, heights);
     for (std::size_t page = first_page; page < pages_.size(); ++page) {
       const std::size_t begin = (page - first_page) * each, n = std::min(each, tiles.size() - begin);
@@ -209,9 +235,11 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
       blocks.out_stride = stride_;
       blocks.out_row = first;
       back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
-      report(progress, "gold", (static_cast<double>(first) + static_cast<double>(heights.size()) *
-                                static_cast<double>(page - first_page + 1) / static_cast<double>(pages_.size() - first_page)) /
-                                   static_cast<double>(g.rows));
+      report(progress, "gold",
+             (static_cast<double>(first) + static_cast<double>(heights.size()) *
+                                               static_cast<double>(page - first_page + 1) /
+                                               static_cast<double>(pages_.size() - first_page)) /
+                 static_cast<double>(g.rows));
     }
     state_.queue.finish();  // before the next rows are allocated
   }
@@ -219,15 +247,16 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
 }
 
-// By row of each tile the first and last node that is kept: the region is convex, so that all between them are.
+// By row of each tile the first and last node that is kept: the region is convex, so that all between them
+// are.
 std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& blocks) const {
   std::vector<std::array<std::int32_t, 2>> out;
   for (const auto& [x0, y0] : blocks.first)
     for (std::int64_t y = 0; y < side; ++y) {
       std::array<std::int32_t, 2> row{to_int(side), -1};
       for (std::int64_t x = 0; x < side; ++x)
-        if (coverage_.margin(x0 + static_cast<double>(x) * spacing_[0], y0 + static_cast<double>(y) * spacing_[1]) >=
-            -reach_) {
+        if (coverage_.margin(x0 + static_cast<double>(x) * spacing_[0],
+                             y0 + static_cast<double>(y) * spacing_[1]) >= -reach_) {
           row[0] = std::min(row[0], to_int(x));
           row[1] = to_int(x);
         }
@@ -251,7 +280,8 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
   h.step = lattice.step[2];
   const bool all_rows = g.rows <= few_rows || h.phases == 1;
   const Span s = span(lattice, 2, box);
-  const double first = all_rows ? static_cast<double>(h.first) * h.step / h.phases : static_cast<double>(s.low),
+  const double first =
+                   all_rows ? static_cast<double>(h.first) * h.step / h.phases : static_cast<double>(s.low),
                step = all_rows ? static_cast<double>(h.step) / h.phases : 1.0;
   const std::int64_t made = all_rows ? h.nodes : s.count;
   const std::vector<double> matrix = resampling_matrix(
@@ -263,7 +293,8 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
     const GoldFilter& f = filter_of(h.phases, 2);
     std::vector<double> between(at(h.nodes * made), 0.0);
     for (std::int64_t n = 0; n < h.nodes; ++n) {
-      const std::int64_t position = n + s.skipped, interval = position / h.phases, phase = position % h.phases;
+      const std::int64_t position = n + s.skipped, interval = position / h.phases,
+                         phase = position % h.phases;
       for (std::int64_t t = 0; t < f.taps; ++t)
         between[at(n * made + interval + t)] = static_cast<double>(f.weights[at(phase * f.taps + t)]);
     }
@@ -289,7 +320,9 @@ const Across& KeptGold::across_of(int phases, std::size_t axis) {
   if (const auto known = across_.find(key); known != across_.end()) return known->second;
   const GoldFilter& f = filter_of(phases, axis);
   return across_
-      .emplace(key, Across(state_, phases, std::span<const float>(f.weights).subspan(at(std::min(f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
+      .emplace(key, Across(state_, phases,
+                           std::span<const float>(f.weights).subspan(
+                               at(std::min(f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
       .first->second;
 }
 

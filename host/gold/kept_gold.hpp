@@ -1,6 +1,6 @@
-// Gold where it determines the field: at twice the detector's columns across z and at its rows along z, back-projected
-// once; gold at every other node is interpolated from there with a bound (docs/error-bounds.md, section 3). Called by
-// gold_stream.cpp, brick_remainder.cpp and plan.cpp.
+// Gold where it determines the field: at twice the detector's columns across z and at its rows along z,
+// back-projected once; gold at every other node is interpolated from there with a bound
+// (docs/error-bounds.md, section 3). Called by gold_stream.cpp, brick_remainder.cpp and plan.cpp.
 #pragma once
 
 #include <array>
@@ -26,7 +26,8 @@ struct GoldLattice {
   std::array<int, 3> phases{1, 1, 1}, step{1, 1, 1};
 };
 
-/// Bounds at the nodes of a lattice, in the units of the field. F^ is the field of the computed filtered samples.
+/// Bounds at the nodes of a lattice, in the units of the field. F^ is the field of the computed filtered
+/// samples.
 struct GoldErrors {
   double interpolation = 0;         ///< of a node of gold from F^, by six taps in u and by the filters
   double rounding = 0;              ///< alike, by fp32 from the upsampled columns on
@@ -42,9 +43,9 @@ struct GoldBox {
 
 class KeptGold {
  public:
-  /// Kept for nodes of a coverage margin of at least -`reach` (world units). All but the numbers is referred to. Rates of
-  /// the grid's own lattice follow from its spacing and the detector's pitch.
-  KeptGold(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups, const Grid& grid,
+  /// Kept for nodes of a coverage margin of at least -`reach` (world units). All but the numbers is referred
+  /// to. Rates of the grid's own lattice follow from its spacing and the detector's pitch.
+  KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
            double reach, int upsampling, Interpolation interpolation);
 
   /// Kept nodes to a cell of the grid, by axis: powers of two, so that their spacing is at most half a pixel.
@@ -55,14 +56,14 @@ class KeptGold {
   /// Cost: milliseconds for each new ratio.
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
 
-  /// Back-projects what `boxes` will read and is not kept yet. Throws ResourceError where memory does not suffice. Cost:
-  /// views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
+  /// Back-projects what `boxes` will read and is not kept yet. Throws ResourceError where memory does not
+  /// suffice. Cost: views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
   void prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress);
 
-  /// float out[y][x][stride] from `first` on: gold at the nodes of a box that was prepared; its z is padded to a
-  /// multiple of 16. Nodes beyond `reach` hold anything finite. Enqueues.
-  void fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out, std::uint64_t first,
-            std::int64_t stride);
+  /// float out[y][x][stride] from `first` on: gold at the nodes of a box that was prepared; its z is padded
+  /// to a multiple of 16. Nodes beyond `reach` hold anything finite. Enqueues.
+  void fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out,
+            std::uint64_t first, std::int64_t stride);
 
   /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
   [[nodiscard]] double seconds() const { return seconds_; }
@@ -81,7 +82,8 @@ class KeptGold {
     std::int64_t intervals = 0, skipped = 0;
   };
   [[nodiscard]] Span span(const GoldLattice& lattice, std::size_t axis, const GoldBox& box) const;
-  [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
+  [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice,
+                                              const std::vector<GoldBox>& boxes) const;
   [[nodiscard]] double margin_of(const TileAt& tile) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
@@ -94,7 +96,7 @@ class KeptGold {
 
   opencl::State& state_;
   const FilteredScan& scan_;
-  Upsampler& upsampler_;
+  Upsampler upsampler_;
   const FieldSups& sups_;
   Grid grid_;
   double reach_;

@@ -92,7 +92,7 @@ class Totals {
         volume_(v),
         stored_(c),
         field_(f.state, v),
-        gold_(f.state, f.scan, f.upsampler, f.sups, settings(v, c)),
+        gold_(f.state, f.scan, f.sups, settings(v, c)),
         same_device_(same_device) {}
 
   void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,
@@ -205,7 +205,8 @@ class Totals {
     if (!(value >= least * (1 - table_rounding)))
       out.push_back(fmt::format("the arithmetic term is {}, below {}", f_.world(value), f_.world(least)));
     if (same_device_ && !(value <= arithmetic * (1 + table_rounding)))
-      out.push_back(fmt::format("the arithmetic term is {}, above {}", f_.world(value), f_.world(arithmetic)));
+      out.push_back(
+          fmt::format("the arithmetic term is {}, above {}", f_.world(value), f_.world(arithmetic)));
   }
 
   void compare_largest(Differences& out, bool exhaustive) const {
@@ -221,8 +222,8 @@ class Totals {
   DeviceField field_;
   GoldRates gold_;
   bool same_device_;
-  double error_ = 0;       // largest seen on the gold that certifies
-  double most_ = 0;        // what measured_max can be
+  double error_ = 0;  // largest seen on the gold that certifies
+  double most_ = 0;   // what measured_max can be
 };
 
 // All but the scan, F and what is reported in `units`.

@@ -99,11 +99,34 @@
   }
 #endif
 // Named sums, not an array: compilers keep these in registers.
-#define ZERO(sum, i, c, r) VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f);
 #define CLEAR(sum, i, c, r) VEC sum##_low = (VEC)(0.0f), sum##_high = (VEC)(0.0f);
+#if VDVR_TAPS == 6
+// What adding a run rounds off is summed beside the totals (Knuth's TwoSum: additions alone).
+#define ZERO(sum, i, c, r)                                         \
+  VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f), \
+      sum##_low_rest = (VEC)(0.0f), sum##_high_rest = (VEC)(0.0f);
+#define ADD_RUN(total, rest, sum)                       \
+  {                                                     \
+    const VEC all = total + sum, part = all - total;    \
+    rest += (total - (all - part)) + (sum - part);      \
+    total = all;                                        \
+  }
+#if VDVR_VECTORS == 2
+#define TOTAL(sum, i, c, r)                           \
+  ADD_RUN(sum##_low_total, sum##_low_rest, sum##_low) \
+  ADD_RUN(sum##_high_total, sum##_high_rest, sum##_high)
+#else
+#define TOTAL(sum, i, c, r) ADD_RUN(sum##_low_total, sum##_low_rest, sum##_low)
+#endif
+#define CORRECT(sum, i, c, r)         \
+  sum##_low_total += sum##_low_rest;  \
+  sum##_high_total += sum##_high_rest;
+#else
+#define ZERO(sum, i, c, r) VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f);
 #define TOTAL(sum, i, c, r)     \
   sum##_low_total += sum##_low; \
   sum##_high_total += sum##_high;
+#endif
 #define AGAIN(sum, i, c, r) sum##_low = sum##_high = (VEC)(0.0f);
 #define PUT(sum, i, c, r)                                                               \
   if (x + c < nx && y + r < ny) {                                                       \
@@ -174,6 +197,9 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
     }
   }
   FOR_TILE(TOTAL)
+#if VDVR_TAPS == 6
+  FOR_TILE(CORRECT)
+#endif
   __global float* target = out + (((size_t)block * ny + y) * nx + x) * out_stride + shape.out_row + z;
   FOR_TILE(PUT)
 }

@@ -128,7 +128,7 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
                                {2, Interpolation::linear, 16}}) {
       Grid grid = grid_at(scan.data.geometry, scan.target, 0.8, rates.gold, Place::cell);
       grid.cells = {4, 4, 2};
-      GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
+      GoldStream stream(device().state(), chain.filtered, chain.sups,
                         {grid, 2, rates.gold, rates.upsampling, rates.interpolation, {}});
       const int top = rates.gold == 2 ? 1 : 2;
       const auto t = static_cast<std::uint8_t>(top);

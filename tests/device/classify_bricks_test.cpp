@@ -36,7 +36,7 @@ struct Case {
         state(attacks::device().state()),
         base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, Interpolation::cubic, {})),
         host(state),
-        gold(state, chain.filtered, chain.upsampler, chain.sups, settings_of(grid, rate, anisotropic)),
+        gold(state, chain.filtered, chain.sups, settings_of(grid, rate, anisotropic)),
         unrecorded(gold, nullptr),
         classify(state, unrecorded, bricks, host, {},
                  [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
@@ -282,12 +282,12 @@ BOOST_AUTO_TEST_CASE(arithmetic_is_that_of_the_gold_that_rounds_most) {
   attacks::Chain chain(scan);
   opencl::State& state = attacks::device().state();
   const GoldSettings settings = Case::settings_of(grid_around_axis({40, 40, 6}, 1.0), 8);
-  GoldRates gold(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  GoldRates gold(state, chain.filtered, chain.sups, settings);
   const GoldStream* coarse = gold.coarse();
   if (coarse == nullptr) throw std::runtime_error("no coarse gold");
   BOOST_TEST(coarse->arithmetic() > gold.fine().arithmetic());
   BOOST_TEST(gold.arithmetic() == coarse->arithmetic());
-  const GoldStream fine(state, chain.filtered, chain.upsampler, chain.sups, settings);
+  const GoldStream fine(state, chain.filtered, chain.sups, settings);
   BOOST_TEST(GoldRates::arithmetic(state, chain.filtered, chain.upsampler, chain.sups, fine) ==
              gold.arithmetic());
 }
@@ -298,7 +298,7 @@ BOOST_AUTO_TEST_CASE(comparison_without_slack_and_windows_take_the_fine_gold_alo
   GoldSettings settings = Case::settings_of(grid_around_axis({6, 6, 6}, 0.7), 8);
   opencl::State& state = attacks::device().state();
   const auto has_coarse = [&](const GoldSettings& s) {
-    return GoldRates(state, chain.filtered, chain.upsampler, chain.sups, s).coarse() != nullptr;
+    return GoldRates(state, chain.filtered, chain.sups, s).coarse() != nullptr;
   };
   BOOST_TEST(has_coarse(settings));
   GoldSettings grid_only = settings, window = settings, low = settings;

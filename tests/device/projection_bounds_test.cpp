@@ -104,7 +104,7 @@ struct BrickNodes {
 };
 std::vector<BrickNodes> stream_nodes(Chain& chain, const Grid& grid, int granularity, const Rates& rates,
                                      double& arithmetic) {
-  GoldStream stream(Chain::state(), chain.filtered, chain.upsampler, chain.sups,
+  GoldStream stream(Chain::state(), chain.filtered, chain.sups,
                     {grid, granularity, rates.gold, rates.upsampling, rates.interpolation, {}});
   arithmetic = stream.arithmetic();
   Index3 n{};

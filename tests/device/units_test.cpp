@@ -200,7 +200,7 @@ BOOST_AUTO_TEST_CASE(slack_that_is_no_number_is_infinite) {
   chain.sups.value = std::numeric_limits<double>::quiet_NaN();  // of which rounding is made
   const Grid grid = small_grid(scan, {4, 4, 4});
   const GoldSettings settings{grid, 2, 4, 8, Interpolation::cubic, {}};
-  GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups, settings);
+  GoldStream stream(device().state(), chain.filtered, chain.sups, settings);
   const Volume base =
       reconstruct_field(device().state(), chain.filtered, chain.upsampler, grid, 8, Interpolation::cubic, {});
   const DeviceField field(device().state(), as_mixed(base, 2));

@@ -90,7 +90,7 @@ struct GoldLattice {
 
 /// Streams the grid in bricks of one base cell, so that P is known per base cell.
 inline GoldLattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
-  GoldStream stream(device().state(), chain.filtered, chain.upsampler, chain.sups,
+  GoldStream stream(device().state(), chain.filtered, chain.sups,
                     {grid, 1, rates.gold, rates.upsampling, rates.interpolation, {}});
   GoldLattice out;
   out.grid = grid;
