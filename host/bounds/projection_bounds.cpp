@@ -84,17 +84,51 @@ std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int
   return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
 }
 
+namespace {
+
+// Where sups are sampled. A signal sampled L times denser than Nyquist rises above its samples by at most
+// 1 / cos(pi / (2 L)), per axis (Ehlich and Zeller 1964). A single row does not vary along v.
+struct DenseGrid {
+  static constexpr int density = 4;
+  explicit DenseGrid(const FilteredScan& scan) : columns(upsampled_columns(scan.geometry.columns, density, 0)) {
+    const std::int64_t V = scan.geometry.rows;
+    for (std::int64_t j = 0; j <= density * V; ++j) rows.push_back(-0.5 + static_cast<double>(j) / density);
+    const double of_axis = 1 / std::cos(pi / (2.0 * density));
+    rise = V > 1 ? of_axis * of_axis : of_axis;
+  }
+  UpsampledColumns columns;
+  std::vector<double> rows;
+  double rise = 1;
+};
+
+}  // namespace
+
+FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  FieldSups sups;
+  const DenseGrid dense(scan);
+  const std::int64_t chunk = view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
+  for (std::int64_t first = 0; first < g.views(); first += chunk)
+    for (const double m : view_sups(state,
+                                    upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first,
+                                              std::min(chunk, g.views() - first)),
+                                    0))
+      sups.value += dense.rise * m;
+  for (const double m : scan.view_max) sups.value += derivative_rounding(upsampler, scan, dense.columns, 0, m);
+  sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
+  if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
+  return sups;
+}
+
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
   const ParallelGeometry& g = scan.geometry;
-  constexpr int dense = 4;
-  // A signal sampled L times denser than Nyquist rises above its samples by at most 1 / cos(pi / (2 L)), per
-  // axis (Ehlich and Zeller 1964). A single row does not vary along v.
-  const double rise = 1 / std::cos(pi / (2.0 * dense)), rise_v = g.rows > 1 ? rise : 1.0;
-  const UpsampledColumns columns = upsampled_columns(g.columns, dense, 0),
-                         own = upsampled_columns(g.columns, 1, 0);
-  std::vector<double> rows, own_rows;
-  for (std::int64_t j = 0; j <= dense * g.rows; ++j) rows.push_back(-0.5 + static_cast<double>(j) / dense);
+  const DenseGrid grid(scan);
+  constexpr int dense = DenseGrid::density;
+  const UpsampledColumns &columns = grid.columns, own = upsampled_columns(g.columns, 1, 0);
+  const std::vector<double>& rows = grid.rows;
+  std::vector<double> own_rows;
   for (std::int64_t j = 0; j < g.rows; ++j) own_rows.push_back(static_cast<double>(j));
+  const double rise = grid.rise;
 
   FieldSups sups;
   const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
@@ -105,13 +139,13 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   };
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
-    sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
+    sups.value += rise * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
     for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
-      sups.view_second_u.push_back(rise * rise_v * m);
+      sups.view_second_u.push_back(rise * m);
     sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
     if (g.rows > 1) {
       for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
-        sups.view_second_v.push_back(rise * rise_v * m);
+        sups.view_second_v.push_back(rise * m);
       sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
     }
   }

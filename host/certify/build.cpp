@@ -351,7 +351,9 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
       filter_projections(state, scan, plan.field, progress, FilterMethod::automatic, Precision::fp64, units);
   Upsampler upsampler(state, filtered);
   watch.lap("filter");
-  const FieldSups sups = field_sups(state, upsampler, filtered);
+  // Six taps need values alone.
+  const FieldSups sups = plan.rates.interpolation == Interpolation::six_taps ? value_sups(state, upsampler, filtered)
+                                                                             : field_sups(state, upsampler, filtered);
   GoldRates gold(state, filtered, sups, gold_settings(plan, options, base.lattice));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");

@@ -26,7 +26,8 @@ opencl::Defines defines(opencl::State& state, int phases) {
 // Whole groups of the phases that a work-item makes together.
 std::vector<float> padded(int phases, std::span<const float> weights) {
   const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
-  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps), 0.0f);
+  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
+                         0.0f);
   std::copy(weights.begin(), weights.end(), out.begin());
   return out;
 }
@@ -78,14 +79,13 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
 }
 
 Across::Across(opencl::State& state, int phases, std::span<const float> weights)
-    : phases_(phases),
-      weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
+    : phases_(phases), weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
 
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
   const auto lanes = count(column_tuning(state.info).lanes);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "gold/interpolate", "across",
-                                                                       defines(state, phases_));
+                                                                        defines(state, phases_));
   kernel({{count(shape.z) / lanes, count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
          in.buffer(), weights_.buffer(), shape);
 }

@@ -27,13 +27,13 @@ constexpr std::size_t most_alone = 16;
 /// The scan filtered as build does, and what follows from that, in `units`.
 struct Filtered {
   Filtered(opencl::State& device, const ProjectionSet& projections, const Units& of_scan,
-           const FieldOptions& field, const Progress& progress)
+           const FieldOptions& field, Interpolation interpolation, const Progress& progress)
       : state(device),
         units(of_scan),
         scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
                                 Precision::fp64, units)),
         upsampler(device, scan) {
-    sups = field_sups(device, upsampler, scan);
+    sups = interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan) : field_sups(device, upsampler, scan);
   }
   Filtered(const Filtered&) = delete;
   Filtered& operator=(const Filtered&) = delete;
@@ -230,7 +230,7 @@ class Totals {
 void compare_in_units(Differences& out, Device& device, const ProjectionSet& scan, const Units& units,
                       const ExactField& exact, const MixedVolume& volume, const Certificate& stored,
                       const std::vector<std::uint8_t>& selected, bool exhaustive, const Progress& progress) {
-  Filtered f(device.state(), scan, units, stored.field, progress);
+  Filtered f(device.state(), scan, units, stored.field, stored.rates.interpolation, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
   compare_range(out, f, exact, volume, stored, progress);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
