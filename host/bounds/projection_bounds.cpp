@@ -1,4 +1,4 @@
-// Bounds in closed form, from sups over the detector, for which row_sup of kernels/bounds/bound_table.cl is
+// Bounds in closed form, from sups over the detector, for which kernels/bounds/projection_bounds.cl is
 // launched (docs/error-bounds.md).
 #include "host/bounds/projection_bounds.hpp"
 
@@ -30,11 +30,19 @@ double underflow(const ParallelGeometry& g, double gain_u) {
   return 4 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
 }
 
+// No bound can be made of a sup that is no finite number.
+void require_finite(const std::vector<float>& sups, int order) {
+  if (std::all_of(sups.begin(), sups.end(), [](float s) { return std::isfinite(s); })) return;
+  throw InputError(fmt::format(
+      "the {} of the filtered projections is not finite in float32; check the scan's values and pitches",
+      order == 0 ? "value" : "2nd derivative"));
+}
+
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
 // The largest |d| of every view of a slab of derivatives.
 std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
-  RowSup row_sup(state, "bounds/bound_table", "row_sup");
+  RowSup row_sup(state, "bounds/projection_bounds", "row_sup");
   opencl::DeviceArray<float> sup(state, count(d.views * d.rows_padded), "row maxima");
   row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(),
           to_int(d.views), to_int(d.columns.count), to_int(d.rows_padded));
@@ -58,19 +66,17 @@ double product_error(std::int64_t n, int run) {
   return run + 2 + 1.01 * runs * runs * unit_roundoff;
 }
 
-void require_finite(const std::vector<float>& sups, int order) {
-  if (std::all_of(sups.begin(), sups.end(), [](float s) { return std::isfinite(s); })) return;
-  throw InputError(fmt::format(
-      "the {} of the filtered projections is not finite in float32; check the scan's values and pitches",
-      order == 0 ? std::string("value") : fmt::format("{}{} derivative", order, order == 2 ? "nd" : "th")));
-}
-
 double lebesgue_constant(std::int64_t n) {
   // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
   // Polynomials, section 1.4).
   return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5;
 }
 
+namespace {
+
+// fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
+// samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
+// more.
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
@@ -79,18 +85,18 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
          underflow(g, upsampler.gain_u(columns, order));
 }
 
+// Views per chunk so that slabs of derivatives stay near 64 MiB.
 std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
   const std::int64_t per_view = columns * (rows + 16) * 4;
   return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
 }
 
-namespace {
-
 // Where sups are sampled. A signal sampled L times denser than Nyquist rises above its samples by at most
 // 1 / cos(pi / (2 L)), per axis (Ehlich and Zeller 1964). A single row does not vary along v.
 struct DenseGrid {
   static constexpr int density = 4;
-  explicit DenseGrid(const FilteredScan& scan) : columns(upsampled_columns(scan.geometry.columns, density, 0)) {
+  explicit DenseGrid(const FilteredScan& scan)
+      : columns(upsampled_columns(scan.geometry.columns, density, 0)) {
     const std::int64_t V = scan.geometry.rows;
     for (std::int64_t j = 0; j <= density * V; ++j) rows.push_back(-0.5 + static_cast<double>(j) / density);
     const double of_axis = 1 / std::cos(pi / (2.0 * density));
@@ -107,14 +113,16 @@ FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   const ParallelGeometry& g = scan.geometry;
   FieldSups sups;
   const DenseGrid dense(scan);
-  const std::int64_t chunk = view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
+  const std::int64_t chunk =
+      view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
   for (std::int64_t first = 0; first < g.views(); first += chunk)
     for (const double m : view_sups(state,
                                     upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first,
                                               std::min(chunk, g.views() - first)),
                                     0))
       sups.value += dense.rise * m;
-  for (const double m : scan.view_max) sups.value += derivative_rounding(upsampler, scan, dense.columns, 0, m);
+  for (const double m : scan.view_max)
+    sups.value += derivative_rounding(upsampler, scan, dense.columns, 0, m);
   sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
   if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
   return sups;
@@ -131,6 +139,7 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   const double rise = grid.rise;
 
   FieldSups sups;
+  std::vector<double> second_u, second_v;  // by view
   const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
   const auto sum = [](const std::vector<double>& v) {
     double s = 0;
@@ -141,37 +150,26 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
     const std::int64_t n = std::min(chunk, g.views() - first);
     sups.value += rise * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
     for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
-      sups.view_second_u.push_back(rise * m);
+      second_u.push_back(rise * m);
     sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
     if (g.rows > 1) {
       for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
-        sups.view_second_v.push_back(rise * m);
+        second_v.push_back(rise * m);
       sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
     }
   }
-  sups.view_second_v.resize(sups.view_second_u.size(), 0.0);  // a single row does not vary along v
+  second_v.resize(second_u.size(), 0.0);  // a single row does not vary along v
   // Rounding of the evaluation, relative to the sums of magnitudes it adds up.
   for (std::size_t k = 0; k < scan.view_max.size(); ++k) {
     const double value = derivative_rounding(upsampler, scan, columns, 0, scan.view_max[k]);
     sups.value += value;
-    sups.view_second_u[k] += derivative_rounding(upsampler, scan, columns, 2, scan.view_max[k]);
+    second_u[k] += derivative_rounding(upsampler, scan, columns, 2, scan.view_max[k]);
     // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
-    if (g.rows > 1) sups.view_second_v[k] += value * std::pow(pi / g.pitch_v, 2);
+    if (g.rows > 1) second_v[k] += value * std::pow(pi / g.pitch_v, 2);
   }
-  sups.second_u = sum(sups.view_second_u);
-  sups.second_v = sum(sups.view_second_v);
+  sups.second_u = sum(second_u);
+  sups.second_v = sum(second_v);
   return sups;
-}
-
-double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Grid& grid, int rate) {
-  const ParallelGeometry& g = scan.geometry;
-  const double h = std::max(grid.spacing[0], grid.spacing[1]) / rate, hz = grid.spacing[2] / rate;
-  const double wu = std::pow(pi / g.pitch_u, 2), wv = g.rows > 1 ? std::pow(pi / g.pitch_v, 2) : 0.0;
-  const double mixed = std::min(wv * sups.second_u, wu * sups.second_v);
-  // (1/8) sum_j h_j^2 [ h_j^2/12 sup|F_jjjj| + sum_i h_i^2/8 sup|F_jjii| ], the x and y parts together (docs,
-  // section 5).
-  return 0.125 * (std::pow(h, 4) * (5.0 / 24) * wu * sups.second_u + 2 * h * h * hz * hz / 8 * mixed +
-                  std::pow(hz, 4) * (5.0 / 24) * wv * sups.second_v);
 }
 
 namespace {

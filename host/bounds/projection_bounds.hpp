@@ -1,5 +1,5 @@
-// Global bounds that rest on the filtered projections: sups per view, the constant part of T, rounding,
-// amplitude bounds (docs/error-bounds.md). Called by plan.cpp, gold_stream.cpp and bound_table.cpp.
+// Global bounds that rest on the filtered projections: sups, the errors of the chain to gold, amplitude bounds
+// (docs/error-bounds.md). Called by plan.cpp, kept_gold.cpp, brick_remainder.cpp and verify_terms.cpp.
 #pragma once
 
 #include <string>
@@ -14,27 +14,15 @@ namespace vdvr {
 
 /// What a scan allows to be said before any gold sample exists; sums over the views, weights included.
 struct FieldSups {
-  double value = 0;                                  ///< sum over views of sup |q|
-  double second_u = 0;                               ///< of sup |q_uu|
-  double second_v = 0;                               ///< of sup |q_vv|
-  std::vector<double> view_second_u, view_second_v;  ///< by view
+  double value = 0;     ///< sum over views of sup |q|
+  double second_u = 0;  ///< of sup |q_uu|
+  double second_v = 0;  ///< of sup |q_vv|
   double sampled_second_u =
       0;  ///< of the largest |q_uu| at the detector's own samples: what the paper's Eq. 7 takes
   double sampled_second_v = 0;
 };
 
-/// fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
-/// samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
-/// more.
-double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                           int order, double view_max);
-
 /// Throws InputError where a derivative's sup is no finite number: no bound can be made of it.
-void require_finite(const std::vector<float>& sups, int order);
-
-/// Views per chunk so that slabs of derivatives stay near 64 MiB.
-std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows);
-
 /// Cost: values and derivatives on a grid 4 times denser than the detector both ways.
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
 /// Derivatives by Bernstein's inequality, at a third of the cost: what rates of six taps and gold need.
@@ -43,11 +31,6 @@ FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
 /// Bounds the growth of sample errors by band-limited interpolation of n samples (Lebesgue constant of the
 /// mirror extension).
 double lebesgue_constant(std::int64_t n);
-
-/// T's part that does not come from second differences of gold, anywhere in the field: their distance from
-/// the second derivatives, and how far those rise inside a gold cell. remainder_table (bound_table.hpp) is
-/// sharper.
-double gold_remainder(const FilteredScan& scan, const FieldSups& sups, const Grid& grid, int rate);
 
 /// How far the field of the computed filtered samples lies from F, anywhere: part of arithmetic_bound. It is
 /// a band-limited field itself, so bounds of curvature made from those samples need not pay for it again.

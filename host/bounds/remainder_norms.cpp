@@ -6,7 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <tuple>
 #include <vector>
 
 #include "host/bounds/node_functional.hpp"
@@ -69,8 +72,9 @@ Functional over_positions(int order, double band, int taps, double eta, int inte
 
 }  // namespace
 
-RemainderNorms remainder_norms(double band, int taps, double eta) {
-  check(band, taps, eta);
+namespace {
+
+RemainderNorms compute(double band, int taps, double eta) {
   // As many positions as leave four fifths of eta to the taps: (band / 2 n)^2 / 8 <= eta / 5.
   const int intervals = static_cast<int>(std::ceil(band / 2 * std::sqrt(5 / (8 * eta))));
   const Functional a = over_positions(0, band, taps, eta, intervals);
@@ -87,6 +91,22 @@ RemainderNorms remainder_norms(double band, int taps, double eta) {
   norms.second_sup = b.sup;
   norms.fourth_sup = d.sup;
   return norms;
+}
+
+}  // namespace
+
+RemainderNorms remainder_norms(double band, int taps, double eta) {
+  check(band, taps, eta);
+  static std::mutex mutex;
+  static std::map<std::tuple<double, int, double>, RemainderNorms> known;
+  const std::tuple key{band, taps, eta};
+  {
+    const std::lock_guard lock(mutex);
+    if (const auto found = known.find(key); found != known.end()) return found->second;
+  }
+  const RemainderNorms norms = compute(band, taps, eta);
+  const std::lock_guard lock(mutex);
+  return known.emplace(key, norms).first->second;
 }
 
 double pure_factor(const RemainderNorms& along, const RemainderNorms& across, const RemainderNorms& other) {

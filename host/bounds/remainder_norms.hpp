@@ -24,8 +24,8 @@ struct RemainderNorms {
 /// linearly between them. Sums of magnitudes are the least, to .01, with an error of `eta`. That of the
 /// result is what was reached: about the one asked for (below 1e-4 up to a tenth above), and 1.3 times the
 /// least possible where `taps` cannot. Throws InputError unless 0 < band <= pi / 2, taps is even, 4 .. 32,
-/// and 1e-5
-/// <= eta <= .1. Cost: half a second of one core for 1e-4 at pi / 2, as the root of 1 / eta; on all cores.
+/// and 1e-5 <= eta <= .1. Cost: half a second of one core for 1e-4 at pi / 2, as the root of 1 / eta, on all
+/// cores; kept for the next call with the same arguments.
 RemainderNorms remainder_norms(double band, int taps = 16, double eta = 1e-4);
 
 // At every point x, with the maxima over all nodes of the stencils,

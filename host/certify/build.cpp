@@ -352,8 +352,9 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   Upsampler upsampler(state, filtered);
   watch.lap("filter");
   // Six taps need values alone.
-  const FieldSups sups = plan.rates.interpolation == Interpolation::six_taps ? value_sups(state, upsampler, filtered)
-                                                                             : field_sups(state, upsampler, filtered);
+  const FieldSups sups = plan.rates.interpolation == Interpolation::six_taps
+                             ? value_sups(state, upsampler, filtered)
+                             : field_sups(state, upsampler, filtered);
   GoldRates gold(state, filtered, sups, gold_settings(plan, options, base.lattice));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");

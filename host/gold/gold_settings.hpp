@@ -33,7 +33,7 @@ struct GoldSettings {
   bool base_only = false;    ///< only fitted base samples are asked for: no slack, no other level
   /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
   float curvature = 0.0625f;
-  int coarse_rate = 0;       ///< of a coarser gold that shares this one's bounds of base cells; 0: none
+  int coarse_rate = 0;       ///< of a coarser gold that is tested first; 0: none
   bool grid_only = false;    ///< slack counts as 0: the paper's test, for comparison
   Lattice lattice{};         ///< on which tiles will be stored; classification leaves room for it
   LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x
@@ -44,8 +44,6 @@ struct GoldSettings {
   }
   /// The level whose samples are this gold, z, y, x.
   [[nodiscard]] LevelTriple finest() const { return finest_level(rate, coarsening); }
-
-  [[nodiscard]] int coarsest() const { return coarse_rate > 0 ? coarse_rate : rate; }
 };
 
 /// The base alone as a volume, every brick at level 0.

@@ -33,7 +33,8 @@ struct Filtered {
         scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
                                 Precision::fp64, units)),
         upsampler(device, scan) {
-    sups = interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan) : field_sups(device, upsampler, scan);
+    sups = interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan)
+                                                    : field_sups(device, upsampler, scan);
   }
   Filtered(const Filtered&) = delete;
   Filtered& operator=(const Filtered&) = delete;

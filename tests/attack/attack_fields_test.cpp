@@ -78,9 +78,9 @@ BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
         // On the rim of the covered disk, and at the first and last row.
         const double angle = 0.26 * i, r = 12;
         const double z = rows == 1 ? 0.0 : i % 3 == 0 ? 1.5 : i % 3 == 1 ? -1.5 : 0.1;
-        const Rates rates{8, Interpolation::cubic, gold};
-        const GoldLattice l =
-            stream_lattice(chain,
+        const Rates rates{8, Interpolation::six_taps, gold};
+        const GoldNodes l =
+            stream_nodes(chain,
                            grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9,
                                    gold, Place::cell),
                            rates);
@@ -124,6 +124,7 @@ BOOST_AUTO_TEST_CASE(measured_totals_bound_stored_fields_everywhere) {
     Chain chain(scan.data);
     for (const Rates& rates : {Rates{4, Interpolation::linear, 4},
                                {8, Interpolation::cubic, 8},
+                               {8, Interpolation::six_taps, 8},
                                {16, Interpolation::linear, 2},
                                {2, Interpolation::linear, 16}}) {
       Grid grid = grid_at(scan.data.geometry, scan.target, 0.8, rates.gold, Place::cell);

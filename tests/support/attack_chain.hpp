@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host/gold/gold_batch.hpp"
+#include "host/gold/gold_stream.hpp"
 #include "tests/support/device.hpp"
 #include "vdvr/exact_field.hpp"
 
@@ -21,12 +22,19 @@ inline std::string name_of(const Rates& rates) {
          std::to_string(rates.gold);
 }
 
-/// Every pair of rates: 4 upsamplings, 2 filters, 4 of gold.
+/// Six taps are for columns at 8x or more.
+inline bool serves(int upsampling, Interpolation filter) {
+  return filter != Interpolation::six_taps || upsampling >= 8;
+}
+constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic, Interpolation::six_taps};
+
+/// Every set of rates: 4 upsamplings, 3 filters, 4 of gold.
 inline std::vector<Rates> all_rates() {
   std::vector<Rates> all;
   for (const int upsampling : {2, 4, 8, 16})
-    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
-      for (const int gold : {2, 4, 8, 16}) all.push_back({upsampling, filter, gold});
+    for (const Interpolation filter : all_filters)
+      for (const int gold : {2, 4, 8, 16})
+        if (serves(upsampling, filter)) all.push_back({upsampling, filter, gold});
   return all;
 }
 
@@ -47,13 +55,13 @@ struct Chain {
 };
 
 /// All gold nodes of a grid, x fastest, with what the certificate says of them. above, below: the smallest
-/// slack that any brick uses; negative: untested. p: of every base cell.
-struct GoldLattice {
+/// slack that any brick uses; negative: untested.
+struct GoldNodes {
   Grid grid;
   int rate = 1;
-  double arithmetic = 0;
+  double arithmetic = 0, projection = 0;  ///< A, and P of any node
   Index3 nodes{0, 0, 0};
-  std::vector<double> gold, above, below, p;
+  std::vector<double> gold, above, below;
   [[nodiscard]] std::size_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
     return static_cast<std::size_t>((z * nodes[1] + y) * nodes[0] + x);
   }
@@ -71,47 +79,29 @@ struct GoldLattice {
         for (std::int64_t x = 0; x < nodes[0]; ++x) out.push_back(position(x, y, z));
     return out;
   }
-  /// P of the base cell that holds a gold cell.
-  [[nodiscard]] double p_of_cell(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    return p[static_cast<std::size_t>((z / rate * grid.cells[1] + y / rate) * grid.cells[0] + x / rate)];
-  }
-  /// The smallest P of the base cells that a node belongs to.
-  [[nodiscard]] double p_of_node(const Index3& i) const {
-    double least = INFINITY;
-    for (int c = 0; c < 8; ++c) {
-      Index3 cell{};
-      for (std::size_t a = 0; a < 3; ++a)
-        cell[a] = std::clamp<std::int64_t>(i[a] - ((c >> a) & 1), 0, nodes[a] - 2);
-      least = std::min(least, p_of_cell(cell[0], cell[1], cell[2]));
-    }
-    return least;
-  }
 };
 
-/// Streams the grid in bricks of one base cell, so that P is known per base cell.
-inline GoldLattice stream_lattice(Chain& chain, const Grid& grid, const Rates& rates) {
+/// Streams the grid in bricks of one base cell, whose remainders are the sharpest.
+inline GoldNodes stream_nodes(Chain& chain, const Grid& grid, const Rates& rates) {
   GoldStream stream(device().state(), chain.filtered, chain.sups,
                     {grid, 1, rates.gold, rates.upsampling, rates.interpolation, {}});
-  GoldLattice out;
+  GoldNodes out;
   out.grid = grid;
   out.rate = rates.gold;
   out.arithmetic = stream.arithmetic();
+  out.projection = stream.projection();
   for (std::size_t a = 0; a < 3; ++a) out.nodes[a] = grid.cells[a] * rates.gold + 1;
   const auto count = static_cast<std::size_t>(out.nodes[0] * out.nodes[1] * out.nodes[2]);
   const auto cells = static_cast<std::size_t>(grid.cells[0] * grid.cells[1] * grid.cells[2]);
   out.gold.assign(count, 0);
   out.above.assign(count, INFINITY);
   out.below.assign(count, INFINITY);
-  out.p.assign(cells, 0);
   stream.run(
       std::vector<std::uint8_t>(cells, 1),
       [&](GoldStream::Batch& batch) {
-        const auto p = batch.largest_p();
-        for (std::size_t b = 0; b < p.size(); ++b) {
-          const std::int64_t id = batch.bricks()[b];
+        for (const std::int64_t id : batch.bricks()) {
           const Index3 brick{id % grid.cells[0], id / grid.cells[0] % grid.cells[1],
                              id / grid.cells[0] / grid.cells[1]};
-          out.p[static_cast<std::size_t>(id)] = static_cast<double>(p[b].first);
           batch.for_each_node(id, [&](const Index3& i, float gold, const Slack& slack) {
             const std::size_t n = out.at(brick[0] * rates.gold + i[0], brick[1] * rates.gold + i[1],
                                          brick[2] * rates.gold + i[2]);
