@@ -244,7 +244,11 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
   // A wrong position moves along the interpolant, and where its intervals meet may jump by twice what it
   // errs.
-  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  // Six taps go by values alone, which is all that some callers have.
+  const double steepest = pi / g.pitch_u * sups.value,
+               slope = interpolation == Interpolation::six_taps
+                           ? steepest
+                           : std::min(steepest, std::sqrt(2 * sups.value * sups.second_u));
   const double moved = position_error(g, columns, blocks);
   out.position =
       moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) + 2 * out.interpolation;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/bounds/six_taps.hpp"
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
@@ -59,15 +60,15 @@ double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double 
                           interpolation);
 }
 
-// R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
-// the extremes of two fields differ by no more than the fields do.
+// R is of a reconstruction with six taps at 8x. One made again has the same interpolation error but for
+// rounding, and the extremes of two fields differ by no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
                    const Certificate& c, const Progress& progress) {
   const Volume base =
-      reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::cubic, progress);
+      reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress);
   const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
-               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::cubic),
+               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps),
                found = range.high - range.low;
   if (!(std::abs(c.reference_range - found) <= 4 * rounding))
     out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
@@ -77,8 +78,7 @@ void compare_range(Differences& out, Filtered& f, const ExactField& exact, const
                           to_world(v.grid.position(range.high_at), f.units)};
   std::vector<double> F = exact.at(points);
   for (double& value : F) value = from_world(value, f.units);
-  const double du = f.scan.geometry.pitch_u / 8, wave = std::numbers::pi / f.scan.geometry.pitch_u,
-               projection = 3.0 / 128 * std::pow(du, 4) * wave * wave * f.sups.second_u;
+  const double projection = six_tap_facts().sup * f.sups.value;
   const double least = F[1] - F[0] - 2 * (projection + rounding + from_world(exact.rounding(), f.units));
   if (!(c.reference_range >= least))
     out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
