@@ -10,9 +10,13 @@
 #include <numbers>
 
 #include "host/opencl/kernel.hpp"
+#include "shared/error_map.h"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrFrequencies) == 44);
+
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -131,7 +135,6 @@ ErrorMap error_map(Device& device, const std::array<FrequencyAxis, 3>& axes, int
   if (rate < 1) throw InputError(fmt::format("error map: rate {}; the least is 1", rate));
   ErrorMap map;
   std::uint64_t entries = 1;
-  cl_float4 step{{0, 0, 0, 0}};
   for (std::size_t a = 0; a < 3; ++a) {
     check_axis(axes[a]);
     map.size[a] = axes[a].count;
@@ -140,7 +143,6 @@ ErrorMap error_map(Device& device, const std::array<FrequencyAxis, 3>& axes, int
       throw ResourceError(fmt::format("error map: {} x {} x {} frequencies pass 2^64 bytes", axes[0].count,
                                       axes[1].count, axes[2].count));
     entries *= n;
-    step.s[a] = static_cast<float>(axes[a].step / rate);
   }
   // Rounding: kappa 2 u, sine 4 ulp, both doubled by the square, and three sums and products: below 64 u.
   constexpr double margin = 1 + 0x1p-17;
@@ -150,15 +152,24 @@ ErrorMap error_map(Device& device, const std::array<FrequencyAxis, 3>& axes, int
   opencl::State& state = device.state();
   const opencl::DeviceArray<float> beyond(state, std::span<const float>(table), "bounds of the wave error");
   const opencl::DeviceArray<float> centre(state, entries, "error map"), bound(state, entries, "error map");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_float4, cl_float, cl_float>
-      kernel(state, "bounds/error_map", "error_map", {{"VDVR_TABLE_STEPS", std::to_string(kTableSteps)}});
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFrequencies> kernel(
+      state, "bounds/error_map", "error_map", {{"VDVR_TABLE_STEPS", std::to_string(kTableSteps)}});
   const auto n = [&](std::size_t a) { return static_cast<std::uint64_t>(axes[a].count); };
   const auto first = [&](std::size_t a) { return static_cast<cl_int>(axes[a].first); };
   const auto count = [&](std::size_t a) { return static_cast<cl_int>(axes[a].count); };
-  kernel({{n(0), n(1), n(2)}, {64, 1, 1}}, centre.buffer(), bound.buffer(), beyond.buffer(), first(0),
-         first(1), first(2), count(0), count(1), count(2), step, static_cast<cl_float>(kExactProduct),
-         static_cast<cl_float>(margin));
+  const auto step = [&](std::size_t a) { return static_cast<cl_float>(axes[a].step / rate); };
+  const VdvrFrequencies frequencies{.first_x = first(0),
+                                    .first_y = first(1),
+                                    .first_z = first(2),
+                                    .count_x = count(0),
+                                    .count_y = count(1),
+                                    .count_z = count(2),
+                                    .step_x = step(0),
+                                    .step_y = step(1),
+                                    .step_z = step(2),
+                                    .exact_product = static_cast<cl_float>(kExactProduct),
+                                    .margin = static_cast<cl_float>(margin)};
+  kernel({{n(0), n(1), n(2)}, {64, 1, 1}}, centre.buffer(), bound.buffer(), beyond.buffer(), frequencies);
   opencl::finish(state, "error map");
   map.centre = centre.to_host();
   map.bound = bound.to_host();

@@ -5,6 +5,8 @@
 
 namespace vdvr {
 
+static_assert(sizeof(VdvrAxisProduct) == 24);
+
 opencl::DeviceArray<float> transposed_on_device(opencl::State& state, std::span<const double> exact,
                                                 std::int64_t n) {
   const auto width = static_cast<std::size_t>(n);
@@ -25,9 +27,14 @@ void AxisProduct::operator()(const opencl::DeviceArray<float>& out, const opencl
   const auto groups = [](std::int64_t v, std::int64_t by) {
     return static_cast<std::uint64_t>((v + by - 1) / by);
   };
+  const VdvrAxisProduct shape{.batches = i(batches),
+                              .rows = i(rows),
+                              .terms = i(n),
+                              .columns = i(columns),
+                              .s_row = i(fast ? n : 1),
+                              .s_term = i(fast ? 1 : n)};
   kernel_({{groups(columns, 16), groups(rows, 4), groups(batches, 1)}, {4, 8, 1}}, out.buffer(),
-          fast ? in.buffer() : matrix.buffer(), fast ? matrix.buffer() : in.buffer(), i(batches), i(rows),
-          i(n), i(columns), i(fast ? n : 1), i(fast ? 1 : n));
+          fast ? in.buffer() : matrix.buffer(), fast ? matrix.buffer() : in.buffer(), shape);
 }
 
 }  // namespace vdvr

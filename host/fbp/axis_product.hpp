@@ -7,6 +7,7 @@
 
 #include "host/opencl/array.hpp"
 #include "host/opencl/kernel.hpp"
+#include "shared/axis_product.h"
 
 namespace vdvr {
 
@@ -24,7 +25,7 @@ class AxisProduct {
                   std::int64_t inner);
 
  private:
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel_;
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAxisProduct> kernel_;
 };
 
 }  // namespace vdvr

@@ -6,8 +6,12 @@
 #include <stdexcept>
 
 #include "host/opencl/kernel.hpp"
+#include "shared/back_project.h"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrColumnBlocks) == 32);
+
 namespace {
 
 struct ViewStep {
@@ -86,22 +90,27 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
 
   const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int>
-      kernel(state, "fbp/back_project", "back_project",
-             {{"VDVR_CUBIC", interpolation == Interpolation::cubic ? "1" : "0"},
-              {"VDVR_RUN", std::to_string(view_run(interpolation))},
-              {"VDVR_LANES", std::to_string(tuning.lanes)},
-              {"VDVR_TILE", std::to_string(tuning.tile)},
-              {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrColumnBlocks> kernel(
+      state, "fbp/back_project", "back_project",
+      {{"VDVR_CUBIC", interpolation == Interpolation::cubic ? "1" : "0"},
+       {"VDVR_RUN", std::to_string(view_run(interpolation))},
+       {"VDVR_LANES", std::to_string(tuning.lanes)},
+       {"VDVR_TILE", std::to_string(tuning.tile)},
+       {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
   const std::int64_t carried = tuning.lanes * tuning.vectors;
+  const VdvrColumnBlocks shape{.views = ints(slab.views),
+                               .columns = ints(slab.columns.count),
+                               .z_padded = ints(padded),
+                               .out_stride = ints(column_stride(rows_wanted)),
+                               .nx = ints(blocks.nx),
+                               .ny = ints(blocks.ny),
+                               .blocks = ints(n),
+                               .first_chunk = ints(blocks.first_row / 16)};
   kernel({{count((padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},
-         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), ints(slab.views),
-         ints(slab.columns.count), ints(padded), ints(column_stride(rows_wanted)), ints(blocks.nx),
-         ints(blocks.ny), ints(n), ints(blocks.first_row / 16));
+         out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), shape);
 }
 
 }  // namespace vdvr

@@ -20,9 +20,13 @@
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
+#include "shared/filter_rows.h"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrFilteredRows) == 48);
+
 namespace {
 
 constexpr double smallest_normal = 0x1p-126;
@@ -120,7 +124,7 @@ class FourierFilter : public RowFilter {
                                                                        "pad_rows", defines);
     opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int> multiply(state_, "fbp/filter_rows_fft",
                                                                     "multiply_spectrum", defines);
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int> crop(
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> crop(
         state_, "fbp/filter_rows_fft", "crop_transposed", defines);
     for (std::int64_t first = 0; first < g_.views(); first += chunk) {
       report(progress, "filter", static_cast<double>(first) / static_cast<double>(g_.views()));
@@ -137,8 +141,8 @@ class FourierFilter : public RowFilter {
                to_int(bins), to_int(row_count));
       fft::inverse_real(state_, precision, length_, row_count, transformed.buffer(), padded.buffer());
       crop({{count(g_.rows), count(g_.columns), count(views)}, {1, 64, 1}}, chunk_rows.buffer(),
-           padded.buffer(), chunk_weights.buffer(), to_int(g_.columns), to_int(g_.rows), to_int(g_.rows),
-           to_int(length_), to_int(views));
+           padded.buffer(), chunk_weights.buffer(), to_int(g_.columns), to_int(g_.rows), to_int(length_),
+           to_int(views));
       chunk_rows.read(out.subspan(at, n));
     }
   }
@@ -263,7 +267,7 @@ class ProductFilter : public RowFilter {
     opencl::DeviceArray<float> product(state_, count(chunk.most_views * view_size), "filtered chunk");
     const std::size_t per_view = static_cast<std::size_t>(g_.rows) * columns_;
     while (next(chunk, rows, weights, all, progress)) {
-      launch(chunk, product, 0, g_.columns, 0, view_size, g_.columns * 16);
+      launch(chunk, product, 0, g_.columns, {0, count(view_size), count(g_.columns * 16)});
       product.read_mapped([&](std::span<const float> source) {
         parallel_for(chunk.views, {}, "", [&](std::int64_t k) {
           scatter(
@@ -278,8 +282,9 @@ class ProductFilter : public RowFilter {
                  const Progress& progress) override {
     Chunk chunk(state_, g_, padded(target.rows));
     while (next(chunk, rows, weights, target.rows, progress)) {
-      launch(chunk, *target.values, target.first, target.count, chunk.first * target.count * 16,
-             target.count * 16, g_.views() * target.count * 16);
+      launch(chunk, *target.values, target.first, target.count,
+             {count(chunk.first * target.count * 16), count(target.count * 16),
+              count(g_.views() * target.count * 16)});
       const std::vector<cl_int> broken = chunk.broken.to_host();
       for (std::int64_t k = 0; k < chunk.views; ++k)
         if (broken[static_cast<std::size_t>(k)] != 0) throw not_finite(chunk.first + k);
@@ -354,25 +359,29 @@ class ProductFilter : public RowFilter {
     }
   }
 
-  // `out`: columns [out_first, out_first + out_columns) of each view, mirrored beyond the edges.
-  void launch(const Chunk& chunk, opencl::DeviceArray<float>& out, std::int64_t out_first,
-              std::int64_t out_columns, std::int64_t out_begin, std::int64_t out_view,
-              std::int64_t out_chunk) const {
+  // `out`: columns [first_column, first_column + out_columns) of each view, mirrored beyond the edges.
+  void launch(const Chunk& chunk, opencl::DeviceArray<float>& out, std::int64_t first_column,
+              std::int64_t out_columns, const VdvrChunks& places) const {
     const ColumnTuning tuning = column_tuning(state_.info);
     // As many bytes in a vector of sums.
     const int lanes = is_double<Real> ? std::max(1, tuning.lanes / 2) : tuning.lanes;
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, Real, cl_int, cl_int, cl_int,
-                   cl_int, cl_int, cl_int, cl_ulong, cl_ulong, cl_ulong>
-        kernel(state_, "fbp/filter_rows", "filter_rows",
-               {{"VDVR_LANES", std::to_string(lanes)},
-                {"VDVR_STEP", std::to_string(step_)},
-                {"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}});
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, Real, VdvrFilteredRows> kernel(
+        state_, "fbp/filter_rows", "filter_rows",
+        {{"VDVR_LANES", std::to_string(lanes)},
+         {"VDVR_STEP", std::to_string(step_)},
+         {"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}});
+    const VdvrFilteredRows shape{.out = places,
+                                 .columns = to_int(g_.columns),
+                                 .z_padded = to_int(chunk.z_padded),
+                                 .views = to_int(chunk.views),
+                                 .offset = to_int(offset_),
+                                 .first_column = to_int(first_column),
+                                 .out_columns = to_int(out_columns)};
     const std::int64_t groups = (g_.columns + 8 * step_ - 1) / (8 * step_) * step_;
     kernel({{count(chunk.z_padded / lanes), count(groups), count(chunk.views)},
             {tuning.local[0], tuning.local[1], 1}},
            out.buffer(), chunk.broken.buffer(), chunk.in.buffer(), taps_.buffer(), chunk.weights.buffer(),
-           centre_, to_int(offset_), to_int(g_.columns), to_int(chunk.z_padded), to_int(chunk.views),
-           to_int(out_first), to_int(out_columns), count(out_begin), count(out_view), count(out_chunk));
+           centre_, shape);
   }
 
   // [v / 16][u][16] -> [u][v].

@@ -7,6 +7,9 @@
 #include "host/system/casts.hpp"
 
 namespace vdvr {
+
+static_assert(sizeof(VdvrGoldBlocks) == 32 && sizeof(VdvrLattice) == 36);
+
 namespace {
 
 // Of the middle of the errors around a sample: 1 would overshoot, since a shift moves the interpolant around
@@ -36,6 +39,18 @@ void LatticeFit::shape_for(const Index3& spacing) {
   level_.shape = {to_int(spacing[0]), to_int(spacing[1]), to_int(spacing[2]),
                   to_int(reach(0)),   to_int(reach(1)),   to_int(reach(2)),
                   samples(b.nx, 0),   samples(b.ny, 1),   samples(b.nz, 2)};
+}
+
+VdvrGoldBlocks LatticeFit::blocks_on_device() const {
+  const GoldBlocks& b = blocks_;
+  return {.nx = to_int(b.nx),
+          .ny = to_int(b.ny),
+          .halo = to_int(b.halo),
+          .gold_stride = to_int(b.gold_stride),
+          .blocks = to_int(b.count),
+          .z_first = to_int(b.z_first),
+          .z_last = to_int(b.z_last),
+          .lowest = b.lowest};
 }
 
 // Bits of the runs of 16 nodes in which nodes low .. high lie; a longer column's last bit stands for the
@@ -99,27 +114,23 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
                      float curvature) {
   const GoldBlocks& b = blocks_;
   const VdvrLattice& l = level_.shape;
-  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
-               blocks = to_int(b.count);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl::Buffer, VdvrLattice, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_float>
+  const VdvrGoldBlocks blocks = blocks_on_device();
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice,
+                 cl_float>
       err(state_, "gold/fit_coefficients", "lattice_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_float, cl::Buffer, cl::Buffer,
-                 VdvrLattice, cl_int, cl_int, cl_int, cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks,
+                 VdvrLattice>
       pool(state_, "gold/fit_coefficients", "pool_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_float>
-      shift(state_, "gold/fit_coefficients", "shift_lattice");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_float> shift(
+      state_, "gold/fit_coefficients", "shift_lattice");
   const std::uint64_t chunks = count(b.gold_stride / 16);
   const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1, deep = (l.cy - 1) * l.spacing_y + 1;
   err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors_.buffer(), level_.along.buffer(),
-      gold.buffer(), margin.buffer(), b.lowest, wanted_.buffer(), l, nx, ny, halo, stride, blocks, curvature);
+      gold.buffer(), margin.buffer(), wanted_.buffer(), blocks, l, curvature);
   pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low_.buffer(), high_.buffer(),
-       errors_.buffer(), margin.buffer(), b.lowest, wanted_.buffer(), needed_.buffer(), l, nx, ny, halo,
-       stride, blocks);
+       errors_.buffer(), margin.buffer(), wanted_.buffer(), needed_.buffer(), blocks, l);
   shift({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
-        low_.buffer(), high_.buffer(), needed_.buffer(), l, halo, stride, blocks, to_int(b.z_first),
-        to_int(b.z_last), share);
+        low_.buffer(), high_.buffer(), needed_.buffer(), blocks, l, share);
 }
 
 const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gold,
@@ -131,17 +142,16 @@ const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gol
   reserve(gold.size(), steps);
   const GoldBlocks& b = blocks_;
   const VdvrLattice& l = level_.shape;
-  const cl_int nx = to_int(b.nx), ny = to_int(b.ny), halo = to_int(b.halo), stride = to_int(b.gold_stride),
-               blocks = to_int(b.count);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int, cl_int, cl_int>
-      take(state_, "gold/fit_coefficients", "take_lattice");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrLattice, cl_int, cl_int, cl_int> interpolate(
+  const VdvrGoldBlocks blocks = blocks_on_device();
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice> take(
+      state_, "gold/fit_coefficients", "take_lattice");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice> interpolate(
       state_, "gold/fit_coefficients", "interpolate_lattice");
   take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
-       gold.buffer(), needed_.buffer(), l, nx, ny, halo, stride, blocks);
+       gold.buffer(), needed_.buffer(), blocks, l);
   for (int step = 0;; ++step) {
     interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, level_.along.buffer(),
-                level_.samples.buffer(), needed_.buffer(), l, halo, stride, blocks);
+                level_.samples.buffer(), needed_.buffer(), blocks, l);
     if (step == steps) return level_;
     fit(gold, margin, curvature);
   }

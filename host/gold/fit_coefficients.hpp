@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/opencl/array.hpp"
+#include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 #include "vdvr/grid.hpp"
 
@@ -58,6 +59,7 @@ class LatticeFit {
 
  private:
   void shape_for(const Index3& spacing);
+  [[nodiscard]] VdvrGoldBlocks blocks_on_device() const;
   void mark(const std::vector<NodeBox>& wanted, int steps);
   void reserve(std::uint64_t gold, int steps);
   void fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin, float curvature);

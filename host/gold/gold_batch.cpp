@@ -373,13 +373,12 @@ std::vector<float> GoldBatch::copy_tiles(const LevelTriple& level, const std::ve
                          to_int(shape_.nx + 2 * shape_.halo),
                          to_int(shape_.ny + 2 * shape_.halo),
                          to_int(shape_.gold_stride)};
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, VdvrLattice,
-                 cl_float>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldShape, VdvrLattice, cl_float>
       kernel(state_, "gold/classify", "extract_tiles", brick_nodes());
   kernel({{size, requests.size(), 1}, {64, 1, 1}}, out.buffer(),
          (lattice ? lattice->samples : gold_).buffer(), margin_.buffer(), on_device.buffer(),
-         to_int(static_cast<std::int64_t>(requests.size())), to_int(shape_.nx), to_int(shape_.ny),
-         to_int(shape_.halo), lattice ? lattice->shape : gold, static_cast<cl_float>(-settings_.kept()));
+         to_int(static_cast<std::int64_t>(requests.size())), shape_on_device(),
+         lattice ? lattice->shape : gold, static_cast<cl_float>(-settings_.kept()));
   return out.to_host();
 }
 

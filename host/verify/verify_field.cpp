@@ -19,7 +19,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrPieces) == 56);
+static_assert(sizeof(VdvrPieces) == 56 && sizeof(VdvrViewRun) == 40);
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -328,19 +328,27 @@ void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
     }
   const opencl::DeviceArray<cl_float4> device_steps(state_, std::span<const cl_float4>(steps),
                                                     "view positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int>
-      kernel(state_, "verify/verify_field", "verify_field", stored_.defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrViewRun> kernel(state_, "verify/verify_field",
+                                                                         "verify_field", stored_.defines);
   for (std::int64_t first = 0; first < g.views(); first += table.views) {
     fill(table, s, first);
     const std::int64_t end = std::min(first + table.views, g.views());
     // In runs, whose sums round seldom.
-    for (std::int64_t run = first; run < end; run += s.run)
+    for (std::int64_t run = first; run < end; run += s.run) {
+      const VdvrViewRun shape{.accumulate = run > 0 ? 1 : 0,
+                              .first_view = to_int(run),
+                              .in_table = to_int(run - first),
+                              .views = to_int(std::min(s.run, end - run)),
+                              .all_views = to_int(g.views()),
+                              .columns = to_int(columns_),
+                              .z_padded = to_int(s.z_padded),
+                              .nx = to_int(s.nx),
+                              .ny = to_int(s.nx),
+                              .blocks = to_int(static_cast<std::int64_t>(blocks))};
       kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
               {count((s.nx + 7) / 8), 1, 1}},
-             values.buffer(), table.device.buffer(), device_steps.buffer(), run > 0 ? 1 : 0, to_int(run),
-             to_int(run - first), to_int(std::min(s.run, end - run)), to_int(g.views()), to_int(columns_),
-             to_int(s.z_padded), to_int(s.nx), to_int(s.nx), to_int(static_cast<std::int64_t>(blocks)));
+             values.buffer(), table.device.buffer(), device_steps.buffer(), shape);
+    }
   }
 }
 

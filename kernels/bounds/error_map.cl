@@ -3,6 +3,8 @@
 // be the worst error, else the smallest of what is proved: sums over the axes, and tables over prod cos, one
 // for two axes and one for three; times `margin`, which covers fp32 rounding. Layout float [z][y][x].
 // Called by host/bounds/error_map.cpp.
+#include "shared/error_map.h"
+
 #ifndef VDVR_TABLE_STEPS
 #error "VDVR_TABLE_STEPS: intervals of the table of bounds"
 #endif
@@ -19,16 +21,14 @@ float beyond_product(__global const float* restrict beyond, float product, float
 }
 
 __kernel void error_map(__global float* restrict centre, __global float* restrict bound,
-                        __global const float* restrict beyond, int first_x, int first_y, int first_z,
-                        int count_x, int count_y, int count_z, float4 step, float exact_product,
-                        float margin) {
+                        __global const float* restrict beyond, VdvrFrequencies f) {
   const int x = (int)get_global_id(0);
   const int y = (int)get_global_id(1);
   const int z = (int)get_global_id(2);
-  if (x >= count_x || y >= count_y || z >= count_z) return;
-  const float ex = axis_error((float)(first_x + x) * step.x);
-  const float ey = axis_error((float)(first_y + y) * step.y);
-  const float ez = axis_error((float)(first_z + z) * step.z);
+  if (x >= f.count_x || y >= f.count_y || z >= f.count_z) return;
+  const float ex = axis_error((float)(f.first_x + x) * f.step_x);
+  const float ey = axis_error((float)(f.first_y + y) * f.step_y);
+  const float ez = axis_error((float)(f.first_z + z) * f.step_z);
   // 1 - (1 - a)(1 - b) = a + b - a b, which keeps small errors to their last digits.
   const float exy = fma(-ex, ey, ex + ey);
   const float e = fma(-exy, ez, exy + ez);
@@ -37,15 +37,15 @@ __kernel void error_map(__global float* restrict centre, __global float* restric
   const float mid = max(min(ex, ey), min(max(ex, ey), ez));
   const float pair = fma(-mid, high, mid + high);
   float proved = e;
-  if (mid > 0.0f && 1.0f - e < exact_product) {
+  if (mid > 0.0f && 1.0f - e < f.exact_product) {
     proved = pair;
-    if (1.0f - pair < exact_product)
-      proved = min(mid + high, beyond_product(beyond, 1.0f - pair, exact_product));
+    if (1.0f - pair < f.exact_product)
+      proved = min(mid + high, beyond_product(beyond, 1.0f - pair, f.exact_product));
     proved += low;
     if (low > 0.0f)
-      proved = min(proved, beyond_product(beyond + VDVR_TABLE_STEPS + 1, 1.0f - e, exact_product));
+      proved = min(proved, beyond_product(beyond + VDVR_TABLE_STEPS + 1, 1.0f - e, f.exact_product));
   }
-  const size_t at = ((size_t)z * count_y + y) * count_x + x;
+  const size_t at = ((size_t)z * f.count_y + y) * f.count_x + x;
   centre[at] = e;
-  bound[at] = proved * margin;
+  bound[at] = proved * f.margin;
 }

@@ -7,6 +7,8 @@
 // runs of 32 terms, as in kernels/fbp/batched_product.cl, for rounding.
 #pragma OPENCL FP_CONTRACT ON
 
+#include "shared/axis_product.h"
+
 // The last columns, fewer than 16.
 inline float element(__global const float* s, __global const float* v, int terms, int columns, int s_term) {
   float total = 0.0f;
@@ -20,10 +22,12 @@ inline float element(__global const float* s, __global const float* v, int terms
 }
 
 __kernel void axis_product(__global float* restrict out, __global const float* restrict s_all,
-                           __global const float* restrict v_all, int batches, int rows, int terms,
-                           int columns, int s_row, int s_term) {
+                           __global const float* restrict v_all, VdvrAxisProduct shape) {
+  // Copies, which no store can be taken to change.
+  const int rows = shape.rows, terms = shape.terms, columns = shape.columns, s_row = shape.s_row,
+            s_term = shape.s_term;
   const int c = (int)get_global_id(0) * 16, r = (int)get_global_id(1) * 4, b = (int)get_global_id(2);
-  if (c >= columns || r >= rows || b >= batches) return;
+  if (c >= columns || r >= rows || b >= shape.batches) return;
   __global const float* s = s_all + (size_t)r * s_row;
   __global const float* v = v_all + (size_t)b * terms * columns + c;
   __global float* to = out + ((size_t)b * rows + r) * columns + c;

@@ -6,11 +6,12 @@
 // tile of neighbours in x and y: position, index and weights are shared by the whole column, and the loads
 // are contiguous. Positions are relative to the block's middle, so fp32 holds them; views are summed in runs
 // of VDVR_RUN, whose sums are then added (docs/error-bounds.md, section 7). rows int2[block][y]: the first
-// and last column of that row (and of the tile's rows above it) that anyone wants. first_chunk: where in
-// filtered the rows wanted begin. Called by host/fbp/back_project.cpp.
+// and last column of that row (and of the tile's rows above it) that anyone wants. Called by
+// host/fbp/back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #include "device/lanes.h"
+#include "shared/back_project.h"
 
 #ifndef VDVR_CUBIC
 #error "VDVR_CUBIC must be 0 (linear in u) or 1 (4-point cubic in u)"
@@ -100,13 +101,15 @@
   }
 
 __kernel void back_project(__global float* out, __global const float* filtered, __global const float4* steps,
-                           __global const int2* rows, int views, int columns, int z_padded, int out_stride,
-                           int nx, int ny, int blocks, int first_chunk) {
+                           __global const int2* rows, VdvrColumnBlocks shape) {
+  // Copies, which no store can be taken to change.
+  const int views = shape.views, columns = shape.columns, z_padded = shape.z_padded,
+            out_stride = shape.out_stride, nx = shape.nx, ny = shape.ny;
   const int z = (int)get_global_id(0) * (VDVR_LANES * VDVR_VECTORS);
   const int x = (int)get_global_id(1) * TILE_X;
   const int tile_rows = (ny + TILE_Y - 1) / TILE_Y, row = (int)get_global_id(2);
   const int block = row / tile_rows, y = (row - block * tile_rows) * TILE_Y;
-  if (z >= z_padded || x >= nx || block >= blocks) return;
+  if (z >= z_padded || x >= nx || block >= shape.blocks) return;
 
   // Columns outside every wanted interval are left as they are.
   const int2 wanted = rows[(size_t)block * ny + y];
@@ -116,7 +119,8 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
   const TILE tile_x = ((float)x - 0.5f * (float)(nx - 1)) + OFFSET_X,
              tile_y = ((float)y - 0.5f * (float)(ny - 1)) + OFFSET_Y;
   FOR_TILE(ZERO)
-  __global const float* plane = filtered + (size_t)(first_chunk + z / 16) * views * columns * 16 + z % 16;
+  __global const float* plane =
+      filtered + (size_t)(shape.first_chunk + z / 16) * views * columns * 16 + z % 16;
   // From one vector of z to the next, in the same chunk or the next one; beyond the last the same one again.
   const int next = z + VDVR_LANES;
   const size_t above = next >= z_padded ? 0

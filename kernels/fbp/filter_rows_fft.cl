@@ -28,10 +28,9 @@ __kernel void multiply_spectrum(__global REAL2* spectrum, __global const REAL* f
 }
 
 __kernel void crop_transposed(__global float* columns_out, __global const REAL* padded,
-                              __global const REAL* weights, int columns, int rows, int rows_padded,
-                              int length, int views) {
+                              __global const REAL* weights, int columns, int rows, int length, int views) {
   const int v = (int)get_global_id(0), u = (int)get_global_id(1), k = (int)get_global_id(2);
-  if (v >= rows_padded || u >= columns || k >= views) return;
-  columns_out[((size_t)k * columns + u) * rows_padded + v] =
-      v < rows ? (float)(weights[k] * padded[((size_t)k * rows + v) * length + u]) : 0.0f;
+  if (v >= rows || u >= columns || k >= views) return;
+  columns_out[((size_t)k * columns + u) * rows + v] =
+      (float)(weights[k] * padded[((size_t)k * rows + v) * length + u]);
 }

@@ -164,8 +164,8 @@ typedef struct {
 
 // From the lattice of their triple (fit_coefficients.cl).
 __kernel void extract_tiles(__global float* out, __global const float* lattice, __global const float* margin,
-                            __global const TileRequest* requests, int count, int nx, int ny, int halo,
-                            VdvrLattice l, float kept) {
+                            __global const TileRequest* requests, int count, VdvrGoldShape s, VdvrLattice l,
+                            float kept) {
   const int i = (int)get_global_id(0), request = (int)get_global_id(1);
   if (request >= count) return;
   const TileRequest r = requests[request];
@@ -174,7 +174,7 @@ __kernel void extract_tiles(__global float* out, __global const float* lattice, 
   const int x = min(r.node_x + ix * r.spacing_x, r.last_x), y = min(r.node_y + iy * r.spacing_y, r.last_y);
   const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
   const bool keep =
-      margin[((size_t)r.block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo] >= kept;
+      margin[((size_t)r.block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo] >= kept;
   const size_t column =
       ((size_t)r.block * l.cy + y / l.spacing_y + l.reach_y) * l.cx + x / l.spacing_x + l.reach_x;
   out[r.offset + i] = keep ? lattice[column * l.cz + z / l.spacing_z + l.reach_z] : 0.0f;

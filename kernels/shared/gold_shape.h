@@ -1,8 +1,9 @@
-// Blocks of gold side by side, and the bricks under them: what kernels that read gold are told of its layout
-// (node_slack.cl). Passed by value from host/gold/gold_batch.cpp to classify.cl and measure.cl.
+// Blocks of gold side by side: what kernels that read gold are told of its layout (node_slack.cl).
 #ifndef VDVR_GOLD_SHAPE_H
 #define VDVR_GOLD_SHAPE_H
 
+// With the bricks under them. Passed by value from host/gold/gold_batch.cpp to classify.cl and measure.cl. 48
+// bytes.
 typedef struct {
   int nx, ny, nz;                    // nodes of a block, without its halo
   int halo;                          // nodes on every side
@@ -12,5 +13,15 @@ typedef struct {
   int blocks;
   float lowest;  // columns of a smaller coverage margin are not tested
 } VdvrGoldShape;
+
+// Alone. Passed by value from host/gold/fit_coefficients.cpp to fit_coefficients.cl. 32 bytes.
+typedef struct {
+  int nx, ny;       // nodes of a block, without its halo
+  int halo;         // nodes on every side
+  int gold_stride;  // of a column of gold
+  int blocks;
+  int z_first, z_last;  // tested nodes along z
+  float lowest;         // columns of a smaller coverage margin are not tested
+} VdvrGoldBlocks;
 
 #endif

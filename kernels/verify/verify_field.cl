@@ -36,21 +36,22 @@
     vstore16(accumulate ? vload16(0, to) + sum##i : sum##i, 0, to); \
   }
 
-// Adds a run of views: first_view of all, in_table the first of them in the table. steps: per block and view
-// {columns per node along x, along y, the block's first node less a whole number of columns, that whole
-// number}. nx, ny count the halo.
+// Adds a run of views. steps: per block and view {columns per node along x, along y, the block's first node
+// less a whole number of columns, that whole number}.
 __kernel void verify_field(__global float* field, __global const float* table, __global const float4* steps,
-                           int accumulate, int first_view, int in_table, int views, int all_views,
-                           int columns, int z_padded, int nx, int ny, int blocks) {
+                           VdvrViewRun run) {
+  // Copies, which no store can be taken to change.
+  const int accumulate = run.accumulate, views = run.views, columns = run.columns, z_padded = run.z_padded,
+            nx = run.nx, ny = run.ny;
   // All columns of a block at 16 heights, then the next 16: what they read of the table stays in the cache.
   const int x = (int)get_global_id(0) * 8, y = (int)get_global_id(1), chunks = z_padded / 16;
   const int block = (int)get_global_id(2) / chunks, z = ((int)get_global_id(2) - block * chunks) * 16;
-  if (x >= nx || y >= ny || block >= blocks) return;
+  if (x >= nx || y >= ny || block >= run.blocks) return;
   __global float* target = field + (((size_t)block * ny + y) * nx + x) * z_padded + z;
   FOR_TILE(CLEAR)
   const float8 tile_x = (float)x + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-  __global const float* plane = table + ((size_t)in_table * z_padded + z) * columns;
-  __global const float4* view = steps + (size_t)block * all_views + first_view;
+  __global const float* plane = table + ((size_t)run.in_table * z_padded + z) * columns;
+  __global const float4* view = steps + (size_t)block * run.all_views + run.first_view;
   for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
     const float4 step = view[k];
     // s > 0 in the block by the host's choice of the whole number: truncation is floor.
