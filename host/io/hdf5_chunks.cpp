@@ -143,9 +143,14 @@ bool chunks_fit(const Dataset& d) {
   return n * bytes <= stored && stored <= n * (bytes + double{fletcher32_bytes});
 }
 
+/// No number of any machine is longer. A damaged length is what HDF5 1.10 takes a chunk to be long by.
+constexpr std::uint64_t longest_number_bytes = 16;
+
 }  // namespace
 
 std::optional<std::string> check_extents(const Dataset& d) {
+  if (d.element_bytes > longest_number_bytes)
+    return fmt::format("is damaged: its numbers are {} bytes long", d.element_bytes);
   if (!extents_fit(d)) return "is damaged: an axis, or its chunks, are longer than its largest extent";
   if (d.layout == H5D_CHUNKED && !chunks_fit(d))
     return "is damaged: its chunks are not as long as their shape says";
