@@ -13,7 +13,7 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/close_boundaries.hpp"
-#include "host/certify/prepared_scan.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/certify/raise_levels.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"

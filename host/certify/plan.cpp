@@ -16,7 +16,7 @@
 #include "host/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/foresee.hpp"
-#include "host/certify/prepared_scan.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 #include "host/bounds/remainder_norms.hpp"
 
 namespace vdvr {

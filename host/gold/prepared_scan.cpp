@@ -1,4 +1,4 @@
-#include "host/certify/prepared_scan.hpp"
+#include "host/gold/prepared_scan.hpp"
 
 #include <bit>
 

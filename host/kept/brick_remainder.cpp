@@ -1,5 +1,5 @@
-// Launcher of kernels/gold/fourth_differences.cl.
-#include "host/gold/brick_remainder.hpp"
+// Launcher of kernels/kept/fourth_differences.cl.
+#include "host/kept/brick_remainder.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -146,7 +146,7 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
   const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
                                        "fourth differences");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(
-      state_, "gold/fourth_differences", "fourth_differences");
+      state_, "kept/fourth_differences", "fourth_differences");
   const auto side = [&](std::size_t a) { return to_int(granularity_ * kept_.rates()[a]); };
   kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
          margin.buffer(),

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "host/bounds/projection_bounds.hpp"
-#include "host/certify/classify_bricks.hpp"
 #include "host/fbp/filter_projections.hpp"
 #include "host/gold/gold_source.hpp"
 #include "host/opencl/host_memory.hpp"

@@ -1,6 +1,6 @@
 // Keeps tiles of back-projected columns, and interpolates boxes from them. Calls back_project.cpp and
 // interpolate_gold.cpp.
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
-// Launcher of kernels/gold/interpolate.cl.
-#include "host/gold/interpolate_gold.hpp"
+// Launcher of kernels/kept/interpolate.cl.
+#include "host/kept/interpolate_gold.hpp"
 
 #include <algorithm>
 #include <stdexcept>
@@ -72,7 +72,7 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   shape.groups = to_int(groups_);
   const auto lanes = count(column_tuning(state.info).lanes);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "gold/interpolate", "along_z", defines(state, 1));
+      state, "kept/interpolate", "along_z", defines(state, 1));
   kernel({{count(groups_ * lanes_of_group) / lanes, count((shape.columns_x + 7) / 8), count(shape.columns_y)},
           {1, 4, 1}},
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), shape);
@@ -84,7 +84,7 @@ Across::Across(opencl::State& state, int phases, std::span<const float> weights)
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
   const auto lanes = count(column_tuning(state.info).lanes);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "gold/interpolate", "across",
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
                                                                         defines(state, phases_));
   kernel({{count(shape.z) / lanes, count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
          in.buffer(), weights_.buffer(), shape);
