@@ -81,8 +81,9 @@ class GoldStream {
 
   /// fp32 error bound of any gold sample, the filter's included.
   [[nodiscard]] double arithmetic() const { return errors_.rounding + errors_.ramp; }
-  /// P: how far a gold sample lies from the field of the computed filtered samples but for rounding.
-  [[nodiscard]] double projection() const { return settings_.grid_only ? 0 : errors_.interpolation; }
+  /// P: how far a gold sample lies from the field of the computed filtered samples but for rounding; also
+  /// where slack does not count.
+  [[nodiscard]] double projection() const { return errors_.interpolation; }
   /// What interpolation adds to every slack.
   [[nodiscard]] double projection_in_slack() const {
     return settings_.grid_only ? 0 : errors_.interpolation + errors_.curved_interpolation;

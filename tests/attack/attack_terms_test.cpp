@@ -6,6 +6,7 @@
 #include "host/fbp/view_weights.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
+#include "tests/support/exact_columns.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
@@ -17,60 +18,6 @@ using namespace vdvr::attacks;
 namespace {
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
-
-// Filtered samples as if measured without error: what is tested is what comes after the filter.
-FilteredScan given_samples(const ParallelGeometry& g, const Value& q) {
-  FilteredScan f;
-  f.geometry = g;
-  f.view_max.assign(g.theta_rad.size(), 0.0);
-  for (std::size_t k = 0; k < g.theta_rad.size(); ++k)
-    for (std::size_t u = 0; u < at(g.columns); ++u)
-      for (std::size_t v = 0; v < at(g.rows); ++v) {
-        f.samples.push_back(static_cast<float>(q(k, v, u)));
-        f.view_max[k] = std::max(f.view_max[k], std::abs(static_cast<double>(f.samples.back())));
-      }
-  return f;
-}
-
-// q_k on upsampled column n and at a detector row, in double precision, from samples [view][u][v].
-struct ExactColumns {
-  ParallelGeometry g;
-  UpsampledColumns columns;
-  std::vector<double> samples;
-  std::vector<double> row_weights;  // of the one detector row in use
-  ExactColumns(const ParallelGeometry& geometry, const UpsampledColumns& c, const std::vector<float>& s,
-               double row)
-      : g(geometry),
-        columns(c),
-        samples(s.begin(), s.end()),
-        row_weights(resampling_matrix(g.rows, std::array{row}, 0, g.pitch_v, 0)) {}
-  double operator()(std::size_t k, std::int64_t n) const {
-    const auto weights = resampling_matrix(g.columns, std::array{columns.position(n)}, 0, g.pitch_u, 0);
-    double sum = 0;
-    for (std::size_t u = 0; u < at(g.columns); ++u)
-      for (std::size_t v = 0; v < at(g.rows); ++v)
-        sum += weights[u] * row_weights[v] * samples[(k * at(g.columns) + u) * at(g.rows) + v];
-    return sum;
-  }
-  // The interpolant, linear or Lagrange's cubic, at a world point.
-  double back_projected(double x, double y, bool cubic) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
-      const double t = x * std::cos(g.theta_rad[k]) + y * std::sin(g.theta_rad[k]);
-      const double s = columns.column_of(t / g.pitch_u + g.center);
-      const auto n = static_cast<std::int64_t>(std::floor(s));
-      const double f = s - static_cast<double>(n);
-      if (!cubic) {
-        sum += (1 - f) * (*this)(k, n) + f * (*this)(k, n + 1);
-        continue;
-      }
-      sum += -f * (1 - f) * (2 - f) / 6 * (*this)(k, n - 1) +
-             (1 + f) * (1 - f) * (2 - f) / 2 * (*this)(k, n) + (1 + f) * f * (2 - f) / 2 * (*this)(k, n + 1) -
-             (1 + f) * f * (1 - f) / 6 * (*this)(k, n + 2);
-    }
-    return sum;
-  }
-};
 
 struct Arithmetic {
   double error = 0, bound = 0;
@@ -97,7 +44,7 @@ Arithmetic measure(const FilteredScan& filtered, const std::vector<float>& truth
     for (std::int64_t x = 0; x < blocks.nx; ++x) {
       const double e = exact.back_projected(blocks.first[0][0] + static_cast<double>(x) * blocks.step_x,
                                             blocks.first[0][1] + static_cast<double>(y) * blocks.step_y,
-                                            interpolation == Interpolation::cubic);
+                                            interpolation);
       a.error = std::max(a.error,
                          std::abs(static_cast<double>(host[at((y * blocks.nx + x) * column_stride(1))]) - e));
     }
@@ -250,8 +197,8 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_gold_of_awkward_scans) {
     FilteredScan filtered = filter_projections(device().state(), scan.data, {});
     filtered.ramp_error = 0;                        // what is tested starts from the filtered samples
     if (filtered.view_max[0] < 0x1p-100) continue;  // attacked with the filter
-    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
-      const int upsampling = 2 << (turn++ % 4);
+    for (const Interpolation filter : all_filters) {
+      const int upsampling = filter == Interpolation::six_taps ? 8 : 2 << (turn++ % 4);
       const ColumnBlocks block{3, 3, 0.37, 0.41, {{scan.target[0] - 0.5, scan.target[1] - 0.4}}, {}};
       const double row = scan.target[2] / scan.data.geometry.pitch_v +
                          0.5 * static_cast<double>(scan.data.geometry.rows - 1);
@@ -270,8 +217,9 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_errors_of_the_filtered_samples) {
   const ParallelGeometry g = geometry(5, 4, 24);
   const double e = 0x1p-10;
   for (const int upsampling : {2, 8})
-    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+    for (const Interpolation filter : all_filters)
       for (const double row : {1.5, 0.5, 3.4}) {
+        if (!serves(upsampling, filter)) continue;
         const double place = middle_of_column(g.center, upsampling) + 0.5 / upsampling;  // on a column
         const auto wu = resampling_matrix(g.columns, std::array{place}, 0, 1, 0),
                    wv = resampling_matrix(g.rows, std::array{row}, 0, 1, 0);
@@ -331,12 +279,13 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_long_biased_sums) {
   for (const std::int64_t views : {8192, 65536}) {
     ParallelGeometry g = geometry(views, 1, 8);
     g.center = 4 - 0.5;  // on a column of every rate: the second term of each view is 0
-    for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+    for (const Interpolation filter : all_filters)
       for (const double term : {1.9999, 1.75, 1.3337, 1.2501, 1.0626}) {
         if (views > 8192 && term != 1.75) continue;
         const FilteredScan f = given_samples(
             g, [&](auto, auto, auto) { return term / static_cast<double>(views) * (1 + 0x1p-13); });
-        expect(measure(f, f.samples, 2, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
+        const int upsampling = filter == Interpolation::six_taps ? 8 : 2;
+        expect(measure(f, f.samples, upsampling, filter, {1, 1, 0.01, 0.01, {{0, 0}}, {}}, 0),
                std::string("summation of ") + std::to_string(views) + " views, " + text_of(filter) + ", " +
                    std::to_string(term));
       }
@@ -349,12 +298,12 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
   constexpr std::int64_t columns = 2048;
   ParallelGeometry g = geometry(2, 1, columns);
   g.theta_rad = {0.1234, 1.3};
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+  for (const Interpolation filter : all_filters)
     for (const std::size_t m : {2047u, 1500u}) {
       const FilteredScan f = given_samples(g, [&](auto, auto, std::size_t u) {
         return std::sin(reference::frequency(m, columns) * (static_cast<double>(u) + 0.5) + 0.1);
       });
-      expect(measure(f, f.samples, 2, filter, {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
+      expect(measure(f, f.samples, filter == Interpolation::six_taps ? 8 : 2, filter, {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
              std::string("position, ") + text_of(filter) + ", wave " + std::to_string(m));
     }
 }

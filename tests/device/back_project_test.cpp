@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include "host/bounds/projection_bounds.hpp"
+#include "host/bounds/six_taps.hpp"
 #include "host/opencl/kernel.hpp"
 #include "tests/reference/back_project.hpp"
 #include "tests/reference/cosine_series.hpp"
@@ -25,6 +26,12 @@ reference::UpsampledViews read_back(const UpsampledSlab& slab) {
         q.values.push_back(static_cast<double>(values[static_cast<std::size_t>(
             ((z / 16 * slab.views + k) * slab.columns.count + n) * 16 + z % 16)]));
   return q;
+}
+
+constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic, Interpolation::six_taps};
+
+int taps_of(Interpolation filter) {
+  return filter == Interpolation::six_taps ? 6 : filter == Interpolation::cubic ? 4 : 2;
 }
 
 std::vector<double> rows_of(std::int64_t rows, std::int64_t count) {
@@ -69,7 +76,9 @@ void check_reference(const ProjectionSet& scan, int rate, Interpolation filter, 
   back_project(device.state(), filtered.geometry, slab, blocks, filter, out);
   const auto q = read_back(slab);
   // A fused multiply-add per weight and view; cubic weights round up to 8 times themselves.
-  const std::int64_t roundings = (filter == Interpolation::cubic ? 4 : 2) * slab.views + 8;
+  // Those of six are known as a sum (six_taps.hpp), of samples that do not exceed the largest.
+  const std::int64_t roundings = taps_of(filter) * slab.views + 8;
+  const double weights = filter == Interpolation::six_taps ? six_tap_facts().rounding : 0;
   const double position = position_error(filtered.geometry, slab.columns, blocks);
   std::int64_t compared = 0, wrong = 0;
   for_each_sample(out.to_host(), blocks, rows, [&](double x, double y, std::int64_t z, double computed) {
@@ -77,7 +86,8 @@ void check_reference(const ProjectionSet& scan, int rate, Interpolation filter, 
     if (!expected.inside) return;
     ++compared;
     if (!(std::abs(computed - expected.value) <=
-          tolerance::fp32_sum(roundings, expected.magnitude) + position * expected.slope))
+          tolerance::fp32_sum(roundings, expected.magnitude) + position * expected.slope + expected.jump +
+              weights * expected.largest))
       ++wrong;
   });
   BOOST_TEST(wrong == 0);
@@ -115,7 +125,7 @@ std::vector<float> with_tuning(opencl::State& state, const ParallelGeometry& g, 
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(back_project_matches_reference_over_odd_extents) {
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+  for (const Interpolation filter : all_filters)
     for (const auto& [views, rows, columns] : {std::array{1, 1, 9}, {7, 3, 31}, {19, 5, 24}})
       for (const auto& [nx, ny, nz] :
            {std::array<std::int64_t, 3>{1, 1, 1}, {3, 5, 17}, {13, 2, 33}, {7, 9, 48}})
@@ -131,13 +141,13 @@ BOOST_AUTO_TEST_CASE(back_project_matches_reference_over_odd_extents) {
 
 BOOST_AUTO_TEST_CASE(several_blocks_match_reference_wherever_they_lie) {
   const ProjectionSet scan = noise_scan(11, 3, 27);
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+  for (const Interpolation filter : all_filters)
     check_reference(scan, 8, filter, {5, 7, 0.25, 0.25, {{0, 0}, {-9.3, 2.1}, {4.0, -8.7}, {1e-3, 5.5}}}, 9);
 }
 
 BOOST_AUTO_TEST_CASE(blocks_beyond_the_detector_match_where_all_views_are_hit_and_stay_finite) {
   const ProjectionSet scan = noise_scan(6, 2, 15);
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
+  for (const Interpolation filter : all_filters) {
     const ColumnBlocks blocks{33, 29, 1.0, 1.0, {{-16, -14}, {-4, -40}}};
     check_reference(scan, 2, filter, blocks, 5);
     Device device;
@@ -157,13 +167,13 @@ BOOST_AUTO_TEST_CASE(off_centre_axis_and_pitch_follow_the_geometry) {
   ProjectionSet scan = noise_scan(9, 3, 25);
   scan.geometry.center = 10.3;
   scan.geometry.pitch_u = 0.1;
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
+  for (const Interpolation filter : all_filters)
     check_reference(scan, 4, filter, {9, 9, 0.03, 0.05, {{-0.13, -0.22}, {0.2, 0.3}}}, 6);
 }
 
 BOOST_AUTO_TEST_CASE(arithmetic_bound_is_never_exceeded) {
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
-    for (const int rate : {2, 8})
+  for (const Interpolation filter : all_filters)
+    for (const int rate : {filter == Interpolation::six_taps ? 16 : 2, 8})
       for (const auto& [views, rows, columns] : {std::array{13, 1, 24}, {17, 6, 33}}) {
         const ProjectionSet scan = noise_scan(views, rows, columns, static_cast<unsigned>(views + rate));
         Device device;
@@ -200,9 +210,12 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
   const auto q = read_back(slab);
   double magnitude = 0;
   for (const double v : q.values) magnitude = std::max(magnitude, std::abs(v));
-  magnitude *= 1.25 * static_cast<double>(slab.views);  // the largest sum of |cubic weights|
-  const double position = position_error(filtered.geometry, slab.columns, blocks) * 2 * 4.0 / 3 * magnitude;
-  for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic}) {
+  magnitude *= static_cast<double>(slab.views);
+  // Twice what positions may do, of slopes in columns and of sums that are largest with six weights. Positions
+  // are the same to the bit in all tilings, so that none finds itself on the other side of a column.
+  const SixTaps& six = six_tap_facts();
+  const double moved = 2 * position_error(filtered.geometry, slab.columns, blocks) * magnitude;
+  for (const Interpolation filter : all_filters) {
     const auto run = [&](const ColumnTuning& tuning) {
       return with_tuning(device.state(), filtered.geometry, slab, blocks, filter, tuning);
     };
@@ -221,7 +234,10 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
               worst = std::max(
                   worst, std::abs(static_cast<double>(sample_of(first, blocks, slab.rows, b, y, x, z)) -
                                   static_cast<double>(sample_of(other, blocks, slab.rows, b, y, x, z))));
-      BOOST_TEST(worst <= tolerance::fp32_sum(4 * slab.views + 8, magnitude) + position);
+      const bool of_six = filter == Interpolation::six_taps;
+      BOOST_TEST(worst <= tolerance::fp32_sum(taps_of(filter) * slab.views + 8, six.norm * magnitude) +
+                              moved * (2 * six.slope + six.slope_sum) +
+                              (of_six ? 2 * six.rounding * magnitude : 0.0));
     }
   }
 }

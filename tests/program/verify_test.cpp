@@ -275,7 +275,7 @@ BOOST_AUTO_TEST_CASE(right_certificates_of_coarse_gold_are_agreed_with) {
     for (const Interpolation filter : {Interpolation::linear, Interpolation::cubic})
       for (const int gold : {2, 4}) {
         const Made m =
-            made(noise_scan(15, 7, 29, seed), {8, 7, 6}, gold == 2 ? 0.6 : 0.2, {16, filter, gold});
+            made(noise_scan(15, 7, 29, seed), {8, 7, 6}, gold == 2 ? 0.75 : 0.2, {16, filter, gold});
         const VerifyResult r = measured(m);
         BOOST_TEST(r.holds, r.failure);
         BOOST_TEST(r.total <= m.certificate.epsilon_abs);
