@@ -1,5 +1,5 @@
-// Bounds in closed form, from sups over the detector, for which kernels/bounds/projection_bounds.cl is launched
-// (docs/error-bounds.md).
+// Bounds in closed form, from sups over the detector, for which kernels/bounds/projection_bounds.cl is
+// launched (docs/error-bounds.md).
 #include "host/bounds/projection_bounds.hpp"
 
 #include <fmt/format.h>
@@ -75,7 +75,8 @@ double lebesgue_constant(std::int64_t n) {
 namespace {
 
 // fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
-// samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order more.
+// samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
+// more.
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
@@ -90,19 +91,52 @@ std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int
   return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
 }
 
+// Where sups are sampled. A signal sampled L times denser than Nyquist rises above its samples by at most
+// 1 / cos(pi / (2 L)), per axis (Ehlich and Zeller 1964). A single row does not vary along v.
+struct DenseGrid {
+  static constexpr int density = 4;
+  explicit DenseGrid(const FilteredScan& scan)
+      : columns(upsampled_columns(scan.geometry.columns, density, 0)) {
+    const std::int64_t V = scan.geometry.rows;
+    for (std::int64_t j = 0; j <= density * V; ++j) rows.push_back(-0.5 + static_cast<double>(j) / density);
+    const double of_axis = 1 / std::cos(pi / (2.0 * density));
+    rise = V > 1 ? of_axis * of_axis : of_axis;
+  }
+  UpsampledColumns columns;
+  std::vector<double> rows;
+  double rise = 1;
+};
+
 }  // namespace
+
+FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  FieldSups sups;
+  const DenseGrid dense(scan);
+  const std::int64_t chunk =
+      view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
+  for (std::int64_t first = 0; first < g.views(); first += chunk)
+    for (const double m : view_sups(state,
+                                    upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first,
+                                              std::min(chunk, g.views() - first)),
+                                    0))
+      sups.value += dense.rise * m;
+  for (const double m : scan.view_max)
+    sups.value += derivative_rounding(upsampler, scan, dense.columns, 0, m);
+  sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
+  if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
+  return sups;
+}
 
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
   const ParallelGeometry& g = scan.geometry;
-  constexpr int dense = 4;
-  // A signal sampled L times denser than Nyquist rises above its samples by at most 1 / cos(pi / (2 L)), per
-  // axis (Ehlich and Zeller 1964). A single row does not vary along v.
-  const double rise = 1 / std::cos(pi / (2.0 * dense)), rise_v = g.rows > 1 ? rise : 1.0;
-  const UpsampledColumns columns = upsampled_columns(g.columns, dense, 0),
-                         own = upsampled_columns(g.columns, 1, 0);
-  std::vector<double> rows, own_rows;
-  for (std::int64_t j = 0; j <= dense * g.rows; ++j) rows.push_back(-0.5 + static_cast<double>(j) / dense);
+  const DenseGrid grid(scan);
+  constexpr int dense = DenseGrid::density;
+  const UpsampledColumns &columns = grid.columns, own = upsampled_columns(g.columns, 1, 0);
+  const std::vector<double>& rows = grid.rows;
+  std::vector<double> own_rows;
   for (std::int64_t j = 0; j < g.rows; ++j) own_rows.push_back(static_cast<double>(j));
+  const double rise = grid.rise;
 
   FieldSups sups;
   std::vector<double> second_u, second_v;  // by view
@@ -114,13 +148,13 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   };
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
-    sups.value += rise * rise_v * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
+    sups.value += rise * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
     for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
-      second_u.push_back(rise * rise_v * m);
+      second_u.push_back(rise * m);
     sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
     if (g.rows > 1) {
       for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
-        second_v.push_back(rise * rise_v * m);
+        second_v.push_back(rise * m);
       sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
     }
   }
@@ -209,8 +243,12 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
   // A wrong position moves along the interpolant, and where intervals of six weights meet, which do not
-  // reproduce columns, may jump by twice what they err.
-  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  // reproduce columns, may jump by twice what they err. Six taps go by values alone, which is all that some
+  // callers have.
+  const double steepest = pi / g.pitch_u * sups.value,
+               slope = interpolation == Interpolation::six_taps
+                           ? steepest
+                           : std::min(steepest, std::sqrt(2 * sups.value * sups.second_u));
   const double moved = position_error(g, columns, blocks);
   out.position =
       moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) +

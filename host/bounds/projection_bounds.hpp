@@ -23,8 +23,10 @@ struct FieldSups {
 };
 
 /// Throws InputError where a derivative's sup is no finite number: no bound can be made of it.
-/// Cost: three derivatives on a grid 4 times denser than the detector both ways.
+/// Cost: values and derivatives on a grid 4 times denser than the detector both ways.
 FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
+/// Derivatives by Bernstein's inequality, at a third of the cost: what rates of six taps and gold need.
+FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
 
 /// Bounds the growth of sample errors by band-limited interpolation of n samples (Lebesgue constant of the
 /// mirror extension).

@@ -13,6 +13,7 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/close_boundaries.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/certify/raise_levels.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
@@ -132,7 +133,7 @@ double node_tolerance(const Inputs& in, const SamplerTerms& sampler) {
                   "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
                   to_world(in.plan.epsilon_abs, in.units), projection ? "the projections" : "gold",
                   to_world(static_cast<double>(slack), in.units), to_world(tolerance, in.units),
-                  projection ? "`upsampling`, or take `u_filter` cubic," : "`gold`",
+                  projection ? "`upsampling`, or take `u_filter` six-taps," : "`gold`",
                   to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 
@@ -321,10 +322,8 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
 }
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
-  host.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
+  host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, as read,");
   host.count(4 * (2 * plan.base.samples.size() + plan.fitted.size()), "the base samples");
-  const Index3& cells = plan.grid.cells;
-  host.count(8 * static_cast<std::uint64_t>(cells[0] * cells[1] * cells[2]), "the slack of base cells");
 }
 
 SamplerTerms with_reserve(SamplerTerms terms) {
@@ -347,12 +346,16 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   if (std::find(selected.begin(), selected.end(), 1) == selected.end())
     throw InputError("`roi` meets no brick of the grid");
 
-  const FilteredScan filtered =
-      filter_projections(state, scan, plan.field, progress, FilterMethod::automatic, Precision::fp64, units);
-  Upsampler upsampler(state, filtered);
+  // Six taps need values alone.
+  const bool prepared = plan.prepared && plan.prepared->is_of(state, scan, plan.field, units);
+  const auto from = prepared ? plan.prepared
+                             : std::make_shared<PreparedScan>(
+                                   state, scan, plan.field, units,
+                                   plan.rates.interpolation != Interpolation::six_taps, progress);
+  const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
-  const FieldSups sups = field_sups(state, upsampler, filtered);
-  GoldRates gold(state, filtered, sups, gold_settings(plan, options, base.lattice));
+  const GoldSettings settings = gold_settings(plan, options, base.lattice);
+  GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
   const SamplerProbe probe = probe_sampler(device);

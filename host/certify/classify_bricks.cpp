@@ -269,17 +269,18 @@ void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, 
   if (!any(selected)) return;
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
                                                     "bricks to measure");
-  gold.run(selected,
-           {[&](GoldStream::Batch& batch) {
-              ByteWriter out;
-              for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), on_device))
-                put(out, m);
-              return out.take();
-            },
-            [&](ByteReader in) {
-              while (!in.empty()) visit(get_measure(in));
-            }},
-           progress_, stage);
+  gold.run(
+      selected,
+      {[&](GoldStream::Batch& batch) {
+         ByteWriter out;
+         for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), on_device, true))
+           put(out, m);
+         return out.take();
+       },
+       [&](ByteReader in) {
+         while (!in.empty()) visit(get_measure(in));
+       }},
+      progress_, stage);
 }
 
 void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,

@@ -226,9 +226,8 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   // What will be kept and was not needed so far.
   const KeptGold& kept = gold.fine().source()->kept;
   const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
-  out.seconds =
-      first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
-                       static_cast<double>(kept.tiles() + missing);
+  out.seconds = first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
+                                 static_cast<double>(kept.tiles() + missing);
   const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {
     out.seconds += small.seconds(fine, purpose, bricks[fate]);
   };

@@ -16,6 +16,7 @@
 #include "host/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/foresee.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
@@ -267,7 +268,7 @@ class Planner {
   Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
           const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
       : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
-    host_.count(8 * static_cast<std::uint64_t>(scan.size()), "the projections, as read and filtered,");
+    host_.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
     ParallelGeometry used = scan.geometry;
     if (field.center) used.center = *field.center;
@@ -277,24 +278,21 @@ class Planner {
     plan_.settings = settings;
     plan_.layout = {fitting_granularity(settings.granularity, grid), {}, settings.levels};
     report(progress_, "plan", 0.0);
-    preparation_ = seconds_of([&] {
-      filtered_ =
-          filter_projections(state_, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
-    });
-    upsampler_.emplace(state_, filtered_);
-    coverage_.emplace(filtered_.geometry);
+    preparation_ = seconds_of(
+        [&] { prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, true, Progress{}); });
+    coverage_.emplace(prepared_->filtered.geometry);
   }
 
   Plan make(const RateOptions& wanted, const Tolerance& tolerance) {
     const std::vector<Rates> all = candidates(wanted);
     reconstruct_reference();
-    sups_ = field_sups(state_, *upsampler_, filtered_);
     set_epsilon(plan_, tolerance,
                 plan_.settings.comparison.epsilon_of_max
-                    ? largest_of_gold(state_, filtered_, sups_, plan_.grid, all.front())
+                    ? largest_of_gold(state_, prepared_->filtered, prepared_->sups, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
-    plan_.bounds = global_bounds(state_, filtered_, sups_, plan_.base, plan_.settings.foresee);
+    plan_.bounds =
+        global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base, plan_.settings.foresee);
     report(progress_, "plan", 0.6);
     const Chosen chosen = choose_rates(all);
     take(chosen);
@@ -302,13 +300,15 @@ class Planner {
     lay_out_base(chosen.trial);
     if (plan_.settings.foresee) foresee(chosen.trial);
     report(progress_, "plan", 1.0);
+    plan_.prepared = prepared_;
     return std::move(plan_);
   }
 
  private:
   // The reference range and the coverage, at rates whose own error cannot matter.
   void reconstruct_reference() {
-    plan_.base = reconstruct_field(state_, filtered_, *upsampler_, plan_.grid, 8, Interpolation::cubic, {});
+    plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid, 8,
+                                   Interpolation::six_taps, {});
     check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
@@ -330,17 +330,10 @@ class Planner {
     return s;
   }
 
-  // Rates that differ in gold alone share what they read.
-  std::shared_ptr<GoldSource> source_at(const Rates& r) {
-    if (!source_ || source_rates_.upsampling != r.upsampling ||
-        source_rates_.interpolation != r.interpolation)
-      source_ = std::make_shared<GoldSource>(state_, filtered_, sups_, settings_at(r));
-    source_rates_ = r;
-    return source_;
-  }
+  std::shared_ptr<GoldSource> source_at(const Rates& r) { return prepared_->source(settings_at(r)); }
 
   Trial try_out(const Rates& r) {
-    GoldRates gold(state_, filtered_, sups_, settings_at(r), source_at(r));
+    GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(r), source_at(r));
     const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs);
     add_trial_bounds(plan_.bounds, r, t);
     return t;
@@ -351,11 +344,6 @@ class Planner {
   Chosen choose_rates(const std::vector<Rates>& all) {
     std::optional<Chosen> finest;
     for (const Rates& r : all) {
-      // Node by node, P is seldom below a quarter of its global bound: skip rates that this alone rules out.
-      const double step = filtered_.geometry.pitch_u / r.upsampling;
-      if (!grid_only() && r.interpolation == Interpolation::linear && &r != &all.back() &&
-          2.5 * 0.25 * step * step / 8 * sups_.second_u > linear_share * plan_.epsilon_abs)
-        continue;
       const Trial t = try_out(r);
       if (!finest || t.slack < finest->trial.slack) finest = {r, t};
       if (grid_only() || fits(r, t, plan_.epsilon_abs)) return {r, t};
@@ -386,7 +374,7 @@ class Planner {
   void take(const Chosen& chosen) {
     const auto& [r, t] = chosen;
     plan_.rates = r;
-    plan_.budget.projection = {t.projection, "curvature, node-wise, on trial blocks"};
+    plan_.budget.projection = {t.projection, "sups: interpolation in u and between kept gold"};
     plan_.budget.gold = {t.gold, "second differences of gold on trial blocks"};
     plan_.budget.arithmetic = {t.arithmetic, "rounding in fp32"};
     plan_.budget.grid = {grid_only() ? plan_.epsilon_abs : plan_.epsilon_abs - t.slack - t.arithmetic,
@@ -394,9 +382,9 @@ class Planner {
     plan_.gold_samples = 1;
     for (const std::int64_t cells : plan_.grid.cells)
       plan_.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
-    if (r.upsampling != 8 || r.interpolation != Interpolation::cubic)
-      plan_.base =
-          reconstruct_field(state_, filtered_, *upsampler_, plan_.grid, r.upsampling, r.interpolation, {});
+    if (r.upsampling != 8 || r.interpolation != Interpolation::six_taps)
+      plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid,
+                                     r.upsampling, r.interpolation, {});
   }
 
   // How coarse the base is, and its samples.
@@ -405,14 +393,15 @@ class Planner {
     if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
     preparation_ += seconds_of([&] {
       plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
-      fit_base_samples(state_, filtered_, sups_, settings_at(plan_.rates), plan_.fitted, {},
-                       source_at(plan_.rates));
+      fit_base_samples(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates), plan_.fitted,
+                       {}, source_at(plan_.rates));
     });
   }
 
   // Storage, memory and time.
   void foresee(const Trial& t) {
-    GoldRates gold(state_, filtered_, sups_, settings_at(plan_.rates), source_at(plan_.rates));
+    GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates),
+                   source_at(plan_.rates));
     const Foreseen foreseen =
         foresee_build(state_, gold, plan_.base,
                       plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,
@@ -431,12 +420,8 @@ class Planner {
   const Progress& progress_;
   HostMemory host_;
   Plan plan_;
-  FilteredScan filtered_;
-  std::optional<Upsampler> upsampler_;
+  std::shared_ptr<PreparedScan> prepared_;
   std::optional<Coverage> coverage_;
-  FieldSups sups_;
-  std::shared_ptr<GoldSource> source_;
-  Rates source_rates_;
   double preparation_ = 0;  // seconds that build will take again
 };
 

@@ -1,5 +1,5 @@
 // What is done to a batch of gold blocks: fit, classify, extract, measure. Called by classify_bricks.cpp,
-// plan.cpp and measure_tightness.cpp. Launches kernels/gold/classify.cl and kernels/gold/measure.cl.
+// plan.cpp and measure_tightness.cpp. Launches kernels/gold/classify.cl and kernels/gold/cell_test.cl.
 #include "host/gold/gold_batch.hpp"
 
 #include <algorithm>
@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "host/fbp/reconstruct.hpp"
+#include "host/gold/cell_test.hpp"
+#include "host/gold/node_slack.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
@@ -133,53 +135,53 @@ opencl::Defines GoldBatch::brick_nodes() const {
   return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
 }
 
-// Per brick of the blocks, [block][z][y][x].
-struct GoldBatch::Results {
-  opencl::DeviceArray<cl_int> total, error, slack, violated;
-};
+void GoldBatch::take_addends(const std::vector<float>& addends, const GoldErrors& errors) {
+  addend_ = opencl::DeviceArray<float>(state_, std::span<const float>(addends), "what bricks add");
+  errors_ = errors;
+  has_slack_ = false;
+}
 
-GoldBatch::Results GoldBatch::run_measure(const DeviceField& field, float tolerance,
-                                          const opencl::DeviceArray<std::uint8_t>& selected) {
-  const std::uint64_t n = blocks(), size = n * count(bricks_x_ * bricks_y_ * bricks_z_);
-  Results r{{state_, size, "brick totals"},
-            {state_, size, "brick errors"},
-            {state_, size, "brick slack"},
-            {state_, size, "violations"}};
-  r.total.fill(-1);
-  r.error.fill(0);
-  r.slack.fill(-1);
-  r.violated.fill(0);
-  std::vector<cl_int4> firsts;
-  for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
-  const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
-                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_float>
-      kernel(state_, "gold/measure", "measure_nodes", field.defines);
-  const std::uint64_t side = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
-  kernel({{count(bricks_x_) * side, count(bricks_y_) * side, n}, {side, 1, 1}}, r.total.buffer(),
-         r.error.buffer(), r.slack.buffer(), r.violated.buffer(), field.samples.buffer(),
-         field.bricks.buffer(), field.grid, gold_.buffer(), above_.buffer(), below_.buffer(),
-         margin_.buffer(), first.buffer(), selected.buffer(), shape_on_device(), tolerance);
-  return r;
+void GoldBatch::require_slack() {
+  if (std::exchange(has_slack_, true)) return;
+  const std::uint64_t nodes = count(shape_.count * shape_.nx * shape_.ny * stride_);
+  if (above_.size() < nodes) {
+    above_ = {};  // before the next ones are allocated
+    below_ = {};
+    above_ = opencl::DeviceArray<float>(state_, nodes, "node slack above");
+    below_ = opencl::DeviceArray<float>(state_, nodes, "node slack below");
+  }
+  node_slack(state_, settings_, {slab_, block_bricks(), errors_}, shape_, first_brick_, gold_, margin_,
+             addend_, above_, below_);
 }
 
 std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tolerance,
-                                             const opencl::DeviceArray<std::uint8_t>& selected) {
-  const Results r = run_measure(field, tolerance, selected);
-  const auto totals = r.total.to_host(), errors = r.error.to_host(), slacks = r.slack.to_host(),
-             bits = r.violated.to_host();
+                                             const opencl::DeviceArray<std::uint8_t>& selected, bool parts) {
+  std::vector<cl_int4> firsts;
+  for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
+  const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  const auto window = widened_window(errors_, settings_);
+  const VdvrCellTest test{.z_first = to_int(shape_.z_first),
+                          .z_last = to_int(shape_.z_last),
+                          .counted = settings_.grid_only ? 0 : 1,
+                          .windowed = settings_.window ? 1 : 0,
+                          .window_low = static_cast<float>(window.first),
+                          .window_high = static_cast<float>(window.second),
+                          .parts = parts ? 1 : 0,
+                          .tolerance = tolerance};
+  const CellTestResults found =
+      cell_test(state_, field, {gold_, margin_, addend_, first, shape_on_device()}, test, selected,
+                std::int64_t{settings_.granularity} * settings_.rate);
   std::vector<BrickMeasure> out;
   for (const std::int64_t brick : bricks_) {
-    const auto [b, x, y, z] = place(brick);
-    const std::size_t i = at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
+    const std::size_t i = slot(brick);
     BrickMeasure m;
     m.brick = brick;
     m.rate = settings_.rate;
-    if (totals[i] >= 0) {
-      m.total = std::bit_cast<float>(totals[i]);
-      m.error = std::bit_cast<float>(errors[i]);
-      m.slack = std::bit_cast<float>(slacks[i]);
-      m.violated = static_cast<std::uint32_t>(bits[i]);
+    if (found.total[i] >= 0) {
+      m.total = found.total[i];
+      m.error = std::max(0.0f, found.error[i]);
+      m.slack = found.slack[i];
+      m.violated = found.violated[i];
     }
     out.push_back(m);
   }
@@ -218,6 +220,7 @@ std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& 
 
 // The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
 std::vector<float> GoldBatch::errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
+  require_slack();
   const std::int64_t n = shape_.count;
   const std::vector<std::uint8_t> wanted = flags(bricks);
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),

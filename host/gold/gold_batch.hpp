@@ -72,7 +72,8 @@ class GoldBatch {
   /// Calls visit(node index x, y, z in the brick, gold, Slack) for every node of one closed brick; reads the
   /// block back.
   template <class Visit>
-  void for_each_node(std::int64_t brick, Visit&& visit) const {
+  void for_each_node(std::int64_t brick, Visit&& visit) {
+    require_slack();
     const auto [b, x, y, z] = place(brick);
     const std::vector<float> gold = gold_.to_host(), above = above_.to_host(), below = below_.to_host();
     const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate, h = shape_.halo;
@@ -91,13 +92,13 @@ class GoldBatch {
   /// [z][y][x] each. They are gold at the top level, fitted below it if the settings say so.
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
-  /// Measures a stored field on every selected brick.
+  /// Measures a stored field on every selected brick. `parts`: also which parts of it violate the tolerance,
+  /// at the cost of that brick once more.
   std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance,
-                                    const opencl::DeviceArray<std::uint8_t>& selected);
+                                    const opencl::DeviceArray<std::uint8_t>& selected, bool parts = false);
 
  private:
   friend class GoldStream;
-  struct Results;
   struct TileRequest;
   struct Candidate;
   [[nodiscard]] TileRequest request(std::int64_t brick, const Index3& spacing, std::uint64_t offset) const;
@@ -107,8 +108,9 @@ class GoldBatch {
                                 const LevelSamples* lattice);
   [[nodiscard]] opencl::Defines brick_nodes() const;
   [[nodiscard]] VdvrGoldShape shape_on_device() const;
-  Results run_measure(const DeviceField& field, float tolerance,
-                      const opencl::DeviceArray<std::uint8_t>& selected);
+  void take_addends(const std::vector<float>& addends, const GoldErrors& errors);
+  // Slack node by node, made when first asked for.
+  void require_slack();
   GoldBatch(opencl::State& state, const GoldSettings& settings)
       : state_(state), settings_(settings), fit_(state, shape_) {}
   void choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
@@ -133,7 +135,9 @@ class GoldBatch {
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;
-  opencl::DeviceArray<float> gold_, above_, below_, margin_;
+  GoldErrors errors_;
+  bool has_slack_ = false;
+  opencl::DeviceArray<float> gold_, above_, below_, margin_, addend_;
 };
 
 }  // namespace vdvr

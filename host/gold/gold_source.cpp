@@ -7,7 +7,7 @@ namespace vdvr {
 
 double gold_reach(const GoldSettings& settings) {
   return std::max(settings.kept(), kept_margin(settings.grid, 1)) +
-         2 * std::hypot(settings.grid.spacing[0], settings.grid.spacing[1]);
+         3 * std::hypot(settings.grid.spacing[0], settings.grid.spacing[1]);
 }
 
 GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,

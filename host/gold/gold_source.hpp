@@ -2,9 +2,9 @@
 // Called by gold_stream.cpp.
 #pragma once
 
-#include "host/gold/brick_remainder.hpp"
+#include "host/kept/brick_remainder.hpp"
 #include "host/gold/gold_settings.hpp"
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 
 namespace vdvr {
 

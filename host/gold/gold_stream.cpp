@@ -63,8 +63,6 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const Fie
   };
   while (slab_bricks_ > 1 && block_bytes() > state.memory.left() / 5) slab_bricks_ /= 2;
   while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
-  if (settings.base_only) return;
-  node_slack_.emplace(state, *source_->remainder, lattice_, errors_, settings_);
 }
 
 GoldStream::~GoldStream() = default;
@@ -154,7 +152,7 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
   begin(purpose);
   const std::vector<Work> all = partition(selected);
   source_->kept.prepare(lattice_, boxes(all), progress);
-  if (node_slack_) source_->remainder->require(selected, progress);
+  if (!settings_.base_only) source_->remainder->require(selected, progress);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
@@ -253,11 +251,6 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   batch.gold_ =
       opencl::DeviceArray<float>(state_, count(together * gold * b.gold_stride + gold_room), "gold block");
   batch.margin_ = opencl::DeviceArray<float>(state_, count(together * gold), "coverage margins");
-  if (node_slack_) {
-    batch.above_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack above");
-    batch.below_ = opencl::DeviceArray<float>(state_, count(together * nodes), "node slack below");
-    node_slack_->begin(slab, together);
-  }
   // What lies between columns, and beyond the last, is read and not used: let it be finite.
   batch.gold_.fill(0.0f);
   return together;
@@ -301,9 +294,10 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     for (std::size_t b = 0; b < n; ++b)
       source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block,
                          batch.shape_.gold_stride);
-    if (node_slack_)
-      (*node_slack_)(batch.shape_, batch.first_brick_, batch.gold_, batch.margin_, batch.above_,
-                     batch.below_);
+    if (!settings_.base_only)
+      batch.take_addends(brick_addends(*source_->remainder, lattice_, errors_, settings_,
+                                       batch.block_bricks(), batch.first_brick_),
+                         errors_);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
       spent.samples +=
@@ -311,7 +305,6 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     tick(static_cast<double>(n));
   }
   spent.seconds += watch.lap();
-  if (node_slack_) node_slack_->end();
 }
 
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,

@@ -89,7 +89,7 @@ class GoldStream {
     return settings_.grid_only ? 0 : errors_.interpolation + errors_.curved_interpolation;
   }
   /// The part of every slack that is due to rounding: what second differences of rounded gold may hide.
-  [[nodiscard]] double rounding_in_slack() const { return node_slack_ ? node_slack_->rounding() : 0; }
+  [[nodiscard]] double rounding_in_slack() const { return settings_.grid_only ? 0 : errors_.curved_rounding; }
   [[nodiscard]] const std::shared_ptr<GoldSource>& source() const { return source_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Bricks of a large block, x, y, z.
@@ -126,7 +126,6 @@ class GoldStream {
   For purpose_ = For::measuring;          // of this run
   std::array<GoldSpent, 2> spent_;        // by purpose
   std::shared_ptr<GoldSource> source_;
-  std::optional<NodeSlack> node_slack_;  // none: no bounds wanted
 };
 
 /// Base samples fitted to the trilinear filter where they are kept; elsewhere `base` stays. Gold at 2x their

@@ -1,9 +1,11 @@
-// The slack T + P of every gold node of a batch of blocks, to either side: P a constant, the remainder of T by brick,
-// second differences by gold cell (docs/error-bounds.md). Called by gold_stream.cpp.
+// The slack T + P of every gold node of a batch of blocks, to either side: P a constant, the remainder of T
+// by brick, second differences by gold cell (docs/error-bounds.md). Called by gold_stream.cpp and
+// gold_batch.cpp.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "host/gold/fit_coefficients.hpp"
@@ -18,35 +20,29 @@ struct SlabShape {
   std::int64_t stride = 0;  ///< of the slack's columns
 };
 
-class NodeSlack {
- public:
-  /// `errors`: of gold on `lattice`. `remainder` and `settings` are referred to.
-  NodeSlack(opencl::State& state, const BrickRemainder& remainder, const GoldLattice& lattice, const GoldErrors& errors,
-            const GoldSettings& settings);
+/// What bricks of blocks whose first ones are given add to an eighth of second differences, to either side:
+/// interpolation, rounding and the remainder of T. float[block][brick z][brick y][brick x], 0 beyond the
+/// grid; the remainder must know them.
+std::vector<float> brick_addends(const BrickRemainder& remainder, const GoldLattice& lattice,
+                                 const GoldErrors& errors, const GoldSettings& settings, const Index3& block,
+                                 const std::vector<std::array<std::int64_t, 3>>& first_brick);
 
-  /// Room for `together` blocks of a slab.
-  void begin(const SlabShape& slab, std::int64_t together);
-  void end();
-  /// above, below[block][y][x][stride] of blocks whose first bricks are given; the remainder must know them.
-  void operator()(const GoldBlocks& blocks, const std::vector<std::array<std::int64_t, 3>>& first_brick,
-                  const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-                  opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below);
+/// The window, widened by what a node of gold may err beside P.
+std::pair<double, double> widened_window(const GoldErrors& errors, const GoldSettings& settings);
 
-  /// What rounding adds to every slack.
-  [[nodiscard]] double rounding() const { return settings_.grid_only ? 0 : errors_.curved_rounding; }
-
- private:
-  void launch(const GoldBlocks& b, const std::vector<std::array<std::int64_t, 3>>& first_brick,
-              const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
-              opencl::DeviceArray<float>& above, opencl::DeviceArray<float>& below);
-
-  opencl::State& state_;
-  const BrickRemainder& remainder_;
-  GoldLattice lattice_;
-  GoldErrors errors_;
-  const GoldSettings& settings_;
-  SlabShape slab_;
-  opencl::DeviceArray<float> addend_, cells_above_, cells_below_, rows_;
+/// What node_slack needs beside gold.
+struct SlackShape {
+  SlabShape slab;
+  Index3 bricks{};  ///< of a block
+  GoldErrors errors;
 };
+
+/// above, below float[block][y][x][slab.stride] of blocks whose first bricks are given, from gold, coverage
+/// margins and what their bricks add. Enqueues. Cost: two passes over arrays of gold's size.
+void node_slack(opencl::State& state, const GoldSettings& settings, const SlackShape& shape,
+                const GoldBlocks& blocks, const std::vector<std::array<std::int64_t, 3>>& first_brick,
+                const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
+                const opencl::DeviceArray<float>& addend, opencl::DeviceArray<float>& above,
+                opencl::DeviceArray<float>& below);
 
 }  // namespace vdvr

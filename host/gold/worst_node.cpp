@@ -5,7 +5,7 @@
 
 namespace vdvr {
 
-std::optional<Vec3> worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
+std::optional<Vec3> worst_node(GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
                                int gold_rate) {
   const Index3 p = Bricks(volume.grid, volume.granularity).position(brick);
   const std::int64_t g = volume.granularity;

@@ -10,7 +10,7 @@ namespace vdvr {
 
 /// World position of the node with the largest |V - gold| + T + P of a brick of a batch of gold at `rate`;
 /// none where that tests no node of it.
-std::optional<Vec3> worst_node(const GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
+std::optional<Vec3> worst_node(GoldStream::Batch& batch, const MixedVolume& volume, std::int64_t brick,
                                int rate);
 
 }  // namespace vdvr

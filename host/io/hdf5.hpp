@@ -1,109 +1,137 @@
-// The HDF5 C API behind handles that close themselves and errors that are exceptions: FileError on reading,
-// ResourceError on writing, each with file and object path. HDF5's own messages are silenced and quoted in
-// ours. External links, external storage and virtual datasets are refused: a scan is one file, and its hash
-// covers all of it. Called by hdf5_scan.cpp, read_scan.cpp, volume_stack.cpp and the tests. Not thread-safe,
-// as HDF5 itself.
+// The base of the HDF5 layer: handles that close themselves, HDF5's messages silenced and quoted, attributes
+// and datasets as their headers declare them. hdf5_reader.hpp opens and reads, hdf5_writer.hpp writes,
+// hdf5_chunks.hpp judges what is stored. Called by those, their callers and seal.cpp.
+//
+// The HDF5 library is not thread-safe: one thread at a time.
 #pragma once
 
 #include <hdf5.h>
 
+#include <bit>
 #include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
-namespace vdvr::io {
+namespace vdvr::io::hdf5 {
 
-/// Owns an hid_t.
-class Hdf5Handle {
+/// An HDF5 identifier, closed by the function it was opened for.
+class Handle {
  public:
   using Close = herr_t (*)(hid_t);
-  Hdf5Handle() = default;
-  Hdf5Handle(hid_t id, Close closer) : id_(id), close_(closer) {}
-  Hdf5Handle(Hdf5Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
-  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
+  Handle() = default;
+  Handle(hid_t id, Close closer) : id_(id), close_(closer) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+  Handle& operator=(Handle&& other) noexcept {
     std::swap(id_, other.id_);
     std::swap(close_, other.close_);
     return *this;
   }
-  Hdf5Handle(const Hdf5Handle&) = delete;
-  Hdf5Handle& operator=(const Hdf5Handle&) = delete;
-  ~Hdf5Handle() { close(); }
-
+  ~Handle() { close(); }
   [[nodiscard]] hid_t id() const { return id_; }
-  [[nodiscard]] bool valid() const { return id_ >= 0; }
-  herr_t close() { return id_ >= 0 ? close_(std::exchange(id_, -1)) : 0; }
+  explicit operator bool() const { return id_ >= 0; }
+  /// False when HDF5 reports that closing (hence flushing) failed.
+  bool close() { return id_ < 0 || close_(std::exchange(id_, H5I_INVALID_HID)) >= 0; }
 
  private:
-  hid_t id_ = -1;
+  hid_t id_ = H5I_INVALID_HID;
   Close close_ = nullptr;
 };
 
-/// A numeric dataset open for reading.
-class Hdf5Dataset {
+/// Keeps HDF5 from printing its error stack while alive; the library never prints. The setting is global to
+/// the process and belongs to the host program.
+class Silence {
  public:
-  [[nodiscard]] const std::vector<std::int64_t>& shape() const { return shape_; }
-  [[nodiscard]] bool is_integer() const { return is_integer_; }
-  /// "file: /path", for messages.
-  [[nodiscard]] const std::string& name() const { return name_; }
+  Silence();
+  ~Silence();
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
+/// The innermost message of HDF5's error stack ("Data error detected by Fletcher32 checksum"), which says
+/// what happened; the outer ones repeat the chain of calls.
+std::string reason();
+
+static_assert(std::endian::native == std::endian::little, "elements are stored little-endian");
+
+/// HDF5's type of a T: the same in memory and in files of ours.
+template <class T>
+hid_t element_type() {
+  if constexpr (std::is_same_v<T, float>) return H5T_IEEE_F32LE;
+  else if constexpr (std::is_same_v<T, double>) return H5T_IEEE_F64LE;
+  else if constexpr (std::is_same_v<T, std::uint8_t>) return H5T_STD_U8LE;
+  else if constexpr (std::is_same_v<T, std::uint16_t>) return H5T_STD_U16LE;
+  else if constexpr (std::is_same_v<T, std::uint32_t>) return H5T_STD_U32LE;
+  else if constexpr (std::is_same_v<T, std::int32_t>) return H5T_STD_I32LE;
+  else {
+    static_assert(std::is_same_v<T, std::int64_t>);
+    return H5T_STD_I64LE;
+  }
+}
+
+/// One UTF-8 text of that many bytes, or of H5T_VARIABLE.
+Handle text_type(std::size_t length);
+
+/// An attribute as what it says, however it is stored: integers as int64, reals as float64, one text.
+struct Attribute {
+  std::string object, name;
+  char kind = 'i';          ///< 'i', 'f' or 't'
+  std::uint64_t count = 0;  ///< numbers, or bytes of text
+  std::string bytes;        ///< little-endian
+};
+
+template <class T>
+Attribute attribute_of(const std::string& object, const std::string& name, std::span<const T> values) {
+  const auto bytes = std::as_bytes(values);
+  return {object, name, std::is_integral_v<T> ? 'i' : 'f', values.size(),
+          std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())};
+}
+
+using Shape = std::vector<std::uint64_t>;   ///< slowest axis first
+using Filters = std::vector<H5Z_filter_t>;  ///< in the order in which they were applied
+
+/// Types whose bytes in the file are those in memory, so that chunks are read without HDF5's conversion.
+enum class Element { f32, u8, u16, u32, i32, other };
+
+/// What was done to a chunk before its Fletcher32 checksum was taken; shuffle goes before deflate.
+struct Packing {
+  bool deflated = false, shuffled = false;
+};
+
+/// A dataset as its header declares it. Its numbers can be read as long as it lives, without its Reader.
+struct Dataset {
+  Handle id;
+  std::string name;  ///< "file: /path", for messages
+  H5T_class_t kind = H5T_NO_CLASS;
+  Element element = Element::other;
+  std::uint64_t element_bytes = 0;
+  Shape shape, largest;     ///< now, and what it may grow to
+  std::uint64_t count = 0;  ///< elements: product of shape, 1 of a scalar
+  std::uint64_t bytes = 0;  ///< in memory
+  H5D_layout_t layout = H5D_LAYOUT_ERROR;
+  bool outside = false;  ///< the numbers lie in other files, or in other datasets
+  Shape chunk;           ///< empty unless chunked
+  Filters filters;
+  // Of a checksummed one, filled in by check_storage:
+  Packing packing;
+  std::uint64_t chunk_bytes = 0, stored_bytes = 0;  ///< of one chunk in memory; of all in the file
+  std::uint64_t chunk_memory = 0;                   ///< that reading takes beside `bytes`
+
+  [[nodiscard]] bool is_integer() const { return kind == H5T_INTEGER; }
+  [[nodiscard]] bool is_number() const { return is_integer() || kind == H5T_FLOAT; }
+  /// The shape as the rest of the library counts; what exceeds 63 bits is negative, which checked_bytes
+  /// refuses.
+  [[nodiscard]] std::vector<std::int64_t> extents() const { return {shape.begin(), shape.end()}; }
   /// A block, converted to double, C order. `start` and `count` have one entry per axis.
-  void read(std::span<const std::int64_t> start, std::span<const std::int64_t> count, double* out) const;
+  void read(std::span<const std::int64_t> start, std::span<const std::int64_t> block_count,
+            double* out) const;
   [[nodiscard]] std::vector<double> read_all() const;
-
- private:
-  friend class Hdf5File;
-  Hdf5Handle handle_;
-  std::vector<std::int64_t> shape_;
-  bool is_integer_ = false;
-  std::string name_;
 };
 
-class Hdf5File {
- public:
-  /// Read-only. Throws FileError when missing, truncated or not HDF5.
-  static Hdf5File open(const std::filesystem::path& path);
-  /// A new file in place of what is there, in the layouts of HDF5 1.10: all metadata carry checksums.
-  static Hdf5File create(const std::filesystem::path& path);
-
-  [[nodiscard]] const std::string& path() const { return path_; }
-  [[nodiscard]] bool is_group(const std::string& object) const;
-  [[nodiscard]] bool is_dataset(const std::string& object) const;
-  /// Names of a group's members, sorted.
-  [[nodiscard]] std::vector<std::string> children(const std::string& group) const;
-  /// Throws FileError when missing, not numeric, without stored data, or stored outside this file.
-  [[nodiscard]] Hdf5Dataset dataset(const std::string& object) const;
-  /// A scalar text dataset; nothing when it is absent or not text.
-  [[nodiscard]] std::optional<std::string> text(const std::string& object) const;
-  /// An attribute's strings (one for a scalar); nothing when it is absent or not text.
-  [[nodiscard]] std::optional<std::vector<std::string>> text_attribute(const std::string& object,
-                                                                       const std::string& name) const;
-  /// A scalar numeric attribute. Throws FileError when it is there and not one number.
-  [[nodiscard]] std::optional<double> number_attribute(const std::string& object,
-                                                       const std::string& name) const;
-  /// A numeric attribute of `count` numbers. Throws FileError when it is there and not that.
-  [[nodiscard]] std::optional<std::vector<double>> numbers_attribute(const std::string& object,
-                                                                     const std::string& name,
-                                                                     std::size_t count) const;
-
-  void create_group(const std::string& group);
-  /// Chunked by `chunk`, with the Fletcher32 checksum.
-  void write(const std::string& object, std::span<const std::int64_t> shape,
-             std::span<const std::int64_t> chunk, const float* values);
-  /// One chunk, with the Fletcher32 checksum.
-  void write(const std::string& object, std::span<const double> values);
-  void write_attribute(const std::string& object, const std::string& name, const std::string& text);
-  void write_attribute(const std::string& object, const std::string& name, double value);
-  /// Flushes and closes; throws ResourceError when that fails. The destructor closes silently.
-  void close();
-
- private:
-  [[nodiscard]] std::string named(const std::string& object) const { return path_ + ": " + object; }
-  [[nodiscard]] Hdf5Handle open_object(const std::string& object) const;
-  Hdf5Handle file_, links_;  // links_: access list that refuses external links
-  std::string path_;
-};
-
-}  // namespace vdvr::io
+}  // namespace vdvr::io::hdf5

@@ -8,13 +8,12 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <limits>
 #include <new>
 #include <vector>
 
-namespace vdvr::io::hdf5_file {
+namespace vdvr::io::hdf5 {
 
 // --- how a dataset is stored ---
 
@@ -39,21 +38,17 @@ std::string filter_name(H5Z_filter_t filter) {
   }
 }
 
-using Filters = std::vector<H5Z_filter_t>;  ///< in the order in which they were applied
-
-Filters filters_of(hid_t properties) {
-  Filters filters;
-  for (int i = 0; i < H5Pget_nfilters(properties); ++i) {
-    unsigned flags = 0;
-    std::size_t parameters = 0;
-    filters.push_back(H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &parameters, nullptr, 0,
-                                     nullptr, nullptr));
-  }
-  return filters;
+/// Chunks that the file has; nothing when their index cannot be read.
+std::optional<hsize_t> stored_chunks(const Dataset& d) {
+  const Handle space(H5Dget_space(d.id.id()), H5Sclose);
+  hsize_t chunks = 0;
+  if (H5Dget_num_chunks(d.id.id(), space.id(), &chunks) < 0) return std::nullopt;
+  return chunks;
 }
 
 /// Accepts what is written here and nothing else.
-std::optional<std::string> check_filters(Dataset& d, const Filters& filters) {
+std::optional<std::string> check_filters(Dataset& d) {
+  const Filters& filters = d.filters;
   if (std::find(filters.begin(), filters.end(), H5Z_FILTER_FLETCHER32) == filters.end())
     return "has no Fletcher32 checksum";
   d.packing.shuffled = filters == Filters{H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE, H5Z_FILTER_FLETCHER32};
@@ -80,12 +75,10 @@ std::optional<std::string> check_deflated(const Dataset& d, std::uint64_t chunks
   if (inflated / most_inflation > d.stored_bytes)
     return fmt::format("claims {} bytes deflated to {}, more than deflate can do: incomplete", inflated,
                        d.stored_bytes);
-  const Handle space(H5Dget_space(d.id.get()), H5Sclose);
-  hsize_t stored_chunks = 0;
-  if (H5Dget_num_chunks(d.id.get(), space.get(), &stored_chunks) < 0)
-    return "has an index that cannot be read";
-  if (stored_chunks != chunks)
-    return fmt::format("{} chunks are stored where its shape needs {}: incomplete", stored_chunks, chunks);
+  const auto stored = stored_chunks(d);
+  if (!stored) return "has an index that cannot be read";
+  if (*stored != chunks)
+    return fmt::format("{} chunks are stored where its shape needs {}: incomplete", *stored, chunks);
   return std::nullopt;
 }
 
@@ -105,34 +98,68 @@ std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
   return __builtin_mul_overflow(a, b, &product) ? std::numeric_limits<std::uint64_t>::max() : product;
 }
 
-bool fletcher32_alone(hid_t properties) { return filters_of(properties) == Filters{H5Z_FILTER_FLETCHER32}; }
-
 std::optional<std::string> check_storage(Dataset& d, std::uint64_t file_bytes) {
-  const Handle properties(H5Dget_create_plist(d.id.get()), H5Pclose);
-  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) return "is not chunked, so it carries no checksum";
-  if (auto problem = check_filters(d, filters_of(properties.get()))) return problem;
-  std::vector<hsize_t> chunk(d.shape.size());
-  if (H5Pget_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data()) < 0 ||
-      std::find(chunk.begin(), chunk.end(), hsize_t{0}) != chunk.end())
+  if (d.layout != H5D_CHUNKED) return "is not chunked, so it carries no checksum";
+  if (auto problem = check_filters(d)) return problem;
+  if (d.chunk.size() != d.shape.size() ||
+      std::find(d.chunk.begin(), d.chunk.end(), std::uint64_t{0}) != d.chunk.end())
     return "has chunks without a size";
-  d.chunk.assign(chunk.begin(), chunk.end());
   std::uint64_t chunks = 1;
   d.chunk_bytes = d.element_bytes;
-  for (std::size_t a = 0; a < chunk.size(); ++a) {
-    chunks = saturating_product(chunks, (d.shape[a] - 1) / chunk[a] + 1);
-    d.chunk_bytes = saturating_product(d.chunk_bytes, chunk[a]);
+  for (std::size_t a = 0; a < d.chunk.size(); ++a) {
+    chunks = saturating_product(chunks, (d.shape[a] - 1) / d.chunk[a] + 1);
+    d.chunk_bytes = saturating_product(d.chunk_bytes, d.chunk[a]);
   }
   // The chunk as it is stored, as it is, and before its bytes are put in order.
   d.chunk_memory = saturating_product(d.packing.shuffled ? 3 : 2, d.chunk_bytes);
-  d.stored_bytes = H5Dget_storage_size(d.id.get());
+  d.stored_bytes = H5Dget_storage_size(d.id.id());
   return d.packing.deflated ? check_deflated(d, chunks, file_bytes) : check_plain(d, chunks, file_bytes);
+}
+
+namespace {
+
+/// False when an axis is longer than it may ever be, or its chunks are.
+bool extents_fit(const Dataset& d) {
+  const bool chunked = d.layout == H5D_CHUNKED;
+  if (chunked && d.chunk.size() != d.shape.size()) return false;
+  for (std::size_t a = 0; a < d.shape.size(); ++a)
+    if (d.largest[a] != H5S_UNLIMITED &&
+        (d.shape[a] > d.largest[a] || (chunked && d.chunk[a] > d.largest[a])))
+      return false;
+  return true;
+}
+
+/// False when stored chunks differ in length from what their shape needs: HDF5 1.10 trusts a damaged shape
+/// and copies beyond the chunk it read. Only chunks without compression can be told so; a checksum adds four
+/// bytes to each.
+bool chunks_fit(const Dataset& d) {
+  for (const H5Z_filter_t filter : d.filters)
+    if (filter != H5Z_FILTER_FLETCHER32 && filter != H5Z_FILTER_SHUFFLE) return true;
+  const auto chunks = stored_chunks(d);
+  if (d.chunk.empty() || !chunks) return false;
+  double bytes = static_cast<double>(d.element_bytes);  // double: a damaged shape may exceed 64 bits
+  for (const std::uint64_t n : d.chunk) bytes *= static_cast<double>(n);
+  const double n = static_cast<double>(*chunks), stored = static_cast<double>(H5Dget_storage_size(d.id.id()));
+  return n * bytes <= stored && stored <= n * (bytes + double{fletcher32_bytes});
+}
+
+/// No number of any machine is longer. A damaged length is what HDF5 1.10 takes a chunk to be long by.
+constexpr std::uint64_t longest_number_bytes = 16;
+
+}  // namespace
+
+std::optional<std::string> check_extents(const Dataset& d) {
+  if (d.element_bytes > longest_number_bytes)
+    return fmt::format("is damaged: its numbers are {} bytes long", d.element_bytes);
+  if (!extents_fit(d)) return "is damaged: an axis, or its chunks, are longer than its largest extent";
+  if (d.layout == H5D_CHUNKED && !chunks_fit(d))
+    return "is damaged: its chunks are not as long as their shape says";
+  return std::nullopt;
 }
 
 // --- what a chunk holds ---
 
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "elements are stored little-endian");
 
 /// A 16-bit sum with the carries added back in: 0 only for nothing but zeros.
 std::uint32_t folded(std::uint64_t sum) {
@@ -195,13 +222,13 @@ bool advance(Shape& at, const Dataset& d) {
 std::optional<std::string> fetch(const Dataset& d, const Shape& at, std::vector<std::uint8_t>& stored) {
   const std::vector<hsize_t> offset(at.begin(), at.end());
   hsize_t bytes = 0;
-  if (H5Dget_chunk_storage_size(d.id.get(), offset.data(), &bytes) < 0 || bytes == 0)
+  if (H5Dget_chunk_storage_size(d.id.id(), offset.data(), &bytes) < 0 || bytes == 0)
     return std::string("is missing: incomplete");
   if (bytes <= fletcher32_bytes || bytes > most_stored(d.chunk_bytes))
     return fmt::format("is {} bytes long, its shape needs {}", bytes, d.chunk_bytes);
   stored.resize(bytes);
   std::uint32_t left_out = 0;
-  if (H5Dread_chunk(d.id.get(), H5P_DEFAULT, offset.data(), &left_out, stored.data()) < 0)
+  if (H5Dread_chunk(d.id.id(), H5P_DEFAULT, offset.data(), &left_out, stored.data()) < 0)
     return std::string("cannot be read");
   if (left_out != 0) return fmt::format("was left out of filters (mask {})", left_out);
   return std::nullopt;
@@ -262,4 +289,4 @@ std::optional<std::string> read_chunks(const Dataset& d, void* values) {
   return std::nullopt;
 }
 
-}  // namespace vdvr::io::hdf5_file
+}  // namespace vdvr::io::hdf5

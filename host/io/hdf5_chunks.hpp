@@ -1,6 +1,6 @@
 // How a dataset is stored, checked; and its chunks, taken apart here and not by HDF5's filters: HDF5 1.10
 // inflates without a limit, and copies what a chunk should hold from behind what it inflated to. Called by
-// hdf5_file.cpp.
+// hdf5_reader.cpp.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 #include <span>
 #include <string>
 
-#include "host/io/hdf5_file.hpp"
+#include "host/io/hdf5.hpp"
 
-namespace vdvr::io::hdf5_file {
+namespace vdvr::io::hdf5 {
 
 constexpr std::uint64_t fletcher32_bytes = 4;   ///< behind every stored chunk
 constexpr std::uint64_t most_inflation = 1032;  ///< a deflate stream spends 2 bits on 258 bytes, never less
@@ -25,13 +25,13 @@ constexpr std::uint64_t most_stored(std::uint64_t chunk_bytes) {
 /// it.
 std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b);
 
-/// True when a creation property list has that filter and no other.
-bool fletcher32_alone(hid_t properties);
-
-/// Fills in what follows `bytes` in a dataset whose `id`, shape and sizes are known, and checks it: filters,
-/// and that the chunks its shape needs are stored in a file of `file_bytes`. Reads no chunk. What is wrong,
-/// or nothing.
+/// Fills in packing and sizes of a dataset that was declared, and checks them: filters, and that the chunks
+/// its shape needs are stored in a file of `file_bytes`. Reads no chunk. What is wrong, or nothing.
 std::optional<std::string> check_storage(Dataset& dataset, std::uint64_t file_bytes);
+
+/// Of a dataset that HDF5 itself reads, by whatever filters: what it never writes, and allocates or copies
+/// by. What is wrong, or nothing.
+std::optional<std::string> check_extents(const Dataset& dataset);
 
 /// HDF5's Fletcher32 of any number of bytes.
 std::uint32_t fletcher32(std::span<const std::uint8_t> bytes);
@@ -45,4 +45,4 @@ std::optional<std::string> unpack_chunk(std::span<const std::uint8_t> stored, co
 /// What is wrong, with the place of the chunk, or nothing.
 std::optional<std::string> read_chunks(const Dataset& dataset, void* values);
 
-}  // namespace vdvr::io::hdf5_file
+}  // namespace vdvr::io::hdf5

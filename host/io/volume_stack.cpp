@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "host/io/hdf5.hpp"
+#include "host/io/hdf5_reader.hpp"
 #include "host/io/natural_order.hpp"
 #include "host/io/tiff.hpp"
 #include "host/system/limits.hpp"
@@ -57,14 +57,14 @@ void append_samples(const std::string& name, Volume& volume, const std::vector<d
 // --- HDF5 ---
 
 /// An attribute z, y, x turned to x, y, z.
-std::optional<Vec3> zyx_attribute(const io::Hdf5File& file, const std::string& dataset,
+std::optional<Vec3> zyx_attribute(const io::hdf5::Reader& file, const std::string& dataset,
                                   const std::string& name) {
-  const auto values = file.numbers_attribute(dataset, name, 3);
+  const auto values = file.find_reals(dataset, name, 3);
   if (!values) return std::nullopt;
   return Vec3{(*values)[2], (*values)[1], (*values)[0]};
 }
 
-void read_hdf5_grid(const io::Hdf5File& file, const std::string& dataset, const std::string& name,
+void read_hdf5_grid(const io::hdf5::Reader& file, const std::string& dataset, const std::string& name,
                     Grid& grid) {
   if (const auto origin = zyx_attribute(file, dataset, "origin")) grid.origin = *origin;
   if (const auto spacing = zyx_attribute(file, dataset, "spacing")) {
@@ -73,8 +73,7 @@ void read_hdf5_grid(const io::Hdf5File& file, const std::string& dataset, const 
     grid.spacing = *micrometres;  // as ImageJ's and ilastik's HDF5 files have it
     grid.unit = "um";
   }
-  if (const auto unit = file.text_attribute(dataset, "unit"); unit && !unit->empty())
-    grid.unit = unit->front();
+  if (const auto unit = file.find_text(dataset, "unit")) grid.unit = *unit;
   for (std::size_t a = 0; a < 3; ++a)
     if (!(grid.spacing[a] > 0) || !std::isfinite(grid.spacing[a]) || !std::isfinite(grid.origin[a]))
       throw FileError(fmt::format("{}: spacing {} and origin {} along {}; one must be positive, both finite",
@@ -158,28 +157,28 @@ Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
 }
 
 Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
-  const io::Hdf5File file = io::Hdf5File::open(path);
-  const io::Hdf5Dataset data = file.dataset(dataset);
-  const auto& shape = data.shape();
+  const io::hdf5::Reader file(path, io::hdf5::Links::within_file);
+  const io::hdf5::Dataset data = file.numeric_dataset(dataset);
+  const auto shape = data.extents();
   if (shape.size() != 3)
-    throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name(), shape.size()));
-  Volume volume = empty_volume(data.name(), {shape[2], shape[1], shape[0]}, max_memory_bytes);
-  read_hdf5_grid(file, dataset, data.name(), volume.grid);
+    throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name, shape.size()));
+  Volume volume = empty_volume(data.name, {shape[2], shape[1], shape[0]}, max_memory_bytes);
+  read_hdf5_grid(file, dataset, data.name, volume.grid);
   const std::array<std::int64_t, 2> plane{shape[1], shape[2]};
-  const std::uint64_t plane_bytes = io::checked_bytes(plane, sizeof(double), data.name());
+  const std::uint64_t plane_bytes = io::checked_bytes(plane, sizeof(double), data.name);
   // Slabs, so that a compressed chunk many slices deep is not inflated once a slice.
   const auto depth =
       std::clamp<std::int64_t>(static_cast<std::int64_t>(kSlabBytes / plane_bytes), 1, shape[0]);
   const std::array<std::int64_t, 3> slab_shape{depth, shape[1], shape[2]};
-  const std::uint64_t bytes = io::checked_bytes(slab_shape, sizeof(double), data.name());
-  io::require_memory(bytes, max_memory_bytes, data.name());
+  const std::uint64_t bytes = io::checked_bytes(slab_shape, sizeof(double), data.name);
+  io::require_memory(bytes, max_memory_bytes, data.name);
   std::vector<double> slab(bytes / sizeof(double));
   for (std::int64_t z = 0; z < shape[0]; z += depth) {
     const std::array<std::int64_t, 3> start{z, 0, 0},
         count{std::min(depth, shape[0] - z), shape[1], shape[2]};
     slab.resize(static_cast<std::size_t>(count[0] * count[1] * count[2]));
     data.read(start, count, slab.data());
-    append_samples(data.name(), volume, slab);
+    append_samples(data.name, volume, slab);
   }
   return volume;
 }

@@ -12,20 +12,19 @@
 #include <memory>
 #include <numbers>
 
-#include "host/io/hdf5.hpp"
+#include "host/io/hdf5_reader.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
 namespace {
 
-using DatasetPointer = std::shared_ptr<const Hdf5Dataset>;
+using hdf5::Dataset, hdf5::Reader;
+using DatasetPointer = std::shared_ptr<const Dataset>;
 
 // The axis of the angles by the names in `axes`, "theta:y:x" or one string per axis; -1 when they do not say.
-int angle_axis(const Hdf5File& file, const std::string& object) {
-  const auto attribute = file.text_attribute(object, "axes");
-  if (!attribute || attribute->empty()) return -1;
-  std::vector<std::string> names = *attribute;
+int angle_axis(const Reader& file, const std::string& object) {
+  std::vector<std::string> names = file.find_texts(object, "axes");
   if (names.size() == 1) {
     std::string text = names[0];
     std::replace_if(
@@ -51,11 +50,11 @@ struct Stack {
 };
 
 // A dataset as frames. A two-dimensional one is a single frame.
-Stack open_stack(const Hdf5File& file, const std::string& object, int fallback_axis) {
+Stack open_stack(const Reader& file, const std::string& object, int fallback_axis) {
   Stack stack;
-  stack.data = std::make_shared<const Hdf5Dataset>(file.dataset(object));
-  const auto& shape = stack.data->shape();
-  checked_bytes(shape, sizeof(double), stack.data->name());
+  stack.data = std::make_shared<const Dataset>(file.numeric_dataset(object));
+  const auto shape = stack.data->extents();
+  checked_bytes(shape, sizeof(double), stack.data->name);
   if (shape.size() == 2) {
     stack.count = 1;
     stack.rows = shape[0];
@@ -63,7 +62,7 @@ Stack open_stack(const Hdf5File& file, const std::string& object, int fallback_a
     return stack;
   }
   if (shape.size() != 3)
-    throw FileError(fmt::format("{}: shape {}; three axes are needed, [angle][v][u]", stack.data->name(),
+    throw FileError(fmt::format("{}: shape {}; three axes are needed, [angle][v][u]", stack.data->name,
                                 shape_text(shape)));
   const int stated = angle_axis(file, object);
   stack.axis = stated >= 0 ? stated : fallback_axis;
@@ -71,7 +70,7 @@ Stack open_stack(const Hdf5File& file, const std::string& object, int fallback_a
     throw FileError(
         fmt::format("{}: 'axes' puts the angle on axis {}; it must be the first (projections) or the second "
                     "(sinograms)",
-                    stack.data->name(), stack.axis));
+                    stack.data->name, stack.axis));
   const auto axis = static_cast<std::size_t>(stack.axis);
   stack.count = shape[axis];
   stack.rows = shape[1 - axis];
@@ -82,7 +81,7 @@ Stack open_stack(const Hdf5File& file, const std::string& object, int fallback_a
 // Frames first .. first + n - 1 of a stack as out[n][row][column].
 void read_run(const Stack& stack, std::int64_t first, std::int64_t n, double* out) {
   const std::int64_t rows = stack.rows, columns = stack.columns;
-  if (stack.data->shape().size() == 2)
+  if (stack.data->shape.size() == 2)
     return stack.data->read(std::array<std::int64_t, 2>{0, 0}, std::array<std::int64_t, 2>{rows, columns},
                             out);
   if (stack.axis == 0)
@@ -102,7 +101,7 @@ Frames frames_of(const Stack& stack, std::vector<std::int64_t> numbers, const st
   frames.count = static_cast<std::int64_t>(numbers.size());
   const auto list = std::make_shared<const std::vector<std::int64_t>>(std::move(numbers));
   frames.name = [stack, list, what](std::int64_t k) {
-    return fmt::format("{}: {} {} (frame {})", stack.data->name(), what, k,
+    return fmt::format("{}: {} {} (frame {})", stack.data->name, what, k,
                        (*list)[static_cast<std::size_t>(k)]);
   };
   frames.read = [stack, list](std::int64_t first, std::int64_t n, double* out) {
@@ -122,63 +121,58 @@ Frames frames_of(const Stack& stack, std::vector<std::int64_t> numbers, const st
 Frames all_frames(const Stack& stack, const std::string& what) {
   Frames frames;
   frames.count = stack.count;
-  frames.name = [stack, what](std::int64_t k) {
-    return fmt::format("{}: {} {}", stack.data->name(), what, k);
-  };
+  frames.name = [stack, what](std::int64_t k) { return fmt::format("{}: {} {}", stack.data->name, what, k); };
   frames.read = [stack](std::int64_t first, std::int64_t n, double* out) { read_run(stack, first, n, out); };
   return frames;
 }
 
 // How many numbers a list holds; looked at before it is read, since a damaged header may claim any.
-std::int64_t count_of(const Hdf5Dataset& data) {
-  return static_cast<std::int64_t>(checked_bytes(data.shape(), 1, data.name()));
+std::int64_t count_of(const Dataset& data) {
+  return static_cast<std::int64_t>(checked_bytes(data.extents(), 1, data.name));
 }
 
 // Angles in degrees by the dataset's units; degrees where it has none, as both formats prescribe.
-std::vector<double> read_angles(const Hdf5File& file, const std::string& object, const Stack& frames) {
-  const Hdf5Dataset data = file.dataset(object);
+std::vector<double> read_angles(const Reader& file, const std::string& object, const Stack& frames) {
+  const Dataset data = file.numeric_dataset(object);
   if (count_of(data) != frames.count)
     throw FileError(
         fmt::format("{}: {} angles for {} frames of {}; one per frame is needed (data in sinogram order must "
                     "say so with an attribute axes = \"y:theta:x\")",
-                    data.name(), count_of(data), frames.count, frames.data->name()));
+                    data.name, count_of(data), frames.count, frames.data->name));
   std::vector<double> angles = data.read_all();
-  const auto units = file.text_attribute(object, "units");
-  const std::string unit = units && !units->empty() ? units->front() : "degrees";
+  const std::string unit = file.find_text(object, "units").value_or("degrees");
   if (unit.rfind("rad", 0) == 0) {
     for (double& a : angles) a *= 180 / std::numbers::pi;
   } else if (unit.rfind("deg", 0) != 0 && unit != "\u00b0" && !unit.empty()) {
-    throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name(), unit));
+    throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name, unit));
   }
   return angles;
 }
 
 void require_same_detector(const Stack& a, const Stack& b) {
   if (a.rows != b.rows || a.columns != b.columns)
-    throw FileError(fmt::format("{}: frames of {} rows x {} columns, but {} has {} x {}", b.data->name(),
-                                b.rows, b.columns, a.data->name(), a.rows, a.columns));
+    throw FileError(fmt::format("{}: frames of {} rows x {} columns, but {} has {} x {}", b.data->name,
+                                b.rows, b.columns, a.data->name, a.rows, a.columns));
 }
 
-RawScan open_data_exchange(const Hdf5File& file) {
+RawScan open_data_exchange(const Reader& file) {
   const std::string object = "/exchange/data";
   RawScan scan;
   scan.format = "data-exchange";
   const Stack data = open_stack(file, object, 0);
-  if (data.data->shape().size() != 3)
-    throw FileError(fmt::format("{}: shape {}; three axes are needed", data.data->name(),
-                                shape_text(data.data->shape())));
+  if (data.data->shape.size() != 3)
+    throw FileError(fmt::format("{}: shape {}; three axes are needed", data.data->name,
+                                shape_text(data.data->extents())));
   scan.rows = data.rows;
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
   scan.projections = all_frames(data, "projection");
   scan.theta_deg = read_angles(file, "/exchange/theta", data);
-  scan.center = file.number_attribute(object, "center");
-  scan.pitch_u = file.number_attribute(object, "pitch_u").value_or(1);
-  scan.pitch_v = file.number_attribute(object, "pitch_v").value_or(1);
-  if (const auto unit = file.text_attribute(object, "unit"); unit && !unit->empty())
-    scan.unit = unit->front();
-  const auto description = file.text_attribute(object, "description");
-  scan.counts = !(description && !description->empty() && description->front() == "line integrals");
+  scan.center = file.find_real(object, "center");
+  scan.pitch_u = file.find_real(object, "pitch_u").value_or(1);
+  scan.pitch_v = file.find_real(object, "pitch_v").value_or(1);
+  if (const auto unit = file.find_text(object, "unit")) scan.unit = *unit;
+  scan.counts = file.find_text(object, "description") != "line integrals";
   if (!scan.counts) return scan;
   for (const char* name : {"/exchange/data_white", "/exchange/data_dark"})
     if (!file.is_dataset(name))
@@ -198,13 +192,11 @@ RawScan open_data_exchange(const Hdf5File& file) {
 // --- NXtomo ---
 
 // A group's child by its usual name, else the first of the NeXus class.
-std::string child_of(const Hdf5File& file, const std::string& group, const std::string& nx_class,
+std::string child_of(const Reader& file, const std::string& group, const std::string& nx_class,
                      const std::string& name) {
   if (file.is_group(group + "/" + name)) return group + "/" + name;
-  for (const std::string& child : file.children(group)) {
-    const auto kind = file.text_attribute(group + "/" + child, "NX_class");
-    if (kind && !kind->empty() && kind->front() == nx_class) return group + "/" + child;
-  }
+  for (const std::string& child : file.members(group))
+    if (file.find_text(group + "/" + child, "NX_class") == nx_class) return group + "/" + child;
   return "";
 }
 
@@ -214,7 +206,7 @@ struct TomoEntry {
 
 // The first group, in order of depth and name, with a detector that has data and image_key. NXtomo entries
 // sit at the root or one or two groups below (NXsubentry); deeper is no entry.
-std::optional<TomoEntry> find_tomo_entry(const Hdf5File& file) {
+std::optional<TomoEntry> find_tomo_entry(const Reader& file) {
   constexpr int deepest = 3;
   std::vector<std::string> level{""};
   for (int depth = 0; depth <= deepest; ++depth) {
@@ -226,7 +218,7 @@ std::optional<TomoEntry> find_tomo_entry(const Hdf5File& file) {
       if (!detector.empty() && file.is_dataset(detector + "/data") &&
           file.is_dataset(detector + "/image_key"))
         return TomoEntry{group, detector};
-      for (const std::string& child : file.children(group.empty() ? "/" : group))
+      for (const std::string& child : file.members(group.empty() ? "/" : group))
         if (file.is_group(group + "/" + child)) next.push_back(group + "/" + child);
     }
     level = std::move(next);
@@ -234,14 +226,13 @@ std::optional<TomoEntry> find_tomo_entry(const Hdf5File& file) {
   return std::nullopt;
 }
 
-void read_pixel_size(const Hdf5File& file, const std::string& detector, RawScan& scan) {
+void read_pixel_size(const Reader& file, const std::string& detector, RawScan& scan) {
   const std::string x = detector + "/x_pixel_size", y = detector + "/y_pixel_size";
   if (!file.is_dataset(x) || !file.is_dataset(y)) return;
   const auto unit_of = [&](const std::string& object) {
-    const auto units = file.text_attribute(object, "units");
-    return units && !units->empty() ? units->front() : std::string("m");
+    return file.find_text(object, "units").value_or("m");
   };
-  const Hdf5Dataset size_u = file.dataset(x), size_v = file.dataset(y);
+  const Dataset size_u = file.numeric_dataset(x), size_v = file.numeric_dataset(y);
   if (count_of(size_u) != 1 || count_of(size_v) != 1 || unit_of(x) != unit_of(y))
     throw FileError(
         fmt::format("{}: x_pixel_size and y_pixel_size must be one number each, in one unit", file.path()));
@@ -250,17 +241,17 @@ void read_pixel_size(const Hdf5File& file, const std::string& detector, RawScan&
   scan.unit = unit_of(x);
 }
 
-RawScan open_nxtomo(const Hdf5File& file, const TomoEntry& where) {
+RawScan open_nxtomo(const Reader& file, const TomoEntry& where) {
   RawScan scan;
   scan.format = "nxtomo";
   const Stack data = open_stack(file, where.detector + "/data", 0);
   scan.rows = data.rows;
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
-  const Hdf5Dataset key_data = file.dataset(where.detector + "/image_key");
+  const Dataset key_data = file.numeric_dataset(where.detector + "/image_key");
   if (count_of(key_data) != data.count)
-    throw FileError(fmt::format("{}: {} keys for {} frames of {}", key_data.name(), count_of(key_data),
-                                data.count, data.data->name()));
+    throw FileError(fmt::format("{}: {} keys for {} frames of {}", key_data.name, count_of(key_data),
+                                data.count, data.data->name));
   const std::vector<double> keys = key_data.read_all();
   std::string sample = child_of(file, where.entry, "NXsample", "sample");
   if (sample.empty()) sample = where.entry + "/sample";
@@ -268,14 +259,14 @@ RawScan open_nxtomo(const Hdf5File& file, const TomoEntry& where) {
   std::array<std::vector<std::int64_t>, 4> numbers;
   for (std::size_t k = 0; k < keys.size(); ++k) {
     if (!(keys[k] == 0 || keys[k] == 1 || keys[k] == 2 || keys[k] == 3))
-      throw FileError(fmt::format("{}: key {} of frame {}; 0 to 3 are defined", key_data.name(), keys[k], k));
+      throw FileError(fmt::format("{}: key {} of frame {}; 0 to 3 are defined", key_data.name, keys[k], k));
     numbers[static_cast<std::size_t>(keys[k])].push_back(static_cast<std::int64_t>(k));
     if (keys[k] == 0) scan.theta_deg.push_back(angles[k]);
   }
   constexpr std::array<const char*, 3> kinds{"projections", "flats", "darks"};
   for (std::size_t kind = 0; kind < kinds.size(); ++kind)
     if (numbers[kind].empty())
-      throw FileError(fmt::format("{}: marks no {} (key {})", key_data.name(), kinds[kind], kind));
+      throw FileError(fmt::format("{}: marks no {} (key {})", key_data.name, kinds[kind], kind));
   if (!numbers[3].empty())
     scan.notes.push_back(fmt::format("{} frames marked invalid were left out", numbers[3].size()));
   scan.projections = frames_of(data, numbers[0], "projection");
@@ -288,12 +279,11 @@ RawScan open_nxtomo(const Hdf5File& file, const TomoEntry& where) {
 }  // namespace
 
 RawScan open_hdf5_scan(const std::filesystem::path& path) {
-  const Hdf5File file = Hdf5File::open(path);
+  const Reader file(path, hdf5::Links::within_file);
   RawScan scan;
   if (file.is_dataset("/exchange/data")) scan = open_data_exchange(file);
   else if (const auto entry = find_tomo_entry(file)) scan = open_nxtomo(file, *entry);
-  else if (const auto format = file.text_attribute("/", "format");
-           format && !format->empty() && format->front() == "vdvr")
+  else if (file.find_text("/", "format") == "vdvr")
     throw FileError(path.string() + ": is a certified volume, not a scan");
   else
     throw FileError(path.string() +

@@ -13,7 +13,7 @@
 #include <numbers>
 #include <thread>
 
-#include "host/io/hdf5.hpp"
+#include "host/io/hdf5_writer.hpp"
 #include "host/io/raster_file.hpp"
 #include "host/scan/find_center.hpp"
 #include "host/scan/hdf5_scan.hpp"
@@ -327,21 +327,22 @@ void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {
   std::vector<double> theta_deg;
   for (const double t : g.theta_rad) theta_deg.push_back(t * (180 / std::numbers::pi));
   io::AtomicFile target(path);
-  io::Hdf5File file = io::Hdf5File::create(target.temporary());
-  file.create_group("/exchange");
+  io::hdf5::Writer file(target.temporary(), path, {.headers = io::hdf5::Headers::dated});
+  file.group("/exchange");
   // One chunk per view, cut into rows where a chunk would pass HDF5's 4 GiB.
   constexpr std::int64_t chunk_samples = std::int64_t{1} << 26;
   const std::array<std::int64_t, 3> chunk{1, std::clamp<std::int64_t>(chunk_samples / g.columns, 1, g.rows),
                                           g.columns};
-  file.write("/exchange/data", shape, chunk, scan.data.data());
-  file.write_attribute("/exchange/data", "description", "line integrals");
-  file.write_attribute("/exchange/data", "axes", "theta:y:x");
-  file.write_attribute("/exchange/data", "unit", g.unit);
-  file.write_attribute("/exchange/data", "pitch_u", g.pitch_u);
-  file.write_attribute("/exchange/data", "pitch_v", g.pitch_v);
-  file.write_attribute("/exchange/data", "center", g.center);
-  file.write("/exchange/theta", theta_deg);
-  file.write_attribute("/exchange/theta", "units", "degrees");
+  file.dataset("/exchange/data", {shape.begin(), shape.end()}, std::span<const float>(scan.data),
+               {chunk.begin(), chunk.end()});
+  file.attribute("/exchange/data", "description", "line integrals");
+  file.attribute("/exchange/data", "axes", "theta:y:x");
+  file.attribute("/exchange/data", "unit", g.unit);
+  file.attribute("/exchange/data", "pitch_u", g.pitch_u);
+  file.attribute("/exchange/data", "pitch_v", g.pitch_v);
+  file.attribute("/exchange/data", "center", g.center);
+  file.dataset("/exchange/theta", {theta_deg.size()}, std::span<const double>(theta_deg), {theta_deg.size()});
+  file.attribute("/exchange/theta", "units", "degrees");
   file.close();
   target.commit();
 }

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/bounds/six_taps.hpp"
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
@@ -27,13 +28,14 @@ constexpr std::size_t most_alone = 16;
 /// The scan filtered as build does, and what follows from that, in `units`.
 struct Filtered {
   Filtered(opencl::State& device, const ProjectionSet& projections, const Units& of_scan,
-           const FieldOptions& field, const Progress& progress)
+           const FieldOptions& field, Interpolation interpolation, const Progress& progress)
       : state(device),
         units(of_scan),
         scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
                                 Precision::fp64, units)),
         upsampler(device, scan) {
-    sups = field_sups(device, upsampler, scan);
+    sups = interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan)
+                                                    : field_sups(device, upsampler, scan);
   }
   Filtered(const Filtered&) = delete;
   Filtered& operator=(const Filtered&) = delete;
@@ -58,15 +60,15 @@ double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double 
                           interpolation);
 }
 
-// R is of a reconstruction at 8x cubic. One made again has the same interpolation error but for rounding, and
-// the extremes of two fields differ by no more than the fields do.
+// R is of a reconstruction with six taps at 8x. One made again has the same interpolation error but for
+// rounding, and the extremes of two fields differ by no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
                    const Certificate& c, const Progress& progress) {
   const Volume base =
-      reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::cubic, progress);
+      reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress);
   const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
-               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::cubic),
+               rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps),
                found = range.high - range.low;
   if (!(std::abs(c.reference_range - found) <= 4 * rounding))
     out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
@@ -76,8 +78,7 @@ void compare_range(Differences& out, Filtered& f, const ExactField& exact, const
                           to_world(v.grid.position(range.high_at), f.units)};
   std::vector<double> F = exact.at(points);
   for (double& value : F) value = from_world(value, f.units);
-  const double du = f.scan.geometry.pitch_u / 8, wave = std::numbers::pi / f.scan.geometry.pitch_u,
-               projection = 3.0 / 128 * std::pow(du, 4) * wave * wave * f.sups.second_u;
+  const double projection = six_tap_facts().sup * f.sups.value;
   const double least = F[1] - F[0] - 2 * (projection + rounding + from_world(exact.rounding(), f.units));
   if (!(c.reference_range >= least))
     out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
@@ -230,7 +231,7 @@ class Totals {
 void compare_in_units(Differences& out, Device& device, const ProjectionSet& scan, const Units& units,
                       const ExactField& exact, const MixedVolume& volume, const Certificate& stored,
                       const std::vector<std::uint8_t>& selected, bool exhaustive, const Progress& progress) {
-  Filtered f(device.state(), scan, units, stored.field, progress);
+  Filtered f(device.state(), scan, units, stored.field, stored.rates.interpolation, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
   compare_range(out, f, exact, volume, stored, progress);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)

@@ -37,7 +37,7 @@ class Stream {
 }  // namespace
 
 std::string seal_of(const std::string& certificate, std::span<const float> brick_totals,
-                    std::vector<io::hdf5_file::Attribute> attributes) {
+                    std::vector<io::hdf5::Attribute> attributes) {
   std::sort(attributes.begin(), attributes.end(), [](const auto& a, const auto& b) {
     return std::tie(a.object, a.name) < std::tie(b.object, b.name);
   });

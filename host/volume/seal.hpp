@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/io/hdf5_file.hpp"
+#include "host/io/hdf5.hpp"
 
 namespace vdvr {
 
@@ -15,6 +15,6 @@ inline constexpr const char* kSeal = "seal";
 
 /// 64 hexadecimal digits. `certificate` is the text as stored.
 std::string seal_of(const std::string& certificate, std::span<const float> brick_totals,
-                    std::vector<io::hdf5_file::Attribute> attributes);
+                    std::vector<io::hdf5::Attribute> attributes);
 
 }  // namespace vdvr

@@ -15,7 +15,8 @@
 #include <optional>
 #include <span>
 
-#include "host/io/hdf5_file.hpp"
+#include "host/io/hdf5_reader.hpp"
+#include "host/io/hdf5_writer.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "host/volume/seal.hpp"
@@ -27,7 +28,7 @@
 namespace vdvr {
 namespace {
 
-namespace h5 = io::hdf5_file;
+namespace h5 = io::hdf5;
 
 static_assert(std::endian::native == std::endian::little,
               "content_sha256 hashes memory, which must be little-endian");
@@ -435,7 +436,7 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
 }
 
 VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  const h5::Reader file(path);
+  const h5::Reader file(path, h5::Links::hard);
   VdvrFile result;
   result.file_bytes = file.file_bytes();
   result.format_version = read_version(file);
@@ -492,7 +493,8 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
 
   io::AtomicFile target(path);
   {
-    h5::Writer file(target.temporary(), path, compression == Compression::deflate ? deflate_level : 0);
+    h5::Writer file(target.temporary(), path,
+                    {.deflate_level = compression == Compression::deflate ? deflate_level : 0});
     file.attribute("/", "format", std::string("vdvr"));
     file.attribute("/", "format_version",
                    std::int64_t{is_coarse(v)      ? 4
@@ -544,7 +546,7 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
 bool is_vdvr(const std::filesystem::path& path) {
   const h5::Silence silence;
   const auto says_so = [&] {
-    const h5::Reader file(path);
+    const h5::Reader file(path, h5::Links::hard);
     return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
   };
   try {

@@ -1,6 +1,7 @@
 // Bounds at each rate, and the choice of rates that fit a tolerance. Builds nothing.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,6 +39,8 @@ struct PlanSettings {
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
 };
 
+struct PreparedScan;
+
 struct Plan {
   Grid grid;
   PlanSettings settings;
@@ -56,6 +59,9 @@ struct Plan {
   Volume base;                ///< the 1x reconstruction it rests on
   std::vector<float> fitted;  ///< the base samples to store, where those are not F: midrange coefficients
   std::vector<std::string> notes;
+  /// The filtered scan and the gold that was kept, on the device: a build of the same scan on it goes on from
+  /// there. Reset it to free their memory.
+  std::shared_ptr<PreparedScan> prepared{};
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.

@@ -5,16 +5,15 @@
 // host/gold/node_slack.cpp.
 #include "shared/untested.h"
 
-// A bound of base cells along gold columns: rows[block][base cell y][base cell x][stride], 0 beyond the
-// block.
-__kernel void expand_bound(__global float* rows, __global const float* p, int cells_x, int cells_y,
-                           int cells_z, int rate, int stride, int blocks) {
+// What bricks add along gold columns: rows[block][brick y][brick x][stride], 0 beyond the block.
+__kernel void expand_addend(__global float* rows, __global const float* addend, int bricks_x, int bricks_y,
+                            int bricks_z, int side, int stride, int blocks) {
   const int z = (int)get_global_id(0), x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / cells_y, y = (int)get_global_id(2) - block * cells_y;
-  if (z >= stride || x >= cells_x || block >= blocks) return;
-  const int cell = z / rate;
-  rows[(((size_t)block * cells_y + y) * cells_x + x) * stride + z] =
-      cell < cells_z ? p[(((size_t)block * cells_z + cell) * cells_y + y) * cells_x + x] : 0.0f;
+  const int block = (int)get_global_id(2) / bricks_y, y = (int)get_global_id(2) - block * bricks_y;
+  if (z >= stride || x >= bricks_x || block >= blocks) return;
+  const int brick = z / side;
+  rows[(((size_t)block * bricks_y + y) * bricks_x + x) * stride + z] =
+      brick < bricks_z ? addend[(((size_t)block * bricks_z + brick) * bricks_y + y) * bricks_x + x] : 0.0f;
 }
 
 // Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.
@@ -46,14 +45,14 @@ __kernel void expand_bound(__global float* rows, __global const float* p, int ce
 
 // Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it
 // lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
-// axis, / 8, `above` that of the negative ones, each plus `addend`, which is 2.5 P + the remainder of T by
-// base cell, plus t_constant. Cells beyond the block, and with `windowed` those whose range misses the
-// window, are VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's
-// room.
+// axis, / 8, `above` that of the negative ones, each plus what its brick adds (interpolation, rounding, the
+// remainder of T). Cells beyond the block, and with `windowed` those whose range misses the window, are
+// VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's room. cell_test.cl
+// has the same by cell, without arrays.
 __kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
                          __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
-                         int stride, int rate, int cells_x, int cells_y, int blocks, int counted,
-                         float t_constant, int windowed, float window_low, float window_high) {
+                         int stride, int side, int bricks_x, int bricks_y, int blocks, int counted,
+                         int windowed, float window_low, float window_high) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
@@ -64,9 +63,9 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
   const float16 bound =
-      vload16(0, addend + (((size_t)block * cells_y + y / rate) * cells_x + x / rate) * stride + z);
-  float16 below = (px + py + pz) * 0.125f + t_constant + bound,
-          above = -(mx + my + mz) * 0.125f + t_constant + bound;
+      vload16(0, addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
+  float16 below = (px + py + pz) * 0.125f + bound,
+          above = -(mx + my + mz) * 0.125f + bound;
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   int16 out = k > nz - 2;
   if (windowed) {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 #include "host/system/casts.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"

@@ -1,6 +1,6 @@
 // What T leaves out, by brick, against derivatives of the field from its cosine series.
 #define BOOST_TEST_MODULE brick_remainder
-#include "host/gold/brick_remainder.hpp"
+#include "host/kept/brick_remainder.hpp"
 
 #include <algorithm>
 #include <array>

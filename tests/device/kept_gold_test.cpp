@@ -1,6 +1,6 @@
 // Gold from kept nodes against F in double precision, wherever the lattice, its boxes and the detector lie.
 #define BOOST_TEST_MODULE kept_gold
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>

@@ -32,11 +32,11 @@ void read(const std::filesystem::path& file) {
   const std::string bytes = support::bytes_of(file);
   if (bytes.empty()) throw FileError(file.string() + ": is empty");
   std::vector<std::uint8_t> stored(bytes.begin() + 1, bytes.end());
-  const std::uint32_t sum = io::hdf5_file::fletcher32(stored);
+  const std::uint32_t sum = io::hdf5::fletcher32(stored);
   for (int i = 0; i < 4; ++i) stored.push_back(static_cast<std::uint8_t>(sum >> 8 * i));
   std::vector<std::uint8_t> chunk(chunk_bytes);
-  const io::hdf5_file::Packing packing{(bytes[0] & 1) != 0, (bytes[0] & 2) != 0};
-  if (const auto problem = io::hdf5_file::unpack_chunk(stored, packing, element_bytes, chunk))
+  const io::hdf5::Packing packing{(bytes[0] & 1) != 0, (bytes[0] & 2) != 0};
+  if (const auto problem = io::hdf5::unpack_chunk(stored, packing, element_bytes, chunk))
     throw FileError(file.string() + ": the chunk " + *problem);
 }
 

@@ -1,7 +1,7 @@
 // Filters between nodes: what they promise is never exceeded by waves, flat functions and sign patterns, and
 // is not far above what these reach.
 #define BOOST_TEST_MODULE gold_filters
-#include "host/gold/gold_filters.hpp"
+#include "host/kept/gold_filters.hpp"
 
 #include <algorithm>
 #include <array>

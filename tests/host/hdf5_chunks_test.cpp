@@ -7,12 +7,12 @@
 #include <limits>
 #include <numeric>
 
-#include "host/io/hdf5_file.hpp"
+#include "host/io/hdf5_reader.hpp"
 #include "tests/support/vdvr_files.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;
-namespace h5 = vdvr::io::hdf5_file;
+namespace h5 = vdvr::io::hdf5;
 
 namespace {
 
@@ -90,7 +90,7 @@ fs::path write(const Folder& folder, const Crafted& c) {
 /// The message of the refusal; "accepted" where there is none. `content` gets what was read.
 std::string refusal_of(const Crafted& c, Bytes* content = nullptr) {
   const Folder folder;
-  const h5::Reader file(write(folder, c));
+  const h5::Reader file(write(folder, c), h5::Links::hard);
   try {
     const h5::Dataset d = file.dataset("/a");
     Bytes read(d.bytes);
@@ -121,11 +121,11 @@ BOOST_AUTO_TEST_CASE(the_checksum_is_that_of_hdf5) {
       c.values = content.data();
       const fs::path path = write(folder, c);
       const h5::Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose),
-          dataset(H5Dopen2(file.get(), "a", H5P_DEFAULT), H5Dclose);
+          dataset(H5Dopen2(file.id(), "a", H5P_DEFAULT), H5Dclose);
       Bytes stored(size + h5::fletcher32_bytes);
       const hsize_t first = 0;
       std::uint32_t mask = 0;
-      BOOST_REQUIRE(H5Dread_chunk(dataset.get(), H5P_DEFAULT, &first, &mask, stored.data()) >= 0);
+      BOOST_REQUIRE(H5Dread_chunk(dataset.id(), H5P_DEFAULT, &first, &mask, stored.data()) >= 0);
       BOOST_TEST((under_checksum(content) == stored), size << " bytes of kind " << kind);
     }
 }

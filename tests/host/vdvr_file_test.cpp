@@ -10,7 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/io/hdf5_file.hpp"
+#include "host/io/hdf5_reader.hpp"
+#include "host/io/hdf5_writer.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;
@@ -90,7 +91,7 @@ BOOST_AUTO_TEST_CASE(a_volume_for_comparison_carries_a_record_and_no_certificate
   c.budget.arithmetic.value = 0.25;
   write_vdvr(folder.path / "a.vdvr", small_volume(), c);
   {
-    const io::hdf5_file::Reader file(folder.path / "a.vdvr");
+    const io::hdf5::Reader file(folder.path / "a.vdvr", io::hdf5::Links::hard);
     BOOST_TEST(file.has("/comparison"));
     BOOST_TEST(!file.has("/certificate"));
     BOOST_TEST(!file.has("/brick_total"));
@@ -179,8 +180,8 @@ BOOST_AUTO_TEST_CASE(only_vdvr_files_are_recognised) {
 }
 
 BOOST_AUTO_TEST_CASE(chunks_are_contiguous_and_hardly_padded) {
-  using io::hdf5_file::chunk_shape;
-  using io::hdf5_file::Shape;
+  using io::hdf5::chunk_shape;
+  using io::hdf5::Shape;
   BOOST_TEST((chunk_shape({65, 65, 65}, 4) == Shape{22, 65, 65}));  // 31 planes would fit: 65 = 22 + 22 + 21
   BOOST_TEST((chunk_shape({7, 1025, 1025}, 4) == Shape{1, 114, 1025}));  // 127 rows would fit: 9 parts
   BOOST_TEST((chunk_shape({900, 9, 9, 9}, 4) == Shape{150, 9, 9, 9}));   // 179 tiles would fit: 6 parts

@@ -359,6 +359,13 @@ BOOST_AUTO_TEST_CASE(hdf5_datasets_that_are_no_volume_are_refused) {
   bytes[at + 2] = 2;
   static_cast<void>(folder.file("v.h5", bytes));
   refused("/volume", "largest extent");
+
+  // Numbers longer than any machine's, for which HDF5 would copy far beyond a short chunk.
+  const hid_t wide = H5Tcopy(H5T_STD_U8LE);
+  H5Tset_size(wide, 24);
+  write_hdf5(path, wide, {4, 4, 4});
+  H5Tclose(wide);
+  refused("/volume", "24 bytes long");
 }
 
 BOOST_AUTO_TEST_CASE(tiff_slices_are_stacked_along_z_in_natural_order) {

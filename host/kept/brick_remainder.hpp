@@ -1,27 +1,27 @@
-// What T leaves out, brick by brick, from fourth differences of kept gold (docs/error-bounds.md, section 5). Called by
-// gold_stream.cpp.
+// What T leaves out, brick by brick, from fourth differences of kept gold (docs/error-bounds.md, section 5).
+// Called by gold_stream.cpp.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 #include "host/bounds/remainder_norms.hpp"
 
 namespace vdvr {
 
-/// Bounds how far an eighth of the sum of three second derivatives, times the spacings' squares, lies from the same sum
-/// of second differences of gold at the corners of its cell: (1/8) [ (5/24) sum_j X_jj + (2/8) sum_{i<j} X_ij ], X_ij at
-/// least h_i^2 h_j^2 |F_iijj| in the cell and one step around it.
+/// Bounds how far an eighth of the sum of three second derivatives, times the spacings' squares, lies from
+/// the same sum of second differences of gold at the corners of its cell: (1/8) [ (5/24) sum_j X_jj + (2/8)
+/// sum_{i<j} X_ij ], X_ij at least h_i^2 h_j^2 |F_iijj| in the cell and one step around it.
 class BrickRemainder {
  public:
   /// Of bricks of `grid`, whose rates `kept` has. All but `granularity` is referred to.
-  BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
-                 int granularity);
+  BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups,
+                 const Grid& grid, int granularity);
 
-  /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as nobody has.
-  /// Cost: kept gold once more along z, and six differences a node.
+  /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as
+  /// nobody has. Cost: kept gold once more along z, and six differences a node.
   void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
 
   /// Of cells of gold on `lattice` in a brick that was required.

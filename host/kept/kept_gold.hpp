@@ -13,8 +13,8 @@
 #include "host/bounds/projection_bounds.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
-#include "host/gold/gold_filters.hpp"
-#include "host/gold/interpolate_gold.hpp"
+#include "host/kept/gold_filters.hpp"
+#include "host/kept/interpolate_gold.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/rates.hpp"
@@ -71,6 +71,10 @@ class KeptGold {
   [[nodiscard]] std::int64_t missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
 
  private:
+  /// Rows of the detector up to which gold's heights are products with all of them: beyond, heights at half a
+  /// pixel and filters between them are the cheaper.
+  static constexpr std::int64_t most_few_rows = 32;
+
   using TileAt = std::pair<std::int64_t, std::int64_t>;  // y, x
   struct Place {
     std::size_t page = 0;
@@ -91,7 +95,12 @@ class KeptGold {
   const Across& across_of(int phases, std::size_t axis);
   const GoldFilter& filter_of(int phases, std::size_t axis);
   void resample_heights(const GoldLattice& lattice, const GoldBox& box);
-  void take_heights(const Span& x, const Span& y);
+  void require_run(const Span& z);
+  const opencl::DeviceArray<float>& heights_of(const TileAt& tile, const Place& place);
+  void take_heights(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out);
+  [[nodiscard]] std::vector<double> rows_of(double first, double step, std::int64_t heights) const;
+  [[nodiscard]] std::uint64_t run_bytes() const;
+  [[nodiscard]] bool few_rows() const { return scan_.geometry.rows <= most_few_rows; }
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
 
   opencl::State& state_;
@@ -110,15 +119,22 @@ class KeptGold {
   std::map<TileAt, Place> tiles_;
   std::map<std::pair<int, std::size_t>, GoldFilter> filters_;
   std::map<std::pair<int, std::size_t>, Across> across_;
-  // Heights of the last box: blocks of a slab share them.
+  // Heights at half a pixel, tile by tile: all of them where memory allows, else a run that serves many
+  // blocks.
+  struct Run {
+    std::int64_t low = 0, count = 0, stride = 0;
+    std::optional<AlongZ> from_rows;
+    std::map<TileAt, opencl::DeviceArray<float>> tiles;
+  };
+  std::optional<Run> run_;
+  // How the last box's heights come of these, or of all rows where they are few: blocks of a slab share that.
   struct Heights {
-    std::int64_t first = 0, nodes = 0;
+    std::int64_t first = 0, nodes = 0, padded = 0;
     int phases = 1, step = 1;
-    std::optional<AlongZ> from_rows, between;
-    std::int64_t stride = 0, padded = 0;  // of columns of heights made of rows, and of gold's
+    std::optional<AlongZ> weights;
   };
   std::optional<Heights> heights_;
-  std::array<opencl::DeviceArray<float>, 3> buffers_;
+  std::array<opencl::DeviceArray<float>, 2> buffers_;
   double seconds_ = 0;
 };
 

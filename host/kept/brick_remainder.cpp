@@ -1,5 +1,5 @@
-// Launcher of kernels/gold/fourth_differences.cl.
-#include "host/gold/brick_remainder.hpp"
+// Launcher of kernels/kept/fourth_differences.cl.
+#include "host/kept/brick_remainder.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -30,8 +30,8 @@ constexpr double difference_norm = 16;
 
 }  // namespace
 
-BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups,
-                               const Grid& grid, int granularity)
+BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
+                               const FieldSups& sups, const Grid& grid, int granularity)
     : state_(state), kept_(kept), coverage_(scan.geometry), grid_(grid), granularity_(granularity) {
   const ParallelGeometry& g = scan.geometry;
   bricks_ = Bricks(grid, granularity).along();
@@ -41,8 +41,9 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
   for (std::size_t a = 0; a < 3; ++a) {
     spacing[a] = grid.spacing[a] / static_cast<double>(kept.rates()[a]);
     const double pitch = a == 2 ? g.pitch_v : g.pitch_u;
-    norms[a] = a == 1 && spacing[1] == spacing[0] ? norms[0]
-                                                  : remainder_norms(std::min(pi / 2, pi * spacing[a] / pitch));
+    norms[a] = a == 1 && spacing[1] == spacing[0]
+                   ? norms[0]
+                   : remainder_norms(std::min(pi / 2, pi * spacing[a] / pitch));
     // The stencil of a point one step of gold, at 2x or finer, outside the brick.
     const std::int64_t side = granularity * kept.rates()[a];
     stencil[a] = norms[a].taps / 2 + std::max<std::int64_t>(1, kept.rates()[a] / 2);
@@ -55,11 +56,14 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
   const GoldErrors errors = kept.errors({});
   const double node = errors.interpolation + errors.rounding;
   const double slack = difference_norm * node + difference_rounding * unit_roundoff * sups.value;
-  const std::array<std::array<std::size_t, 3>, 6> axes{{{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}}};
+  const std::array<std::array<std::size_t, 3>, 6> axes{
+      {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}}};
   for (std::size_t d = 0; d < 6; ++d) {
     const auto& [i, j, k] = axes[d];
-    const double factor = d < 3 ? pure_factor(norms[i], norms[j], norms[k]) : mixed_factor(norms[i], norms[j], norms[k]),
-                 tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k]) : mixed_tail(norms[i], norms[j], norms[k]);
+    const double factor = d < 3 ? pure_factor(norms[i], norms[j], norms[k])
+                                : mixed_factor(norms[i], norms[j], norms[k]),
+                 tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k])
+                              : mixed_tail(norms[i], norms[j], norms[k]);
     factor_[d] = round_up(factor);
     addend_[d] = round_up(factor * slack + tail * sups.value);
   }
@@ -70,8 +74,9 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
 }
 
 std::size_t BrickRemainder::slot(const Index3& p) const {
-  return at(((p[2] + rings_[2]) * (bricks_[1] + 2 * rings_[1]) + p[1] + rings_[1]) * (bricks_[0] + 2 * rings_[0]) + p[0] +
-            rings_[0]);
+  return at(((p[2] + rings_[2]) * (bricks_[1] + 2 * rings_[1]) + p[1] + rings_[1]) *
+                (bricks_[0] + 2 * rings_[0]) +
+            p[0] + rings_[0]);
 }
 
 void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Progress& progress) {
@@ -92,7 +97,8 @@ void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Pr
     for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
       for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
         Index3 size{};
-        for (std::size_t a = 0; a < 3; ++a) size[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
+        for (std::size_t a = 0; a < 3; ++a)
+          size[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
         bool open = false;
         for (std::int64_t z = 0; z < size[2] && !open; ++z)
           for (std::int64_t y = 0; y < size[1] && !open; ++y)
@@ -137,14 +143,15 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
                            grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
                                                  static_cast<double>(kept_.rates()[1]))));
   const opencl::DeviceArray<float> margin(state_, std::span<const float>(margins), "coverage margins");
-  const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6), "fourth differences");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(state_, "gold/fourth_differences",
-                                                                                   "fourth_differences");
+  const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
+                                       "fourth differences");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(
+      state_, "kept/fourth_differences", "fourth_differences");
   const auto side = [&](std::size_t a) { return to_int(granularity_ * kept_.rates()[a]); };
   kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
          margin.buffer(),
-         VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1), side(2),
-                               to_int(box.nodes[0]), to_int(stride), static_cast<float>(lowest_)});
+         VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
+                               side(2), to_int(box.nodes[0]), to_int(stride), static_cast<float>(lowest_)});
   const std::vector<float> found = out.to_host();
   for (std::int64_t z = 0; z < bricks[2]; ++z)
     for (std::int64_t y = 0; y < bricks[1]; ++y)
@@ -163,12 +170,16 @@ float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
       for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x)
         for (std::size_t d = 0; d < 6; ++d) largest[d] = std::max(largest[d], maxima_[slot({x, y, z})][d]);
   std::array<double, 3> square{};  // of gold's spacing over that of kept nodes
-  for (std::size_t a = 0; a < 3; ++a) square[a] = std::pow(static_cast<double>(lattice.step[a]) / lattice.phases[a], 2);
+  for (std::size_t a = 0; a < 3; ++a)
+    square[a] = std::pow(static_cast<double>(lattice.step[a]) / lattice.phases[a], 2);
   const auto sup = [&](std::size_t d) {
-    return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) + static_cast<double>(addend_[d]);
+    return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) +
+           static_cast<double>(addend_[d]);
   };
-  const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) + square[2] * square[2] * sup(2),
-               mixed = square[0] * square[1] * sup(3) + square[0] * square[2] * sup(4) + square[1] * square[2] * sup(5);
+  const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) +
+                      square[2] * square[2] * sup(2),
+               mixed = square[0] * square[1] * sup(3) + square[0] * square[2] * sup(4) +
+                       square[1] * square[2] * sup(5);
   return round_up(0.125 * (5.0 / 24 * pure + 2.0 / 8 * mixed));
 }
 

@@ -1,4 +1,4 @@
-#include "host/gold/gold_filters.hpp"
+#include "host/kept/gold_filters.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 // Keeps tiles of back-projected columns, and interpolates boxes from them. Calls back_project.cpp and
 // interpolate_gold.cpp.
-#include "host/gold/kept_gold.hpp"
+#include "host/kept/kept_gold.hpp"
 
 #include <fmt/format.h>
 
@@ -25,9 +25,8 @@ constexpr double pi = std::numbers::pi;
 constexpr std::int64_t side = 32;
 // Bytes of the tiles that are made together, which share one allocation.
 constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
-// Rows of the detector from which gold's heights are made by way of heights at half a pixel: below, the
-// product with all rows is the cheaper.
-constexpr std::int64_t few_rows = 32;
+// Kept heights around those asked for: boxes of other halos will read them.
+constexpr std::int64_t run_margin = 32;
 
 // Terms of a run of the upsampled columns, whose errors what follows multiplies.
 constexpr int exact_run = 4;
@@ -114,9 +113,8 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
 
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   const ParallelGeometry& g = scan_.geometry;
-  const bool all_rows = g.rows <= few_rows || lattice.phases[2] == 1;
   const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
-                   &z = filter_of(all_rows ? 1 : lattice.phases[2], 2);
+                   &z = filter_of(few_rows() ? 1 : lattice.phases[2], 2);
   // Second differences of what is not interpolated are those of nodes, each with an error of its own.
   const auto bend = [](const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; };
   const double S = sups_.value;
@@ -140,7 +138,7 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
   // height by itself, product and filter; of each node by itself, 17 roundings in either filter across z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
-  const double between = z.rate > 1 ? product_error(taps_before + taps_after + 9, AlongZ::run) + 2 : 0.0;
+  const double between = !few_rows() ? product_error(taps_before + taps_after + 9, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *
                          ((g.rows > 1 ? (product_error(g.rows, AlongZ::run) + 2) * gain_v : 0.0) + between);
   const double apart = (x.rate > 1 ? 17.0 : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
@@ -267,41 +265,98 @@ std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& bl
 
 // --- boxes ---
 
-// Of the rows where they are few or nothing lies between heights of half a pixel, else of these.
+// Rows that determine nodes of height `first` + i * `step`, in kept heights: [i][row].
+std::vector<double> KeptGold::rows_of(double first, double step, std::int64_t heights) const {
+  const ParallelGeometry& g = scan_.geometry;
+  std::vector<double> positions;
+  // One by one: a height has the same weights in every box.
+  for (std::int64_t i = 0; i < heights; ++i)
+    positions.push_back(
+        detector_rows(g, grid_.origin[2] + (first + static_cast<double>(i) * step) * spacing_[2], 0, 1)
+            .front());
+  return resampling_matrix(g.rows, positions, 0, 1.0, 0);
+}
+
+void KeptGold::require_run(const Span& z) {
+  if (run_ && run_->low <= z.low && z.low + z.count <= run_->low + run_->count) return;
+  // Beyond the grid as far as halos and filters read.
+  const std::int64_t all_low = -run_margin, all_high = grid_.cells[2] * rates_[2] + 1 + run_margin;
+  Run run;
+  run.low = std::min(all_low, z.low);
+  run.count = std::max(all_high, z.low + z.count) - run.low;
+  const auto bytes = [&](std::int64_t heights) {
+    return count(4 * side * side * column_stride(heights)) * tiles_.size();
+  };
+  if (bytes(run.count) > (state_.memory.left() + run_bytes()) / 4) {
+    run.low = z.low - run_margin;
+    run.count = z.count + 2 * run_margin;
+  }
+  run_.reset();
+  const HeightWeights weights =
+      height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
+  run.stride = column_stride(run.count);
+  run.from_rows.emplace(state_, weights);
+  run_ = std::move(run);
+}
+
+std::uint64_t KeptGold::run_bytes() const {
+  std::uint64_t bytes = 0;
+  if (run_)
+    for (const auto& [at, tile] : run_->tiles) bytes += 4 * tile.size();
+  return bytes;
+}
+
+const opencl::DeviceArray<float>& KeptGold::heights_of(const TileAt& tile, const Place& place) {
+  if (const auto known = run_->tiles.find(tile); known != run_->tiles.end()) return known->second;
+  opencl::DeviceArray<float>& out =
+      run_->tiles
+          .emplace(tile, opencl::DeviceArray<float>(state_, count(side * side * run_->stride),
+                                                    "heights of kept gold"))
+          .first->second;
+  VdvrAlongZ part{};
+  part.in_first = place.first;
+  part.in_x = count(stride_);
+  part.in_y = count(side * stride_);
+  part.out_x = count(run_->stride);
+  part.out_y = count(side * run_->stride);
+  part.columns_x = part.columns_y = to_int(side);
+  (*run_->from_rows)(state_, pages_[place.page], out, part);
+  return out;
+}
+
+// Of all rows where they are few, else of heights at half a pixel.
 void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) {
+  const Span s = span(lattice, 2, box);
+  if (!few_rows()) require_run(s);
   if (heights_ && heights_->first == box.first[2] && heights_->nodes == box.nodes[2] &&
       heights_->phases == lattice.phases[2] && heights_->step == lattice.step[2])
     return;
-  const ParallelGeometry& g = scan_.geometry;
   Heights h;
   h.first = box.first[2];
   h.nodes = box.nodes[2];
   h.phases = lattice.phases[2];
   h.step = lattice.step[2];
-  const bool all_rows = g.rows <= few_rows || h.phases == 1;
-  const Span s = span(lattice, 2, box);
-  const double first =
-                   all_rows ? static_cast<double>(h.first) * h.step / h.phases : static_cast<double>(s.low),
-               step = all_rows ? static_cast<double>(h.step) / h.phases : 1.0;
-  const std::int64_t made = all_rows ? h.nodes : s.count;
-  const std::vector<double> matrix = resampling_matrix(
-      g.rows, detector_rows(g, grid_.origin[2] + first * spacing_[2], step * spacing_[2], made), 0, 1.0, 0);
-  const HeightWeights from_rows = height_weights(matrix, made, g.rows);
-  h.from_rows.emplace(state_, from_rows);
-  h.stride = h.padded = 16 * from_rows.groups();
-  if (!all_rows) {
+  HeightWeights weights;
+  if (few_rows()) {
+    const double step = static_cast<double>(h.step) / h.phases;
+    weights = height_weights(rows_of(static_cast<double>(h.first) * step, step, h.nodes), h.nodes,
+                             scan_.geometry.rows);
+  } else {
     const GoldFilter& f = filter_of(h.phases, 2);
-    std::vector<double> between(at(h.nodes * made), 0.0);
+    std::vector<double> between(at(h.nodes * s.count), 0.0);
     for (std::int64_t n = 0; n < h.nodes; ++n) {
       const std::int64_t position = n + s.skipped, interval = position / h.phases,
                          phase = position % h.phases;
-      for (std::int64_t t = 0; t < f.taps; ++t)
-        between[at(n * made + interval + t)] = static_cast<double>(f.weights[at(phase * f.taps + t)]);
+      double* row = between.data() + n * s.count + interval * h.step;
+      if (phase == 0) row[taps_before] = 1;
+      else
+        for (std::int64_t t = 0; t < f.taps; ++t)
+          row[t] = static_cast<double>(f.weights[at(phase * f.taps + t)]);
     }
-    const HeightWeights weights = height_weights(between, h.nodes, made);
-    h.between.emplace(state_, weights);
-    h.padded = 16 * weights.groups();
+    weights = height_weights(between, h.nodes, s.count);
   }
+  h.weights.emplace(state_, weights);
+  h.padded = 16 * weights.groups();
   heights_ = std::move(h);
 }
 
@@ -326,26 +381,31 @@ const Across& KeptGold::across_of(int phases, std::size_t axis) {
       .first->second;
 }
 
-// float [y][x][stride] of the kept nodes, heights made of the rows.
-void KeptGold::take_heights(const Span& x, const Span& y) {
-  const std::int64_t stride = heights_->stride;
-  opencl::DeviceArray<float>& out = buffer(0, count(x.count * y.count * stride));
+// float out[y][x][padded]: gold's heights on kept columns.
+void KeptGold::take_heights(const GoldLattice& lattice, const GoldBox& box,
+                            const opencl::DeviceArray<float>& out) {
+  const Span x = span(lattice, 0, box), y = span(lattice, 1, box), z = span(lattice, 2, box);
+  const std::int64_t padded = heights_->padded;
   for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
     for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
       const auto tile = tiles_.find({ty, tx});
       if (tile == tiles_.end()) continue;  // beyond reach
       const std::int64_t x0 = std::max(x.low, tx * side), x1 = std::min(x.low + x.count, (tx + 1) * side),
                          y0 = std::max(y.low, ty * side), y1 = std::min(y.low + y.count, (ty + 1) * side);
+      const std::int64_t stride = few_rows() ? stride_ : run_->stride;
+      const opencl::DeviceArray<float>& in =
+          few_rows() ? pages_[tile->second.page] : heights_of(tile->first, tile->second);
       VdvrAlongZ part{};
-      part.in_first = tile->second.first + count(((y0 - ty * side) * side + x0 - tx * side) * stride_);
-      part.in_x = count(stride_);
-      part.in_y = count(side * stride_);
-      part.out_first = count(((y0 - y.low) * x.count + x0 - x.low) * stride);
-      part.out_x = count(stride);
-      part.out_y = count(x.count * stride);
+      part.in_first = (few_rows() ? tile->second.first : count(z.low - run_->low)) +
+                      count(((y0 - ty * side) * side + x0 - tx * side) * stride);
+      part.in_x = count(stride);
+      part.in_y = count(side * stride);
+      part.out_first = count(((y0 - y.low) * x.count + x0 - x.low) * padded);
+      part.out_x = count(padded);
+      part.out_y = count(x.count * padded);
       part.columns_x = to_int(x1 - x0);
       part.columns_y = to_int(y1 - y0);
-      (*heights_->from_rows)(state_, pages_[tile->second.page], out, part);
+      (*heights_->weights)(state_, in, out, part);
     }
 }
 
@@ -353,22 +413,10 @@ void KeptGold::fill(const GoldLattice& lattice, const GoldBox& box, const opencl
                     std::uint64_t first, std::int64_t stride) {
   const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
   resample_heights(lattice, box);
-  take_heights(x, y);
-  const std::int64_t padded = heights_->padded, columns = x.count * y.count;
-  const opencl::DeviceArray<float>* heights = &buffer(0, 0);
-  if (heights_->between) {
-    opencl::DeviceArray<float>& finer = buffer(1, count(columns * padded));
-    VdvrAlongZ part{};
-    part.in_x = count(heights_->stride);
-    part.in_y = count(x.count * heights_->stride);
-    part.out_x = count(padded);
-    part.out_y = count(x.count * padded);
-    part.columns_x = to_int(x.count);
-    part.columns_y = to_int(y.count);
-    (*heights_->between)(state_, *heights, finer, part);
-    heights = &finer;
-  }
-  const opencl::DeviceArray<float>& rows = buffer(2, count(x.count * box.nodes[1] * padded));
+  const std::int64_t padded = heights_->padded;
+  const opencl::DeviceArray<float>& heights = buffer(0, count(x.count * y.count * padded));
+  take_heights(lattice, box, heights);
+  const opencl::DeviceArray<float>& rows = buffer(1, count(x.count * box.nodes[1] * padded));
   VdvrAcross along_y{};
   along_y.in_along = along_y.out_along = count(x.count * padded);
   along_y.in_other = along_y.out_other = count(padded);
@@ -378,7 +426,7 @@ void KeptGold::fill(const GoldLattice& lattice, const GoldBox& box, const opencl
   along_y.step = lattice.step[1];
   along_y.skipped = to_int(y.skipped);
   along_y.outputs = to_int(box.nodes[1]);
-  across_of(lattice.phases[1], 1)(state_, *heights, rows, along_y);
+  across_of(lattice.phases[1], 1)(state_, heights, rows, along_y);
   VdvrAcross along_x{};
   along_x.in_along = count(padded);
   along_x.in_other = count(x.count * padded);

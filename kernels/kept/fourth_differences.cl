@@ -1,6 +1,6 @@
 // The largest fourth differences of kept gold on closed bricks: along x, y, z, then xy, xz, yz (docs/error-bounds.md,
 // section 5). Layouts: float gold[y][x][stride] with two nodes around the bricks on every side; float margin[y][x];
-// float out[brick z][y][x][6]. Called by host/gold/brick_remainder.cpp.
+// float out[brick z][y][x][6]. Called by host/kept/brick_remainder.cpp.
 #include "shared/fourth_differences.h"
 
 #define AT(c) vload8(0, c)

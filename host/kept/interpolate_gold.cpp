@@ -1,5 +1,5 @@
-// Launcher of kernels/gold/interpolate.cl.
-#include "host/gold/interpolate_gold.hpp"
+// Launcher of kernels/kept/interpolate.cl.
+#include "host/kept/interpolate_gold.hpp"
 
 #include <algorithm>
 #include <stdexcept>
@@ -26,7 +26,8 @@ opencl::Defines defines(opencl::State& state, int phases) {
 // Whole groups of the phases that a work-item makes together.
 std::vector<float> padded(int phases, std::span<const float> weights) {
   const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
-  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps), 0.0f);
+  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
+                         0.0f);
   std::copy(weights.begin(), weights.end(), out.begin());
   return out;
 }
@@ -71,21 +72,20 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   shape.groups = to_int(groups_);
   const auto lanes = count(column_tuning(state.info).lanes);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "gold/interpolate", "along_z", defines(state, 1));
+      state, "kept/interpolate", "along_z", defines(state, 1));
   kernel({{count(groups_ * lanes_of_group) / lanes, count((shape.columns_x + 7) / 8), count(shape.columns_y)},
           {1, 4, 1}},
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), shape);
 }
 
 Across::Across(opencl::State& state, int phases, std::span<const float> weights)
-    : phases_(phases),
-      weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
+    : phases_(phases), weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
 
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
   const auto lanes = count(column_tuning(state.info).lanes);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "gold/interpolate", "across",
-                                                                       defines(state, phases_));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
+                                                                        defines(state, phases_));
   kernel({{count(shape.z) / lanes, count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
          in.buffer(), weights_.buffer(), shape);
 }

@@ -1,0 +1,62 @@
+#include "host/gold/cell_test.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <string>
+
+#include "host/opencl/column_tuning.hpp"
+#include "host/opencl/kernel.hpp"
+#include "host/system/casts.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrCellTest) == 32);
+
+namespace {
+
+std::vector<float> floats(const opencl::DeviceArray<cl_int>& bits) {
+  std::vector<float> out;
+  for (const cl_int b : bits.to_host()) out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
+  return out;
+}
+
+}  // namespace
+
+CellTestResults cell_test(opencl::State& state, const DeviceField& field, const GoldOnDevice& gold,
+                          const VdvrCellTest& test, const opencl::DeviceArray<std::uint8_t>& selected,
+                          std::int64_t brick_nodes) {
+  const VdvrGoldShape& s = gold.shape;
+  const std::uint64_t across = count(std::int64_t{s.bricks_x} * s.bricks_y),
+                      layers = count(std::int64_t{s.bricks_z} * s.blocks);
+  opencl::DeviceArray<cl_int> total(state, across * layers, "brick totals"),
+      error(state, across * layers, "brick errors"), slack(state, across * layers, "brick slack"),
+      violated(state, across * layers, "violations");
+  total.fill(-1);
+  error.fill(-1);
+  slack.fill(-1);
+  violated.fill(0);
+  opencl::Defines defines = field.defines;
+  // Eight at most: the corners' parts are as many registers.
+  const std::int64_t most = std::min<std::int64_t>({column_tuning(state.info).lanes, 8, brick_nodes}),
+                     lanes = most >= 8   ? 8
+                             : most >= 4 ? 4
+                                         : 1;
+  defines.emplace_back("VDVR_LANES", std::to_string(lanes));
+  defines.emplace_back("VDVR_BRICK_NODES", std::to_string(brick_nodes));
+  defines.emplace_back("VDVR_WINDOWED", test.windowed != 0 ? "1" : "0");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
+                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, VdvrCellTest>
+      kernel(state, "gold/cell_test", "cell_test", defines);
+  kernel({{count((brick_nodes + lanes - 1) / lanes), across, layers}, {1, 1, 1}}, total.buffer(),
+         error.buffer(), slack.buffer(), violated.buffer(), field.samples.buffer(), field.bricks.buffer(),
+         field.grid, gold.gold.buffer(), gold.addend.buffer(), gold.margin.buffer(),
+         gold.first_brick.buffer(), selected.buffer(), s, test);
+  CellTestResults out{floats(total), floats(error), floats(slack), {}};
+  out.violated.assign(out.total.size(), 0);
+  if (test.parts == 0) return out;
+  const auto bits = violated.to_host();
+  for (std::size_t i = 0; i < bits.size(); ++i) out.violated[i] = static_cast<std::uint32_t>(bits[i]);
+  return out;
+}
+
+}  // namespace vdvr

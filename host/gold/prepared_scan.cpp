@@ -1,0 +1,60 @@
+#include "host/gold/prepared_scan.hpp"
+
+#include <bit>
+
+namespace vdvr {
+namespace {
+
+// Of the line integrals and the geometry: one scan read again has the same, another's differs but by an
+// accident of 2^-64.
+std::uint64_t checksum(const ProjectionSet& scan) {
+  std::uint64_t sum = 0xcbf29ce484222325u;
+  const auto add = [&](std::uint64_t word) { sum = std::rotl((sum ^ word) * 0x9e3779b97f4a7c15u, 29); };
+  for (const float v : scan.data) add(std::bit_cast<std::uint32_t>(v));
+  const ParallelGeometry& g = scan.geometry;
+  for (const double v : g.theta_rad) add(std::bit_cast<std::uint64_t>(v));
+  for (const double v : {g.pitch_u, g.pitch_v, g.center}) add(std::bit_cast<std::uint64_t>(v));
+  add(static_cast<std::uint64_t>(g.rows));
+  add(static_cast<std::uint64_t>(g.columns));
+  return sum;
+}
+
+bool is_same_grid(const Grid& a, const Grid& b) {
+  return a.cells == b.cells && a.origin == b.origin && a.spacing == b.spacing;
+}
+
+}  // namespace
+
+PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
+                           const Units& units, bool derivatives, const Progress& progress)
+    : state(device),
+      filtered(
+          filter_projections(device, scan, field, progress, FilterMethod::automatic, Precision::fp64, units)),
+      upsampler(device, filtered),
+      sups(derivatives ? field_sups(device, upsampler, filtered) : value_sups(device, upsampler, filtered)),
+      host_(device),
+      field_(field),
+      units_(units),
+      checksum_(checksum(scan)) {
+  host_.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, filtered,");
+}
+
+bool PreparedScan::is_of(const opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
+                         const Units& units) const {
+  return &device == &state && field.filter == field_.filter && field.cutoff == field_.cutoff &&
+         field.center == field_.center && units.across == units_.across && units.along == units_.along &&
+         units.line == units_.line && checksum(scan) == checksum_;
+}
+
+std::shared_ptr<GoldSource> PreparedScan::source(const GoldSettings& s) {
+  if (!source_ || !is_same_grid(s.grid, settings_.grid) || s.granularity != settings_.granularity ||
+      s.upsampling != settings_.upsampling || s.interpolation != settings_.interpolation ||
+      gold_reach(s) > gold_reach(settings_)) {
+    source_ = nullptr;  // before the next one is allocated
+    source_ = std::make_shared<GoldSource>(state, filtered, sups, s);
+    settings_ = s;
+  }
+  return source_;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,44 @@
+// A scan as planning leaves it to the build that follows: filtered, with its sups and the gold that is kept.
+// Made by plan.cpp; taken over by build.cpp where the scan is the same.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "host/bounds/projection_bounds.hpp"
+#include "host/fbp/filter_projections.hpp"
+#include "host/gold/gold_source.hpp"
+#include "host/opencl/host_memory.hpp"
+#include "host/scan/units.hpp"
+
+namespace vdvr {
+
+struct PreparedScan {
+  /// Filters and bounds. `derivatives`: sups of these too, which the plan's bounds and interpolation by two
+  /// or four taps need. Refers to `state`.
+  PreparedScan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field, const Units& units,
+               bool derivatives, const Progress& progress);
+  PreparedScan(const PreparedScan&) = delete;
+  PreparedScan& operator=(const PreparedScan&) = delete;
+
+  /// Whether it is of this scan and field on this device.
+  [[nodiscard]] bool is_of(const opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                           const Units& units) const;
+  /// What gold of these settings reads: rates that differ in gold alone share it.
+  std::shared_ptr<GoldSource> source(const GoldSettings& settings);
+
+  opencl::State& state;
+  FilteredScan filtered;
+  Upsampler upsampler;
+  FieldSups sups;
+
+ private:
+  HostMemory host_;
+  FieldOptions field_;
+  Units units_;
+  std::uint64_t checksum_ = 0;
+  std::shared_ptr<GoldSource> source_;
+  GoldSettings settings_;  // of source_
+};
+
+}  // namespace vdvr

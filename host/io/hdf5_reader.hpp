@@ -1,0 +1,87 @@
+// Reads HDF5 files and refuses: every failure is a FileError naming file and object. What links may lead to
+// is one policy for a whole Reader. A dataset comes in one of two ways: checksummed, as our writer makes
+// them, checked down to its stored bytes; or numeric, as others make them, read and converted by HDF5. Either
+// is handed out only after its declaration has been checked, so that callers can size memory by it. Called by
+// vdvr_file.cpp (volumes), hdf5_scan.cpp and volume_stack.cpp (files of others).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/io/hdf5.hpp"
+
+namespace vdvr::io::hdf5 {
+
+/// How an object may be reached. In both, all that is read lies in the one file, which its hash covers.
+enum class Links {
+  hard,        ///< a soft or external link on the path is refused, and so is what cannot be opened
+  within_file  ///< soft links too; what lies behind an external one or cannot be opened counts as absent
+};
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& path, Links links);
+
+  [[nodiscard]] bool has(const std::string& path) const { return static_cast<bool>(find(path)); }
+  [[nodiscard]] bool is_group(const std::string& path) const;
+  [[nodiscard]] bool is_dataset(const std::string& path) const;
+  void require_group(const std::string& path) const;
+  /// Link names in a group, sorted.
+  [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
+
+  // --- attributes that must be there ---
+  [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
+  [[nodiscard]] std::int64_t integer(const std::string& object, const std::string& name) const;
+  [[nodiscard]] std::vector<std::int64_t> integers(const std::string& object, const std::string& name,
+                                                   std::uint64_t count) const;
+  [[nodiscard]] std::vector<double> reals(const std::string& object, const std::string& name,
+                                          std::uint64_t count) const;
+  [[nodiscard]] std::string text_attribute(const std::string& object, const std::string& name) const;
+  /// Every attribute of an object, by name; one that is no number and no text is refused.
+  [[nodiscard]] std::vector<Attribute> attributes(const std::string& object) const;
+
+  // --- attributes that may be there ---
+  /// Its texts, one for a scalar; none when it is absent or not text.
+  [[nodiscard]] std::vector<std::string> find_texts(const std::string& object, const std::string& name) const;
+  /// The first of them.
+  [[nodiscard]] std::optional<std::string> find_text(const std::string& object,
+                                                     const std::string& name) const;
+  /// Refused when it is there and not `count` numbers.
+  [[nodiscard]] std::optional<std::vector<double>> find_reals(const std::string& object,
+                                                              const std::string& name,
+                                                              std::uint64_t count) const;
+  [[nodiscard]] std::optional<double> find_real(const std::string& object, const std::string& name) const;
+
+  // --- datasets ---
+  /// A checksummed one: chunked, of a known packing, as many chunks as its shape needs, shape without a zero.
+  /// A chunk's content is checked when it is read.
+  [[nodiscard]] Dataset dataset(const std::string& path) const;
+  /// All of such a one, each chunk against its checksum, into dataset.bytes bytes.
+  void read(const Dataset& dataset, void* values) const;
+  /// Any with numbers stored in this file; Dataset::read converts them.
+  [[nodiscard]] Dataset numeric_dataset(const std::string& path) const;
+  /// A string dataset, fixed or variable length, scalar or of one element, of at most `max_bytes`.
+  [[nodiscard]] std::string text(const std::string& path, std::uint64_t max_bytes) const;
+
+  /// Throws FileError: "path: object: what".
+  [[noreturn]] void refuse(const std::string& object, const std::string& what) const;
+  [[nodiscard]] const std::string& path() const { return shown_; }
+  [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
+
+ private:
+  [[nodiscard]] bool hard_linked(const std::string& path) const;
+  /// What the policy lets be reached; invalid where nothing is.
+  [[nodiscard]] Handle find(const std::string& path) const;
+  [[nodiscard]] Handle open_object(const std::string& path) const;
+  [[nodiscard]] Dataset declared(const std::string& path) const;
+
+  Silence silence_;
+  std::string shown_;
+  Links links_;
+  std::uint64_t file_bytes_ = 0;
+  Handle file_, access_;  // access_: of links, refuses external ones
+};
+
+}  // namespace vdvr::io::hdf5

@@ -1,0 +1,297 @@
+// Tests the stored field V against F on the cells of gold of a block, through the sampler that renders it
+// (kernels/shared/mixed_sampler.h). In a cell |V - F| is at most the larger of V - gold + below and above - (V - gold) over
+// its corners: below is an eighth of the largest second differences of gold at them, by axis, plus what its brick adds
+// (interpolation, rounding, remainder); above alike with the other sign (docs/error-bounds.md, section 5). Layouts: gold
+// float[block][y + halo][x + halo][gold stride], node z at z + halo, with a halo of at least one node; margin
+// float[block][y + halo][x + halo]; addend float and results [block][brick z][brick y][brick x]. A brick's results are those
+// of its own cells, in whatever block they are computed. Called by host/gold/cell_test.cpp.
+#include "device/lanes.h"
+#include "device/largest.h"
+#include "shared/cell_test.h"
+#include "shared/gold_shape.h"
+#include "shared/mixed_sampler.h"
+
+#if VDVR_LANES == 1
+#define READ(p) (*(p))
+#define WRITE(v, p) (*(p) = (v))
+#define INT int
+#define INDEX 0
+#define LARGEST(v) (v)
+#elif VDVR_LANES == 4
+#define READ(p) vload4(0, p)
+#define WRITE(v, p) vstore4(v, 0, p)
+#define INT int4
+#define INDEX (int4)(0, 1, 2, 3)
+#define LARGEST(v) fmax(fmax((v).x, (v).y), fmax((v).z, (v).w))
+#elif VDVR_LANES == 8
+#define READ(p) vload8(0, p)
+#define WRITE(v, p) vstore8(v, 0, p)
+#define INT int8
+#define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
+#define LARGEST(v) largest_of_8(v)
+#else
+#define READ(p) vload16(0, p)
+#define WRITE(v, p) vstore16(v, 0, p)
+#define INT int16
+#define INDEX (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define LARGEST(v) largest_of_16(v)
+#endif
+
+// What goes through memory is a third of the time.
+#define ALWAYS_INLINE __attribute__((always_inline))
+
+#ifndef VDVR_BRICK_NODES
+#error "VDVR_BRICK_NODES must be granularity * gold rate"
+#endif
+
+// Positive floats order as their bits do. Most do not raise the maximum: a plain read spares them the atomic.
+inline void raise(volatile __global int* target, float v) {
+  if (as_int(v) > *target) atomic_max(target, as_int(v));
+}
+
+// --- a brick among the blocks ---
+
+typedef struct {
+  int block, x, y, z;             // in its block
+  int bx, by, bz;                 // in the grid
+  int last_x, last_y, last_z;     // its nodes' last indices
+  size_t slot;                    // of results
+  __global const float* gold;     // its first node
+  __global const float* margin;   // alike
+  int row;                        // columns of a row
+  VdvrBrick brick;
+} Place;
+
+// False where there is no such brick, or nobody wants it.
+inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold, __global const float* margin,
+                       __global const uint* bricks, VdvrGrid grid, __global const int4* first_brick,
+                       __global const uchar* selected, VdvrGoldShape s) {
+  p->block = layer / s.bricks_z;
+  p->x = x;
+  p->y = y;
+  p->z = layer - p->block * s.bricks_z;
+  if (x >= s.bricks_x || y >= s.bricks_y || p->block >= s.blocks) return false;
+  const int4 first = first_brick[p->block];
+  p->bx = first.x + x;
+  p->by = first.y + y;
+  p->bz = first.z + p->z;
+  if (p->bx >= grid.bricks_x || p->by >= grid.bricks_y || p->bz >= grid.bricks_z) return false;
+  const size_t brick = ((size_t)p->bz * grid.bricks_y + p->by) * grid.bricks_x + p->bx;
+  if (!selected[brick]) return false;
+  const int g = grid.granularity;
+  p->last_x = min(g, grid.cells_x - p->bx * g) * s.rate;
+  p->last_y = min(g, grid.cells_y - p->by * g) * s.rate;
+  p->last_z = min(g, grid.cells_z - p->bz * g) * s.rate;
+  p->slot = (((size_t)p->block * s.bricks_z + p->z) * s.bricks_y + y) * s.bricks_x + x;
+  p->row = s.nx + 2 * s.halo;
+  const size_t column = ((size_t)p->block * (s.ny + 2 * s.halo) + y * VDVR_BRICK_NODES + s.halo) * p->row +
+                        x * VDVR_BRICK_NODES + s.halo;
+  p->gold = gold + column * s.gold_stride + p->z * VDVR_BRICK_NODES + s.halo;
+  p->margin = margin + column;
+  p->brick = vdvr_brick(bricks, grid, brick);
+  return true;
+}
+
+// V on a column of nodes: between the samples of a level, whose first lies at node 0. Gold nodes are dyadic fractions of a
+// cell: these cell coordinates are exact.
+typedef struct {
+  VdvrLocal x, y;
+  int per_interval;
+  float interval;
+} Column;
+inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
+  const int g = grid.granularity;
+  const float cx = (float)(p->bx * g) + (float)ix / (float)rate, cy = (float)(p->by * g) + (float)iy / (float)rate;
+  Column c;
+  c.x = vdvr_local(cx, p->bx, p->brick.level_x, g, grid.cells_x, grid.coarse_x);
+  c.y = vdvr_local(cy, p->by, p->brick.level_y, g, grid.cells_y, grid.coarse_y);
+  c.per_interval = (rate << grid.coarse_z) >> p->brick.level_z;
+  c.interval = 1.0f / (float)c.per_interval;
+  return c;
+}
+inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
+  // The last node belongs to the interval below it.
+  const int index = k < p->last_z ? k / c->per_interval : (p->last_z - 1) / c->per_interval;
+  return vdvr_lerp(vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index),
+                   vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index + 1),
+                   (float)(k - index * c->per_interval) * c->interval);
+}
+
+#if VDVR_LANES > 1
+// V at VDVR_LANES + 1 nodes from `begin` on, interval by interval: two planes serve all nodes between them. Beyond the last
+// node anything finite. `out` has room for eight more.
+inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples, int begin, float* out) {
+  const int end = min(begin + VDVR_LANES, p->last_z), per = c->per_interval;
+  int index = min(begin, p->last_z - 1) / per;
+  float low = vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index);
+  for (; index * per < end || index * per == begin; ++index) {
+    const float high = vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index + 1);
+    const int from = max(index * per, begin);
+    if (per >= 8)
+      for (int k = from; k <= end && k <= (index + 1) * per; k += 8) {
+        const float8 t = (float8)((float)(k - index * per)) + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
+        vstore8((1.0f - t * c->interval) * low + t * c->interval * high, 0, out + k - begin);
+      }
+    else
+      for (int k = from; k <= end && k <= (index + 1) * per; ++k)
+        out[k - begin] = vdvr_lerp(low, high, (float)(k - index * per) * c->interval);
+    low = high;
+    if ((index + 1) * per >= end) break;
+  }
+  for (int k = end + 1; k <= begin + VDVR_LANES; ++k) out[k - begin] = 0.0f;
+}
+#endif
+
+// --- the test ---
+
+// What corners give: the largest of V - gold and of its negative, of second differences along x, y, z and of their
+// negatives, and of gold and its negative for the window.
+#if VDVR_WINDOWED
+#define FOR_PARTS(M) M(ep) M(em) M(xp) M(xm) M(yp) M(ym) M(zp) M(zm) M(gp) M(gm)
+#else
+#define FOR_PARTS(M) M(ep) M(em) M(xp) M(xm) M(yp) M(ym) M(zp) M(zm)
+#endif
+#define DECLARE(part) VEC part;
+typedef struct {
+  FOR_PARTS(DECLARE)
+} Corners;
+#define LARGER(part) out.part = fmax(a.part, b.part);
+inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
+  Corners out;
+  FOR_PARTS(LARGER)
+  return out;
+}
+
+// Of both ends of edges along z from node z of a column on.
+inline ALWAYS_INLINE Corners ends_of(__global const float* c, VEC low_v, VEC high_v, INT low_tested, INT high_tested, int to_x, int to_y) {
+  const VEC low = READ(c), high = READ(c + 1);
+  const VEC unlimited = (VEC)(INFINITY);
+  VEC e0 = low_v - low, e1 = high_v - high;
+  // NaN would drop out of a maximum.
+  e0 = select(unlimited, e0, fabs(e0) <= FLT_MAX);
+  e1 = select(unlimited, e1, fabs(e1) <= FLT_MAX);
+  const VEC x0 = READ(c - to_x) + READ(c + to_x) - 2.0f * low, x1 = READ(c + 1 - to_x) + READ(c + 1 + to_x) - 2.0f * high,
+            y0 = READ(c - to_y) + READ(c + to_y) - 2.0f * low, y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - 2.0f * high,
+            z0 = READ(c - 1) + high - 2.0f * low, z1 = low + READ(c + 2) - 2.0f * high;
+  Corners out;
+  out.ep = fmax(select(-unlimited, e0, low_tested), select(-unlimited, e1, high_tested));
+  out.em = fmax(select(-unlimited, -e0, low_tested), select(-unlimited, -e1, high_tested));
+  out.xp = fmax(x0, x1);
+  out.xm = -fmin(x0, x1);
+  out.yp = fmax(y0, y1);
+  out.ym = -fmin(y0, y1);
+  out.zp = fmax(z0, z1);
+  out.zm = -fmin(z0, z1);
+#if VDVR_WINDOWED
+  out.gp = fmax(low, high);
+  out.gm = -fmin(low, high);
+#endif
+  return out;
+}
+
+// The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
+inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
+
+// One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at which its test
+// fails.
+int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, VdvrGoldShape s, VdvrCellTest test, int x,
+                  int y, int z, float below, float above) {
+  int parts = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int ix = x + (corner & 1), iy = y + (corner >> 1 & 1), iz = z + (corner >> 2);
+    const int node = p->z * VDVR_BRICK_NODES + iz;
+    const size_t column = (size_t)iy * p->row + ix;
+    if (p->margin[column] < s.lowest || node < test.z_first || node > test.z_last) continue;
+    const Column at = column_of(p, ix, iy, grid, s.rate);
+    const float e = field_at(p, &at, samples, iz) - p->gold[column * s.gold_stride + iz];
+    if (!(fmax(e + below, above - e) <= test.tolerance))
+      parts |= 1 << (part_of(iz, p->last_z) * 9 + part_of(iy, p->last_y) * 3 + part_of(ix, p->last_x));
+  }
+  return parts;
+}
+
+// One work-item does VDVR_LANES heights of a brick. violated: the failing parts, where test.parts asks for them.
+__kernel void cell_test(volatile __global int* total, volatile __global int* error, volatile __global int* slack_max,
+                        volatile __global int* violated,
+                        __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
+                        __global const float* gold, __global const float* addend, __global const float* margin,
+                        __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
+                        VdvrCellTest test) {
+  const int begin = (int)get_global_id(0) * VDVR_LANES;
+  const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
+  Place p;
+  if (!find_place(&p, bricks_across - by * s.bricks_x, by, (int)get_global_id(2), gold, margin, bricks, grid, first_brick,
+                  selected, s) ||
+      begin >= p.last_z)
+    return;
+  const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY);
+  const int to_x = s.gold_stride, to_y = p.row * s.gold_stride;
+  const INT node = begin + p.z * VDVR_BRICK_NODES + INDEX, cell = begin + INDEX;
+  const INT low_tested = (node >= test.z_first) & (node <= test.z_last),
+            high_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last), inside = cell < p.last_z;
+  VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
+  int parts = 0;
+  Corners before[VDVR_BRICK_NODES];
+  for (int iy = 0; iy <= p.last_y; ++iy) {
+    Corners left;
+    for (int ix = 0; ix <= p.last_x; ++ix) {
+      const size_t column = (size_t)iy * p.row + ix;
+      __global const float* c = p.gold + column * s.gold_stride + begin;
+      const int tested = p.margin[column] >= s.lowest;
+      const Column at = column_of(&p, ix, iy, grid, s.rate);
+#if VDVR_LANES == 1
+      const float low_v = tested ? field_at(&p, &at, samples, begin) : 0.0f,
+                  high_v = tested ? field_at(&p, &at, samples, begin + 1) : 0.0f;
+      const Corners here = ends_of(c, low_v, high_v, tested && low_tested, tested && high_tested, to_x, to_y);
+#else
+      float v[VDVR_LANES + 12];
+      if (tested) field_along(&p, &at, samples, begin, v);
+      else
+        for (int i = 0; i < VDVR_LANES + 1; ++i) v[i] = 0.0f;
+      const VEC low_v = READ(v), high_v = READ(v + 1);
+      const INT of_column = (INT)(tested ? -1 : 0);
+      const Corners here =
+          ends_of(c, low_v, high_v, of_column & low_tested, of_column & high_tested & (cell + 1 <= p.last_z), to_x, to_y);
+#endif
+      largest_error = fmax(largest_error, select(-unlimited, fmax(here.ep, here.em), inside));
+      if (ix > 0) {
+        const Corners face = larger(left, here);
+        if (iy > 0) {
+          const Corners all = larger(before[ix - 1], face);
+          VEC below = (fmax(all.xp, 0.0f) + fmax(all.yp, 0.0f) + fmax(all.zp, 0.0f)) * 0.125f + rest,
+              above = (fmax(all.xm, 0.0f) + fmax(all.ym, 0.0f) + fmax(all.zm, 0.0f)) * 0.125f + rest;
+          // Whatever is no number here is no bound.
+          below = select(unlimited, below, below <= FLT_MAX);
+          above = select(unlimited, above, above <= FLT_MAX);
+          if (!test.counted) below = above = (VEC)(0.0f);
+          // No corner is tested: -e and e are both -infinity.
+          INT counts = inside & (all.ep > -unlimited);
+#if VDVR_WINDOWED
+          // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
+          counts &= (-all.gm - below <= test.window_high) & (all.gp + above >= test.window_low);
+#endif
+          const VEC both = select(-unlimited, fmax(all.ep + below, all.em + above), counts);
+          largest_total = fmax(largest_total, both);
+          if (test.parts && LARGEST(both) > test.tolerance) {
+            float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
+            WRITE(both, totals);
+            WRITE(below, belows);
+            WRITE(above, aboves);
+            for (int i = 0; i < VDVR_LANES; ++i)
+              if (totals[i] > test.tolerance)
+                parts |= failing_parts(&p, samples, grid, s, test, ix - 1, iy - 1, begin + i, belows[i], aboves[i]);
+          }
+          largest_slack = fmax(largest_slack, select(-unlimited, fmax(below, above), counts));
+        }
+        before[ix - 1] = face;
+      }
+      left = here;
+    }
+  }
+  const float found = LARGEST(largest_slack);
+  if (found < 0.0f) return;
+  if (parts) atomic_or(violated + p.slot, parts);
+  raise(slack_max + p.slot, found);
+  raise(total + p.slot, fmax(LARGEST(largest_total), 0.0f));
+  raise(error + p.slot, fmax(LARGEST(largest_error), 0.0f));
+}
