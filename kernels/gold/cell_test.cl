@@ -253,7 +253,6 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       const Corners here =
           ends_of(c, low_v, high_v, of_column & low_tested, of_column & high_tested & (cell + 1 <= p.last_z), to_x, to_y);
 #endif
-      largest_error = fmax(largest_error, select(-unlimited, fmax(here.ep, here.em), inside));
       if (ix > 0) {
         const Corners face = larger(left, here);
         if (iy > 0) {
@@ -272,6 +271,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
 #endif
           const VEC both = select(-unlimited, fmax(all.ep + below, all.em + above), counts);
           largest_total = fmax(largest_total, both);
+          largest_error = fmax(largest_error, select(-unlimited, fmax(all.ep, all.em), counts));
           if (test.parts && LARGEST(both) > test.tolerance) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
