@@ -81,9 +81,9 @@ BOOST_AUTO_TEST_CASE(every_gold_cell_with_a_covered_point_is_tested) {
         const Rates rates{8, Interpolation::six_taps, gold};
         const GoldNodes l =
             stream_nodes(chain,
-                           grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9,
-                                   gold, Place::cell),
-                           rates);
+                         grid_at(scan.data.geometry, {r * std::cos(angle), r * std::sin(angle), z}, 0.9, gold,
+                                 Place::cell),
+                         rates);
         std::int64_t missed = 0, covered = 0;
         for (std::int64_t cz = 0; cz + 1 < l.nodes[2]; ++cz)
           for (std::int64_t y = 0; y + 1 < l.nodes[1]; ++y)

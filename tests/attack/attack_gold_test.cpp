@@ -38,9 +38,9 @@ double node_of(KeptGold& kept, const GoldLattice& lattice, const Index3& node) {
   return static_cast<double>(out.to_host().front());
 }
 
-// Linear interpolation between columns errs most in their middles and not at all on them. A kept node lies 1.2
-// or 1.6 columns from the next (3-4-5): around a node on a column, midway between four of them, those of
-// positive weight lie near middles and others near columns, and errors add to 1.2 of the largest.
+// Linear interpolation between columns errs most in their middles and not at all on them. A kept node
+// lies 1.2 or 1.6 columns from the next (3-4-5): around a node on a column, midway between four of them,
+// those of positive weight lie near middles and others near columns, and errors add to 1.2 of the largest.
 struct Amplified {
   static constexpr std::int64_t U = 24;
   static constexpr int upsampling = 4;
@@ -92,9 +92,9 @@ BOOST_AUTO_TEST_CASE(second_differences_err_by_no_more_than_is_charged) {
       for (const int rate : {2, 4, 8}) {
         const int upsampling = filter == Interpolation::six_taps ? 8 : 2 << (turn++ % 4);
         const double spacing = turn % 3 == 0 ? 1.0 : turn % 3 == 1 ? 0.7 : 1.9;
-        const Grid grid = grid_in({3, 3, 1}, {spacing, spacing, spacing},
-                                  {scan.target[0] - 1.3 * spacing, scan.target[1] - 1.6 * spacing,
-                                   scan.target[2] - 0.4 * spacing});
+        const Grid grid = grid_in(
+            {3, 3, 1}, {spacing, spacing, spacing},
+            {scan.target[0] - 1.3 * spacing, scan.target[1] - 1.6 * spacing, scan.target[2] - 0.4 * spacing});
         KeptGold kept(device().state(), chain.filtered, chain.sups, grid, 2 * spacing, upsampling, filter);
         const GoldLattice lattice = kept.lattice(grid, rate);
         const GoldErrors e = kept.errors(lattice);
@@ -110,8 +110,7 @@ BOOST_AUTO_TEST_CASE(second_differences_err_by_no_more_than_is_charged) {
         for (std::int64_t z = 0; z < box.nodes[2]; ++z)
           for (std::int64_t y = 0; y < box.nodes[1]; ++y)
             for (std::int64_t x = 0; x < box.nodes[0]; ++x) {
-              computed.push_back(
-                  static_cast<double>(gold[vdvr::at((y * box.nodes[0] + x) * stride + z)]));
+              computed.push_back(static_cast<double>(gold[vdvr::at((y * box.nodes[0] + x) * stride + z)]));
               const Index3 i{x, y, z};
               Vec3 p{};
               for (std::size_t a = 0; a < 3; ++a)
@@ -134,21 +133,53 @@ BOOST_AUTO_TEST_CASE(second_differences_err_by_no_more_than_is_charged) {
               double found = 0, truth = 0, worst = 0;
               const std::size_t c = vdvr::at((z * n[1] + y) * n[0] + x);
               // The signs that add up.
-              for (const std::size_t step :
-                   {std::size_t{1}, vdvr::at(n[0]), vdvr::at(n[0] * n[1])}) {
+              for (const std::size_t step : {std::size_t{1}, vdvr::at(n[0]), vdvr::at(n[0] * n[1])}) {
                 found = computed[c - step] + computed[c + step] - 2 * computed[c];
                 truth = F[c - step] + F[c + step] - 2 * F[c];
                 worst += std::abs(found - truth) / 8;
               }
               if (worst > 0) closest = std::max(closest, worst / bound);
-              BOOST_TEST(worst <= tolerance::bound(bound),
-                         scan.name << ", " << text_of(filter) << " " << upsampling << ", " << rate
-                                   << "x: " << worst << " > " << bound);
+              BOOST_TEST(worst <= tolerance::bound(bound), scan.name << ", " << text_of(filter) << " "
+                                                                     << upsampling << ", " << rate
+                                                                     << "x: " << worst << " > " << bound);
             }
       }
   }
   BOOST_TEST_MESSAGE("  second differences: error / bound " << closest);
   BOOST_TEST(closest >= 0.02);
+}
+
+// Every filtered sample wrong by e, with the signs that add up at a node.
+BOOST_AUTO_TEST_CASE(errors_of_filtered_samples_reach_gold_as_charged) {
+  const double e = 0x1p-10;
+  double closest = 0;
+  for (const double row : {1.5, 0.5, 3.25})
+    for (const int rate : {2, 4}) {
+      ParallelGeometry g = geometry(5, 4, 24);
+      const auto wu = resampling_matrix(g.columns, std::array{g.center}, 0, 1, 0),
+                 wv = resampling_matrix(g.rows, std::array{row}, 0, 1, 0);
+      const FilteredScan right = given_samples(
+          g, [](auto k, auto v, auto u) { return std::cos(static_cast<double>(7 * k + 3 * v + 5 * u)); });
+      const auto sample = [&](std::size_t k, std::size_t v, std::size_t u) { return (k * 24 + u) * 4 + v; };
+      FilteredScan wrong = given_samples(g, [&](std::size_t k, std::size_t v, std::size_t u) {
+        return static_cast<double>(right.samples[sample(k, v, u)]) + e * (wu[u] * wv[v] < 0 ? -1.0 : 1.0);
+      });
+      wrong.ramp_error = 5 * (e + tolerance::unit_roundoff * 2);  // the sum is rounded
+      Upsampler upsampler(device().state(), wrong);
+      const FieldSups sups = field_sups(device().state(), upsampler, wrong);
+      const Grid grid = grid_in({4, 4, 1}, {1, 1, 1}, {-2, -2, row - 1.5});
+      KeptGold kept(device().state(), wrong, sups, grid, 1, 8, Interpolation::six_taps);
+      const GoldLattice lattice = kept.lattice(grid, rate);
+      const ExactColumns exact(g, {1, g.center, 0, 1}, right.samples, row);
+      double F = 0;
+      for (std::size_t k = 0; k < 5; ++k) F += exact(k, 0);
+      const GoldErrors errors = kept.errors(lattice);
+      const double error = std::abs(node_of(kept, lattice, {2 * rate, 2 * rate, 0}) - F);
+      closest = std::max(closest, error / (errors.interpolation + errors.rounding + errors.ramp));
+      BOOST_TEST(error <= tolerance::bound(errors.interpolation + errors.rounding + errors.ramp));
+      BOOST_TEST(error > errors.interpolation + errors.rounding);
+    }
+  BOOST_TEST_MESSAGE("  filtered samples: error / bound " << closest);
 }
 
 // Kept nodes as they are: between columns and with them, in one view or thousands.
@@ -209,11 +240,12 @@ BOOST_AUTO_TEST_CASE(six_taps_of_computed_columns_err_by_no_more_than_the_chain_
       const ExactColumns exact(g, upsampled, f.samples, 0);
       for (std::int64_t y = 0; y < blocks.ny; y += 2)
         for (std::int64_t x = 0; x < blocks.nx; x += 2) {
-          const double truth = exact.back_projected(-1.2 + 0.43 * static_cast<double>(x),
-                                                    0.3 + 0.51 * static_cast<double>(y),
-                                                    Interpolation::six_taps),
+          const double truth =
+                           exact.back_projected(-1.2 + 0.43 * static_cast<double>(x),
+                                                0.3 + 0.51 * static_cast<double>(y), Interpolation::six_taps),
                        error = std::abs(
-                           static_cast<double>(host[vdvr::at((y * blocks.nx + x) * column_stride(1))]) - truth);
+                           static_cast<double>(host[vdvr::at((y * blocks.nx + x) * column_stride(1))]) -
+                           truth);
           closest = std::max(closest, error / bound);
           BOOST_TEST(error <= tolerance::bound(bound), views << " views: " << error << " > " << bound);
         }

@@ -42,9 +42,9 @@ Arithmetic measure(const FilteredScan& filtered, const std::vector<float>& truth
   a.bound = arithmetic_bound(upsampler, filtered, sups, columns, blocks, interpolation);
   for (std::int64_t y = 0; y < blocks.ny; ++y)
     for (std::int64_t x = 0; x < blocks.nx; ++x) {
-      const double e = exact.back_projected(blocks.first[0][0] + static_cast<double>(x) * blocks.step_x,
-                                            blocks.first[0][1] + static_cast<double>(y) * blocks.step_y,
-                                            interpolation);
+      const double e =
+          exact.back_projected(blocks.first[0][0] + static_cast<double>(x) * blocks.step_x,
+                               blocks.first[0][1] + static_cast<double>(y) * blocks.step_y, interpolation);
       a.error = std::max(a.error,
                          std::abs(static_cast<double>(host[at((y * blocks.nx + x) * column_stride(1))]) - e));
     }
@@ -303,7 +303,8 @@ BOOST_AUTO_TEST_CASE(arithmetic_covers_positions_far_from_the_block_corner) {
       const FilteredScan f = given_samples(g, [&](auto, auto, std::size_t u) {
         return std::sin(reference::frequency(m, columns) * (static_cast<double>(u) + 0.5) + 0.1);
       });
-      expect(measure(f, f.samples, filter == Interpolation::six_taps ? 8 : 2, filter, {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
+      expect(measure(f, f.samples, filter == Interpolation::six_taps ? 8 : 2, filter,
+                     {40, 40, 34.987, 33.311, {{-680.1, -650.3}}, {}}, 0),
              std::string("position, ") + text_of(filter) + ", wave " + std::to_string(m));
     }
 }

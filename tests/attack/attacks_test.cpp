@@ -141,8 +141,7 @@ void check_projections(const Scan& scan, Chain& chain, const GoldNodes& l, const
       arithmetic_bound(chain.upsampler, chain.filtered, chain.sups, columns,
                        {n[0], n[1], grid.spacing[0], grid.spacing[1], {}, {}}, rates.interpolation);
   // The amplitudes are those of the fp32 filtered samples.
-  const double ramp =
-      chain.filtered.ramp_error * lebesgue_constant(g.columns) * lebesgue_constant(g.rows);
+  const double ramp = chain.filtered.ramp_error * lebesgue_constant(g.columns) * lebesgue_constant(g.rows);
   const double amplitude = amplitude_bounds(chain.filtered, grid, {rates.upsampling}).projection[0].second,
                d = g.pitch_u / rates.upsampling, w = std::numbers::pi / g.pitch_u;
   const Volume made = reconstruct_field(device().state(), chain.filtered, chain.upsampler, grid,
@@ -164,7 +163,8 @@ void check_projections(const Scan& scan, Chain& chain, const GoldNodes& l, const
     }
   }
   expect("amplitude of projections", scan, how, by_amplitude);
-  expect(std::string("projections between columns, ") + text_of(rates.interpolation), scan, how, by_curvature);
+  expect(std::string("projections between columns, ") + text_of(rates.interpolation), scan, how,
+         by_curvature);
 }
 
 // The global bounds that `plan` prints beside the certificate's: amplitude and curvature.

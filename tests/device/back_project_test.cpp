@@ -28,7 +28,8 @@ reference::UpsampledViews read_back(const UpsampledSlab& slab) {
   return q;
 }
 
-constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic, Interpolation::six_taps};
+constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic,
+                                         Interpolation::six_taps};
 
 int taps_of(Interpolation filter) {
   return filter == Interpolation::six_taps ? 6 : filter == Interpolation::cubic ? 4 : 2;
@@ -85,9 +86,9 @@ void check_reference(const ProjectionSet& scan, int rate, Interpolation filter, 
     const auto expected = reference::back_project(q, filtered.geometry, x, y, z, filter);
     if (!expected.inside) return;
     ++compared;
-    if (!(std::abs(computed - expected.value) <=
-          tolerance::fp32_sum(roundings, expected.magnitude) + position * expected.slope + expected.jump +
-              weights * expected.largest))
+    if (!(std::abs(computed - expected.value) <= tolerance::fp32_sum(roundings, expected.magnitude) +
+                                                     position * expected.slope + expected.jump +
+                                                     weights * expected.largest))
       ++wrong;
   });
   BOOST_TEST(wrong == 0);
@@ -211,8 +212,9 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
   double magnitude = 0;
   for (const double v : q.values) magnitude = std::max(magnitude, std::abs(v));
   magnitude *= static_cast<double>(slab.views);
-  // Twice what positions may do, of slopes in columns and of sums that are largest with six weights. Positions
-  // are the same to the bit in all tilings, so that none finds itself on the other side of a column.
+  // Twice what positions may do, of slopes in columns and of sums that are largest with six weights.
+  // Positions are the same to the bit in all tilings, so that none finds itself on the other side of a
+  // column.
   const SixTaps& six = six_tap_facts();
   const double moved = 2 * position_error(filtered.geometry, slab.columns, blocks) * magnitude;
   for (const Interpolation filter : all_filters) {

@@ -45,7 +45,11 @@ std::array<double, 6> bounds_of(const BrickRemainder& remainder, const KeptGold&
     return static_cast<double>(remainder.of(brick, lattice));
   };
   const double xx = of(true, false, false), yy = of(false, true, false), zz = of(false, false, true);
-  std::array<double, 6> out{xx, yy, zz, of(true, true, false) - xx - yy, of(true, false, true) - xx - zz,
+  std::array<double, 6> out{xx,
+                            yy,
+                            zz,
+                            of(true, true, false) - xx - yy,
+                            of(true, false, true) - xx - zz,
                             of(false, true, true) - yy - zz};
   for (std::size_t d = 0; d < 6; ++d) out[d] /= 0.125 * (d < 3 ? 5.0 / 24 : 2.0 / 8);
   return out;
@@ -162,8 +166,7 @@ BOOST_AUTO_TEST_CASE(peaks_between_nodes_do_not_exceed_their_bounds) {
     for (const std::size_t low : {1u, 12u, 20u}) {
       const attacks::Scan scan = attacks::axis_peak(8, low, sign, false);
       for (const double shift : {0.0, 0.25, 0.13}) {
-        const Grid grid =
-            grid_in({8, 8, 4}, {1, 1, 1}, {-4 + shift, -4 - shift, scan.target[2] - 2 + shift});
+        const Grid grid = grid_in({8, 8, 4}, {1, 1, 1}, {-4 + shift, -4 - shift, scan.target[2] - 2 + shift});
         const Ratios r = ratios_of(scan.data, grid, 4, 300);
         for (std::size_t k = 0; k < 6; ++k)
           BOOST_TEST(r.least[k] >= 1, scan.name << ", " << names[k] << ": " << r.least[k]);

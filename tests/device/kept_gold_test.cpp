@@ -27,7 +27,8 @@ struct Nodes {
   std::int64_t stride = 0;
   std::vector<float> values;
   [[nodiscard]] float at(std::int64_t x, std::int64_t y, std::int64_t z) const {  // nodes of the lattice
-    return values[vdvr::at(((y - box.first[1]) * box.nodes[0] + x - box.first[0]) * stride + z - box.first[2])];
+    return values[vdvr::at(((y - box.first[1]) * box.nodes[0] + x - box.first[0]) * stride + z -
+                           box.first[2])];
   }
 };
 
@@ -41,8 +42,12 @@ Nodes nodes_of(KeptGold& kept, const GoldLattice& lattice, const GoldBox& box, s
   out.fill(untouched);
   kept.fill(lattice, box, out, before, stride);
   std::vector<float> all = out.to_host();
-  for (std::size_t i = 0; i < before; ++i) BOOST_REQUIRE(all[i] == untouched && all[all.size() - 1 - i] == untouched);
-  return {box, stride, {all.begin() + static_cast<std::ptrdiff_t>(before), all.end() - static_cast<std::ptrdiff_t>(before)}};
+  for (std::size_t i = 0; i < before; ++i)
+    BOOST_REQUIRE(all[i] == untouched && all[all.size() - 1 - i] == untouched);
+  return {
+      box,
+      stride,
+      {all.begin() + static_cast<std::ptrdiff_t>(before), all.end() - static_cast<std::ptrdiff_t>(before)}};
 }
 
 Grid grid_in(const Index3& cells, const Vec3& spacing, const Vec3& origin) {
@@ -97,15 +102,20 @@ std::vector<Case> cases() {
       {"three columns and rows", noise_scan(4, 3, 3, 4), grid_in({2, 2, 2}, {1, 1, 1}, {-1, -1, -1})},
       {"20 rows", noise_scan(11, 20, 24, 5), grid_in({2, 2, 5}, {1, 1, 1}, {-1.3, 0.2, 4.3})},
       {"33 rows", noise_scan(11, 33, 24, 5), grid_in({2, 2, 5}, {1, 1, 1}, {-1.3, 0.2, 4.3})},
-      {"40 rows, over the last", noise_scan(11, 40, 24, 5), grid_in({2, 2, 6}, {0.7, 0.7, 0.7}, {-1.3, 0.2, 17})},
-      {"40 rows, over the first", noise_scan(11, 40, 24, 5), grid_in({2, 2, 9}, {0.3, 0.3, 0.3}, {-1.3, 0.2, -21})},
-      {"40 rows, spacing of three", noise_scan(11, 40, 24, 5), grid_in({2, 2, 8}, {1, 1, 3}, {-1.3, 0.2, -12})},
-      {"uneven angles", [] {
+      {"40 rows, over the last", noise_scan(11, 40, 24, 5),
+       grid_in({2, 2, 6}, {0.7, 0.7, 0.7}, {-1.3, 0.2, 17})},
+      {"40 rows, over the first", noise_scan(11, 40, 24, 5),
+       grid_in({2, 2, 9}, {0.3, 0.3, 0.3}, {-1.3, 0.2, -21})},
+      {"40 rows, spacing of three", noise_scan(11, 40, 24, 5),
+       grid_in({2, 2, 8}, {1, 1, 3}, {-1.3, 0.2, -12})},
+      {"uneven angles",
+       [] {
          ProjectionSet scan = noise_scan(11, 5, 24, 9);
          for (std::size_t k = 0; k < 11; ++k)
            scan.geometry.theta_rad[k] = std::numbers::pi * std::pow(static_cast<double>(k) / 11, 1.7);
          return scan;
-       }(), grid_in({3, 3, 2}, {1, 1, 1}, {1.1, -3, -1.2})},
+       }(),
+       grid_in({3, 3, 2}, {1, 1, 1}, {1.1, -3, -1.2})},
   };
 }
 
@@ -156,8 +166,7 @@ BOOST_AUTO_TEST_CASE(gold_of_any_lattice_is_within_its_errors_of_the_field) {
       // Six taps and sixteen: a hundred-thousandth of what the field can be, but for the ramp.
       BOOST_TEST(e.interpolation <= 2e-5 * chain.sups.value);
       const Nodes nodes = nodes_of(kept, lattice, whole(c.grid, rate, 3), 64);
-      const Compared r =
-          compare(chain, c.grid, rate, nodes, c.reach, e.interpolation + e.rounding + e.ramp);
+      const Compared r = compare(chain, c.grid, rate, nodes, c.reach, e.interpolation + e.rounding + e.ramp);
       BOOST_TEST_MESSAGE(c.name << ", " << rate << "x (" << lattice.phases[0] << " / " << lattice.step[0]
                                 << " across, " << lattice.phases[2] << " / " << lattice.step[2]
                                 << " along): " << r.nodes << " nodes, error / bound " << r.worst);
@@ -210,8 +219,8 @@ BOOST_AUTO_TEST_CASE(lattices_of_coarser_grids_share_nodes_and_other_grids_are_r
   BOOST_CHECK_THROW(static_cast<void>(kept.lattice(grid, 3)), std::logic_error);
 }
 
-// Blocks of a pass, bricks of a repair, in whatever order tiles were asked for: across z to the bit, and along
-// z too where heights are made of the rows alone.
+// Blocks of a pass, bricks of a repair, in whatever order tiles were asked for: across z to the bit, and
+// along z too where heights are made of the rows alone.
 BOOST_AUTO_TEST_CASE(a_block_computed_alone_is_the_block_in_the_whole) {
   for (const std::int64_t rows : {9, 40}) {
     const ProjectionSet scan = noise_scan(11, rows, 40, 3);

@@ -27,5 +27,6 @@ BOOST_AUTO_TEST_CASE(bounds_of_marschner_lobb_are_as_tight_as_documented) {
   BOOST_TEST(t.gold_bound <= 1.2 * t.gold_error);
   BOOST_TEST(t.projection_error > 0);
   BOOST_TEST(t.projection_bound >= t.projection_error - t.arithmetic);
-  BOOST_TEST_MESSAGE("P: bound / error " << t.projection_bound / t.projection_error);
+  // A constant: 3.4 for what errors of kept nodes can grow to, and the views' sups as if all peaked together.
+  BOOST_TEST(t.projection_bound <= 20 * t.projection_error);
 }

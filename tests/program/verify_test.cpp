@@ -284,7 +284,8 @@ BOOST_AUTO_TEST_CASE(right_certificates_of_coarse_gold_are_agreed_with) {
   for (const unsigned seed : {3u, 4u})
     for (const Interpolation filter : {Interpolation::cubic, Interpolation::six_taps})
       for (const int gold : {4, 8}) {
-        const Made m = made(noise_between_stronger(seed), {8, 7, 6}, gold == 4 ? 0.2 : 0.05, {16, filter, gold});
+        const Made m =
+            made(noise_between_stronger(seed), {8, 7, 6}, gold == 4 ? 0.2 : 0.05, {16, filter, gold});
         const VerifyResult r = measured(m);
         BOOST_TEST(r.holds, r.failure);
         BOOST_TEST(r.total <= m.certificate.epsilon_abs);

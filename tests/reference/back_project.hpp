@@ -30,7 +30,7 @@ struct BackProjected {
   double slope =
       0;  ///< sum over views of a bound on |d value / d column| within a column of where the view is hit
   double largest = 0;  ///< sum over views of the largest sample that is read
-  double jump = 0;  ///< sum over views of what it may jump by from one column to the next
+  double jump = 0;     ///< sum over views of what it may jump by from one column to the next
   bool inside = true;  ///< every stencil lies on the columns
 };
 

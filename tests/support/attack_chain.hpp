@@ -26,7 +26,8 @@ inline std::string name_of(const Rates& rates) {
 inline bool serves(int upsampling, Interpolation filter) {
   return filter != Interpolation::six_taps || upsampling >= 8;
 }
-constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic, Interpolation::six_taps};
+constexpr Interpolation all_filters[] = {Interpolation::linear, Interpolation::cubic,
+                                         Interpolation::six_taps};
 
 /// Every set of rates: 4 upsamplings, 3 filters, 4 of gold.
 inline std::vector<Rates> all_rates() {
