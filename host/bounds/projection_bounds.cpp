@@ -242,17 +242,10 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
                            : w.taps * run + std::ceil(views / run) + 8;
   out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
-  // A wrong position moves along the interpolant, and where intervals of six weights meet, which do not
-  // reproduce columns, may jump by twice what they err. Six taps go by values alone, which is all that some
-  // callers have.
-  const double steepest = pi / g.pitch_u * sups.value,
-               slope = interpolation == Interpolation::six_taps
-                           ? steepest
-                           : std::min(steepest, std::sqrt(2 * sups.value * sups.second_u));
-  const double moved = position_error(g, columns, blocks);
-  out.position =
-      moved * (w.slope * g.pitch_u / columns.rate * slope + w.slope_sum * sups.value) +
-      (interpolation == Interpolation::six_taps ? 2 * out.interpolation : 0.0);
+  // At a wrong position, too, the interpolant is that close to the signal, which moves by its slope: at most
+  // what Bernstein says, and Landau and Kolmogorov, |q'|^2 <= 2 |q| |q''|.
+  const double slope = std::min(pi / g.pitch_u * sups.value, std::sqrt(2 * sups.value * sups.second_u));
+  out.position = position_error(g, columns, blocks) * g.pitch_u / columns.rate * slope;
   out.underflow = views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
   return out;
 }

@@ -27,7 +27,8 @@ bool is_same_grid(const Grid& a, const Grid& b) {
 
 PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
                            const Units& units, bool derivatives, const Progress& progress)
-    : state(device),
+    : shared(device.shared_from_this()),
+      state(device),
       filtered(
           filter_projections(device, scan, field, progress, FilterMethod::automatic, Precision::fp64, units)),
       upsampler(device, filtered),

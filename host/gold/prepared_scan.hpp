@@ -15,7 +15,7 @@ namespace vdvr {
 
 struct PreparedScan {
   /// Filters and bounds. `derivatives`: sups of these too, which the plan's bounds and interpolation by two
-  /// or four taps need. Refers to `state`.
+  /// or four taps need. Keeps the state: a plan that has it may outlive its Device.
   PreparedScan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field, const Units& units,
                bool derivatives, const Progress& progress);
   PreparedScan(const PreparedScan&) = delete;
@@ -27,6 +27,7 @@ struct PreparedScan {
   /// What gold of these settings reads: rates that differ in gold alone share it.
   std::shared_ptr<GoldSource> source(const GoldSettings& settings);
 
+  std::shared_ptr<opencl::State> shared;  ///< first: what follows counts its memory there to the last
   opencl::State& state;
   FilteredScan filtered;
   Upsampler upsampler;

@@ -235,7 +235,7 @@ std::vector<DeviceInfo> Device::list() {
 }
 
 Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
-    : state_(std::make_unique<opencl::State>()) {
+    : state_(std::make_shared<opencl::State>()) {
   const Found found = enumerate();
   if (found.empty()) {
     throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");

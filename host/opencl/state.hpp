@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -52,7 +53,8 @@ class BufferPool {
 /// kernel).
 using Defines = std::vector<std::pair<std::string, std::string>>;
 
-struct State {
+/// Shared by the Device and by what may outlive it.
+struct State : std::enable_shared_from_this<State> {
   DeviceInfo info;
   cl::Device device;
   cl::Context context;

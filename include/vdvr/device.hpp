@@ -53,7 +53,7 @@ class VDVR_API Device {
   opencl::State& state() { return *state_; }
 
  private:
-  std::unique_ptr<opencl::State> state_;
+  std::shared_ptr<opencl::State> state_;
 };
 
 }  // namespace vdvr

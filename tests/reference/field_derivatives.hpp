@@ -1,4 +1,5 @@
-// Derivatives of F from its cosine series, term by term in double precision. Used by brick_remainder_test.
+// Derivatives of F from its cosine series, term by term in double precision; F itself is that of order 0.
+// Used by brick_remainder_test and attack_gold_test.
 #pragma once
 
 #include <array>
