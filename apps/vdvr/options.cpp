@@ -127,7 +127,8 @@ int upsampling_option(const Arguments& args) {
 RateOptions rate_options(const Arguments& args) {
   RateOptions rates;
   rates.upsampling = rate(args, "upsampling", 64);
-  rates.interpolation = interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic", "six-taps"}, "auto"));
+  rates.interpolation =
+      interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic", "six-taps"}, "auto"));
   rates.gold = rate(args, "gold", 64);
   if (args.has("paper")) {
     if (!args.has("upsampling")) rates.upsampling = 8;

@@ -242,8 +242,8 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
                            : w.taps * run + std::ceil(views / run) + 8;
   out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
-  // At a wrong position, too, the interpolant is that close to the signal, which moves by its slope (Bernstein:
-  // of values alone, as six taps are). A position is in columns, and pi / pitch in world units.
+  // At a wrong position, too, the interpolant is that close to the signal, which moves by its slope
+  // (Bernstein: of values alone, as six taps are). A position is in columns, and pi / pitch in world units.
   out.position = position_error(g, columns, blocks) / columns.rate * pi * sups.value;
   out.underflow = views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
   return out;

@@ -1,5 +1,5 @@
-// Global bounds that rest on the filtered projections: sups, the errors of the chain to gold, amplitude bounds
-// (docs/error-bounds.md). Called by plan.cpp, kept_gold.cpp, brick_remainder.cpp and verify_terms.cpp.
+// Global bounds that rest on the filtered projections: sups, the errors of the chain to gold, amplitude
+// bounds (docs/error-bounds.md). Called by plan.cpp, kept_gold.cpp, brick_remainder.cpp and verify_terms.cpp.
 #pragma once
 
 #include <string>
@@ -52,7 +52,8 @@ struct ChainErrors {
   double underflow = 0;      ///< of what relative bounds do not cover
 };
 ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
-                         const UpsampledColumns& columns, const ColumnBlocks& blocks, Interpolation interpolation);
+                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
+                         Interpolation interpolation);
 
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,

@@ -103,15 +103,16 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
        {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
   const std::int64_t carried = tuning.lanes * tuning.vectors;
-  const VdvrColumnBlocks shape{.views = ints(slab.views),
-                               .columns = ints(slab.columns.count),
-                               .z_padded = ints(padded),
-                               .out_stride = ints(blocks.out_stride > 0 ? blocks.out_stride : column_stride(rows_wanted)),
-                               .nx = ints(blocks.nx),
-                               .ny = ints(blocks.ny),
-                               .blocks = ints(n),
-                               .first_chunk = ints(blocks.first_row / 16),
-                               .out_row = ints(blocks.out_row)};
+  const VdvrColumnBlocks shape{
+      .views = ints(slab.views),
+      .columns = ints(slab.columns.count),
+      .z_padded = ints(padded),
+      .out_stride = ints(blocks.out_stride > 0 ? blocks.out_stride : column_stride(rows_wanted)),
+      .nx = ints(blocks.nx),
+      .ny = ints(blocks.ny),
+      .blocks = ints(n),
+      .first_chunk = ints(blocks.first_row / 16),
+      .out_row = ints(blocks.out_row)};
   kernel({{count((padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},

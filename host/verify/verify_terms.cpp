@@ -95,7 +95,8 @@ class Totals {
         field_(f.state, v),
         gold_(f.state, f.scan, f.sups, settings(v, c)),
         same_device_(same_device) {
-    for (const float b : decoded(v.base, v.step)) largest_ = std::max(largest_, std::abs(static_cast<double>(b)));
+    for (const float b : decoded(v.base, v.step))
+      largest_ = std::max(largest_, std::abs(static_cast<double>(b)));
   }
 
   void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,

@@ -6,8 +6,8 @@
 
 namespace vdvr {
 
-/// Of the upsampled projections, along u. Cubic: Lagrange's, through four samples. Six taps: nearly minimax, of columns
-/// at 8x or more.
+/// Of the upsampled projections, along u. Cubic: Lagrange's, through four samples. Six taps: nearly minimax,
+/// of columns at 8x or more.
 enum class Interpolation { linear, cubic, six_taps };
 /// "linear", "cubic", "six-taps": as files and options write them.
 constexpr const char* text_of(Interpolation interpolation) {

@@ -102,14 +102,14 @@
 #define CLEAR(sum, i, c, r) VEC sum##_low = (VEC)(0.0f), sum##_high = (VEC)(0.0f);
 #if VDVR_TAPS == 6
 // What adding a run rounds off is summed beside the totals (Knuth's TwoSum: additions alone).
-#define ZERO(sum, i, c, r)                                         \
-  VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f), \
-      sum##_low_rest = (VEC)(0.0f), sum##_high_rest = (VEC)(0.0f);
-#define ADD_RUN(total, rest, sum)                       \
-  {                                                     \
-    const VEC all = total + sum, part = all - total;    \
-    rest += (total - (all - part)) + (sum - part);      \
-    total = all;                                        \
+#define ZERO(sum, i, c, r)                                                                         \
+  VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f), sum##_low_rest = (VEC)(0.0f), \
+      sum##_high_rest = (VEC)(0.0f);
+#define ADD_RUN(total, rest, sum)                    \
+  {                                                  \
+    const VEC all = total + sum, part = all - total; \
+    rest += (total - (all - part)) + (sum - part);   \
+    total = all;                                     \
   }
 #if VDVR_VECTORS == 2
 #define TOTAL(sum, i, c, r)                           \
@@ -118,8 +118,8 @@
 #else
 #define TOTAL(sum, i, c, r) ADD_RUN(sum##_low_total, sum##_low_rest, sum##_low)
 #endif
-#define CORRECT(sum, i, c, r)         \
-  sum##_low_total += sum##_low_rest;  \
+#define CORRECT(sum, i, c, r)        \
+  sum##_low_total += sum##_low_rest; \
   sum##_high_total += sum##_high_rest;
 #else
 #define ZERO(sum, i, c, r) VEC sum##_low_total = (VEC)(0.0f), sum##_high_total = (VEC)(0.0f);
@@ -174,9 +174,12 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
 #endif
 #if VDVR_TAPS == 6
     const TILE m = f - 0.5f, square = m * m;
-    const TILE even_a = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_A), odd_a = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_A),
-               even_b = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_B), odd_b = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_B),
-               even_c = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_C), odd_c = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_C);
+    const TILE even_a = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_A),
+               odd_a = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_A),
+               even_b = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_B),
+               odd_b = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_B),
+               even_c = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_C),
+               odd_c = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_C);
     const TILE w0 = even_a + odd_a, w1 = even_b + odd_b, w2 = even_c + odd_c, w3 = even_c - odd_c,
                w4 = even_b - odd_b, w5 = even_a - odd_a;
     const ITILE at = (clamp((int)step.w + below, (ITILE)2, (ITILE)(columns - 4)) - 2) * 16;

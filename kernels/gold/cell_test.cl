@@ -1,10 +1,11 @@
 // Tests the stored field V against F on the cells of gold of a block, through the sampler that renders it
-// (kernels/shared/mixed_sampler.h). In a cell |V - F| is at most the larger of V - gold + below and above - (V - gold) over
-// its corners: below is an eighth of the largest second differences of gold at them, by axis, plus what its brick adds
-// (interpolation, rounding, remainder); above alike with the other sign (docs/error-bounds.md, section 5). Layouts: gold
-// float[block][y + halo][x + halo][gold stride], node z at z + halo, with a halo of at least one node; margin
-// float[block][y + halo][x + halo]; addend float and results [block][brick z][brick y][brick x]. A brick's results are those
-// of its own cells, in whatever block they are computed. Called by host/gold/cell_test.cpp.
+// (kernels/shared/mixed_sampler.h). In a cell |V - F| is at most the larger of V - gold + below and above -
+// (V - gold) over its corners: below is an eighth of the largest second differences of gold at them, by axis,
+// plus what its brick adds (interpolation, rounding, remainder); above alike with the other sign
+// (docs/error-bounds.md, section 5). Layouts: gold float[block][y + halo][x + halo][gold stride], node z at z
+// + halo, with a halo of at least one node; margin float[block][y + halo][x + halo]; addend float and results
+// [block][brick z][brick y][brick x]. A brick's results are those of its own cells, in whatever block they
+// are computed. Called by host/gold/cell_test.cpp.
 #include "device/lanes.h"
 #include "device/largest.h"
 #include "shared/cell_test.h"
@@ -52,20 +53,20 @@ inline void raise(volatile __global int* target, float v) {
 // --- a brick among the blocks ---
 
 typedef struct {
-  int block, x, y, z;             // in its block
-  int bx, by, bz;                 // in the grid
-  int last_x, last_y, last_z;     // its nodes' last indices
-  size_t slot;                    // of results
-  __global const float* gold;     // its first node
-  __global const float* margin;   // alike
-  int row;                        // columns of a row
+  int block, x, y, z;            // in its block
+  int bx, by, bz;                // in the grid
+  int last_x, last_y, last_z;    // its nodes' last indices
+  size_t slot;                   // of results
+  __global const float* gold;    // its first node
+  __global const float* margin;  // alike
+  int row;                       // columns of a row
   VdvrBrick brick;
 } Place;
 
 // False where there is no such brick, or nobody wants it.
-inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold, __global const float* margin,
-                       __global const uint* bricks, VdvrGrid grid, __global const int4* first_brick,
-                       __global const uchar* selected, VdvrGoldShape s) {
+inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold,
+                       __global const float* margin, __global const uint* bricks, VdvrGrid grid,
+                       __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s) {
   p->block = layer / s.bricks_z;
   p->x = x;
   p->y = y;
@@ -92,8 +93,8 @@ inline bool find_place(Place* p, int x, int y, int layer, __global const float* 
   return true;
 }
 
-// V on a column of nodes: between the samples of a level, whose first lies at node 0. Gold nodes are dyadic fractions of a
-// cell: these cell coordinates are exact.
+// V on a column of nodes: between the samples of a level, whose first lies at node 0. Gold nodes are dyadic
+// fractions of a cell: these cell coordinates are exact.
 typedef struct {
   VdvrLocal x, y;
   int per_interval;
@@ -101,7 +102,8 @@ typedef struct {
 } Column;
 inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
   const int g = grid.granularity;
-  const float cx = (float)(p->bx * g) + (float)ix / (float)rate, cy = (float)(p->by * g) + (float)iy / (float)rate;
+  const float cx = (float)(p->bx * g) + (float)ix / (float)rate,
+              cy = (float)(p->by * g) + (float)iy / (float)rate;
   Column c;
   c.x = vdvr_local(cx, p->bx, p->brick.level_x, g, grid.cells_x, grid.coarse_x);
   c.y = vdvr_local(cy, p->by, p->brick.level_y, g, grid.cells_y, grid.coarse_y);
@@ -118,9 +120,10 @@ inline float field_at(const Place* p, const Column* c, __global const uchar* sam
 }
 
 #if VDVR_LANES > 1
-// V at VDVR_LANES + 1 nodes from `begin` on, interval by interval: two planes serve all nodes between them. Beyond the last
-// node anything finite. `out` has room for eight more.
-inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples, int begin, float* out) {
+// V at VDVR_LANES + 1 nodes from `begin` on, interval by interval: two planes serve all nodes between them.
+// Beyond the last node anything finite. `out` has room for eight more.
+inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples,
+                                      int begin, float* out) {
   const int end = min(begin + VDVR_LANES, p->last_z), per = c->per_interval;
   int index = min(begin, p->last_z - 1) / per;
   float low = vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index);
@@ -144,8 +147,8 @@ inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global 
 
 // --- the test ---
 
-// What corners give: the largest of V - gold and of its negative, of second differences along x, y, z and of their
-// negatives, and of gold and its negative for the window.
+// What corners give: the largest of V - gold and of its negative, of second differences along x, y, z and of
+// their negatives, and of gold and its negative for the window.
 #if VDVR_WINDOWED
 #define FOR_PARTS(M) M(ep) M(em) M(xp) M(xm) M(yp) M(ym) M(zp) M(zm) M(gp) M(gm)
 #else
@@ -163,16 +166,19 @@ inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
 }
 
 // Of both ends of edges along z from node z of a column on.
-inline ALWAYS_INLINE Corners ends_of(__global const float* c, VEC low_v, VEC high_v, INT low_tested, INT high_tested, int to_x, int to_y) {
+inline ALWAYS_INLINE Corners ends_of(__global const float* c, VEC low_v, VEC high_v, INT low_tested,
+                                     INT high_tested, int to_x, int to_y) {
   const VEC low = READ(c), high = READ(c + 1);
   const VEC unlimited = (VEC)(INFINITY);
   VEC e0 = low_v - low, e1 = high_v - high;
   // NaN would drop out of a maximum.
   e0 = select(unlimited, e0, fabs(e0) <= FLT_MAX);
   e1 = select(unlimited, e1, fabs(e1) <= FLT_MAX);
-  const VEC x0 = READ(c - to_x) + READ(c + to_x) - 2.0f * low, x1 = READ(c + 1 - to_x) + READ(c + 1 + to_x) - 2.0f * high,
-            y0 = READ(c - to_y) + READ(c + to_y) - 2.0f * low, y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - 2.0f * high,
-            z0 = READ(c - 1) + high - 2.0f * low, z1 = low + READ(c + 2) - 2.0f * high;
+  const VEC x0 = READ(c - to_x) + READ(c + to_x) - 2.0f * low,
+            x1 = READ(c + 1 - to_x) + READ(c + 1 + to_x) - 2.0f * high,
+            y0 = READ(c - to_y) + READ(c + to_y) - 2.0f * low,
+            y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - 2.0f * high, z0 = READ(c - 1) + high - 2.0f * low,
+            z1 = low + READ(c + 2) - 2.0f * high;
   Corners out;
   out.ep = fmax(select(-unlimited, e0, low_tested), select(-unlimited, e1, high_tested));
   out.em = fmax(select(-unlimited, -e0, low_tested), select(-unlimited, -e1, high_tested));
@@ -192,10 +198,10 @@ inline ALWAYS_INLINE Corners ends_of(__global const float* c, VEC low_v, VEC hig
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
 inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
-// One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at which its test
-// fails.
-int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, VdvrGoldShape s, VdvrCellTest test, int x,
-                  int y, int z, float below, float above) {
+// One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at
+// which its test fails.
+int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, VdvrGoldShape s,
+                  VdvrCellTest test, int x, int y, int z, float below, float above) {
   int parts = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int ix = x + (corner & 1), iy = y + (corner >> 1 & 1), iz = z + (corner >> 2);
@@ -210,18 +216,19 @@ int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, 
   return parts;
 }
 
-// One work-item does VDVR_LANES heights of a brick. violated: the failing parts, where test.parts asks for them.
-__kernel void cell_test(volatile __global int* total, volatile __global int* error, volatile __global int* slack_max,
-                        volatile __global int* violated,
+// One work-item does VDVR_LANES heights of a brick. violated: the failing parts, where test.parts asks for
+// them.
+__kernel void cell_test(volatile __global int* total, volatile __global int* error,
+                        volatile __global int* slack_max, volatile __global int* violated,
                         __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
-                        __global const float* gold, __global const float* addend, __global const float* margin,
-                        __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
-                        VdvrCellTest test) {
+                        __global const float* gold, __global const float* addend,
+                        __global const float* margin, __global const int4* first_brick,
+                        __global const uchar* selected, VdvrGoldShape s, VdvrCellTest test) {
   const int begin = (int)get_global_id(0) * VDVR_LANES;
   const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
   Place p;
-  if (!find_place(&p, bricks_across - by * s.bricks_x, by, (int)get_global_id(2), gold, margin, bricks, grid, first_brick,
-                  selected, s) ||
+  if (!find_place(&p, bricks_across - by * s.bricks_x, by, (int)get_global_id(2), gold, margin, bricks, grid,
+                  first_brick, selected, s) ||
       begin >= p.last_z)
     return;
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY);
@@ -250,8 +257,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
         for (int i = 0; i < VDVR_LANES + 1; ++i) v[i] = 0.0f;
       const VEC low_v = READ(v), high_v = READ(v + 1);
       const INT of_column = (INT)(tested ? -1 : 0);
-      const Corners here =
-          ends_of(c, low_v, high_v, of_column & low_tested, of_column & high_tested & (cell + 1 <= p.last_z), to_x, to_y);
+      const Corners here = ends_of(c, low_v, high_v, of_column & low_tested,
+                                   of_column & high_tested & (cell + 1 <= p.last_z), to_x, to_y);
 #endif
       if (ix > 0) {
         const Corners face = larger(left, here);
@@ -266,7 +273,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           // No corner is tested: -e and e are both -infinity.
           INT counts = inside & (all.ep > -unlimited);
 #if VDVR_WINDOWED
-          // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
+          // F may enter the window between corners that computed gold leaves out of it: by no more than the
+          // slack.
           counts &= (-all.gm - below <= test.window_high) & (all.gp + above >= test.window_low);
 #endif
           const VEC both = select(-unlimited, fmax(all.ep + below, all.em + above), counts);
@@ -279,7 +287,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
             WRITE(above, aboves);
             for (int i = 0; i < VDVR_LANES; ++i)
               if (totals[i] > test.tolerance)
-                parts |= failing_parts(&p, samples, grid, s, test, ix - 1, iy - 1, begin + i, belows[i], aboves[i]);
+                parts |= failing_parts(&p, samples, grid, s, test, ix - 1, iy - 1, begin + i, belows[i],
+                                       aboves[i]);
           }
           largest_slack = fmax(largest_slack, select(-unlimited, fmax(below, above), counts));
         }

@@ -47,8 +47,8 @@ __kernel void expand_addend(__global float* rows, __global const float* addend, 
 // lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
 // axis, / 8, `above` that of the negative ones, each plus what its brick adds (interpolation, rounding, the
 // remainder of T). Cells beyond the block, and with `windowed` those whose range misses the window, are
-// VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's room. cell_test.cl
-// has the same by cell, without arrays.
+// VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's room.
+// cell_test.cl has the same by cell, without arrays.
 __kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
                          __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
                          int stride, int side, int bricks_x, int bricks_y, int blocks, int counted,
@@ -64,8 +64,7 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   CORNERS(DIFFERENCES)
   const float16 bound =
       vload16(0, addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
-  float16 below = (px + py + pz) * 0.125f + bound,
-          above = -(mx + my + mz) * 0.125f + bound;
+  float16 below = (px + py + pz) * 0.125f + bound, above = -(mx + my + mz) * 0.125f + bound;
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   int16 out = k > nz - 2;
   if (windowed) {

@@ -1,6 +1,6 @@
-// The largest fourth differences of kept gold on closed bricks: along x, y, z, then xy, xz, yz (docs/error-bounds.md,
-// section 5). Layouts: float gold[y][x][stride] with two nodes around the bricks on every side; float margin[y][x];
-// float out[brick z][y][x][6]. Called by host/kept/brick_remainder.cpp.
+// The largest fourth differences of kept gold on closed bricks: along x, y, z, then xy, xz, yz
+// (docs/error-bounds.md, section 5). Layouts: float gold[y][x][stride] with two nodes around the bricks on
+// every side; float margin[y][x]; float out[brick z][y][x][6]. Called by host/kept/brick_remainder.cpp.
 #include "shared/fourth_differences.h"
 
 #define AT(c) vload8(0, c)
@@ -8,10 +8,11 @@
 #define ALONG(c) (vload8(0, (c)-1) + vload8(0, (c) + 1) - 2.0f * vload8(0, c))
 #define FOURTH(a, b, c, d, e) ((a) + (e)-4.0f * ((b) + (d)) + 6.0f * (c))
 // NaN would drop out of a maximum.
-#define TAKE(largest, v)                                                              \
-  {                                                                                   \
-    const float8 size = fabs(v);                                                      \
-    largest = fmax(largest, select((float8)(0.0f), select((float8)(INFINITY), size, size <= FLT_MAX), inside)); \
+#define TAKE(largest, v)                                                                                  \
+  {                                                                                                       \
+    const float8 size = fabs(v);                                                                          \
+    largest =                                                                                             \
+        fmax(largest, select((float8)(0.0f), select((float8)(INFINITY), size, size <= FLT_MAX), inside)); \
   }
 
 inline float largest_of(float8 v) {
@@ -20,8 +21,8 @@ inline float largest_of(float8 v) {
   return fmax(b.x, b.y);
 }
 
-__kernel void fourth_differences(__global float* out, __global const float* gold, __global const float* margin,
-                                 VdvrFourthDifferences s) {
+__kernel void fourth_differences(__global float* out, __global const float* gold,
+                                 __global const float* margin, VdvrFourthDifferences s) {
   const int bx = (int)get_global_id(0), by = (int)get_global_id(1), bz = (int)get_global_id(2);
   if (bx >= s.bricks_x || by >= s.bricks_y || bz >= s.bricks_z) return;
   const long to_x = s.stride, to_y = (long)s.nx * s.stride;

@@ -1,6 +1,6 @@
-// Gold from the nodes that determine it (docs/error-bounds.md, section 3): along z a product with few rows or with a band of
-// them, across z filters of 16 taps. Layouts: columns of contiguous heights, anywhere (shared/interpolate_gold.h).
-// Called by host/kept/interpolate_gold.cpp.
+// Gold from the nodes that determine it (docs/error-bounds.md, section 3): along z a product with few rows or
+// with a band of them, across z filters of 16 taps. Layouts: columns of contiguous heights, anywhere
+// (shared/interpolate_gold.h). Called by host/kept/interpolate_gold.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #include "device/lanes.h"
@@ -18,8 +18,8 @@
 // Eight columns share each vector of weights. Named sums, not arrays: compilers keep these in registers.
 #define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
 // Columns beyond the last repeat it and are not stored.
-#define COLUMN(c)                                                                                      \
-  __global const float* column##c = in + s.in_first + (size_t)y * s.in_y +                             \
+#define COLUMN(c)                                                                                     \
+  __global const float* column##c = in + s.in_first + (size_t)y * s.in_y +                            \
                                     (size_t)min(x + c, s.columns_x - 1) * s.in_x + first_term[group]; \
   VEC total##c = (VEC)(0.0f), rest##c = (VEC)(0.0f);
 #define CLEAR(c) VEC sum##c = (VEC)(0.0f);
@@ -68,15 +68,16 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 #endif
 #define BEGIN_SUM(i) VEC phase##i = (VEC)(0.0f);
 #define ADD_TAP(i) phase##i = fma((VEC)(w[(i)*TAPS + t]), v, phase##i);
-#define PUT_PHASE(i)                                                            \
-  {                                                                             \
-    const int n = interval * VDVR_PHASES + p + i - s.skipped;                   \
+#define PUT_PHASE(i)                                                                                       \
+  {                                                                                                        \
+    const int n = interval * VDVR_PHASES + p + i - s.skipped;                                              \
     if (p + i < VDVR_PHASES && n >= 0 && n < s.outputs) STORE(phase##i, target + (size_t)n * s.out_along); \
   }
 
-// The nodes of an interval, which lies between its 8th and 9th of 16 inputs: the 8th itself, and the others by
-// weights[phase - 1][16], in whole groups of SUMS phases.
-__kernel void across(__global float* out, __global const float* in, __global const float* weights, VdvrAcross s) {
+// The nodes of an interval, which lies between its 8th and 9th of 16 inputs: the 8th itself, and the others
+// by weights[phase - 1][16], in whole groups of SUMS phases.
+__kernel void across(__global float* out, __global const float* in, __global const float* weights,
+                     VdvrAcross s) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
   const int other = (int)get_global_id(1), interval = (int)get_global_id(2);
   if (z >= s.z || other >= s.others || interval >= s.intervals) return;

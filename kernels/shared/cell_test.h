@@ -1,4 +1,5 @@
-// What the test of gold cells is told beside gold's layout (gold_shape.h). Passed by value from host/gold/cell_test.cpp.
+// What the test of gold cells is told beside gold's layout (gold_shape.h). Passed by value from
+// host/gold/cell_test.cpp.
 #ifndef VDVR_CELL_TEST_H
 #define VDVR_CELL_TEST_H
 
@@ -7,7 +8,7 @@ typedef struct {
   int counted;          // whether slack counts: 0 tests |V - gold| alone
   int windowed;         // whether cells outside the window do not count
   float window_low, window_high;
-  int parts;            // whether to say which parts of bricks are over the tolerance
+  int parts;  // whether to say which parts of bricks are over the tolerance
   float tolerance;
 } VdvrCellTest;
 
