@@ -8,9 +8,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <utility>
 
+#include "host/bounds/node_functional.hpp"
 #include "host/bounds/six_taps.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
@@ -74,15 +77,60 @@ double lebesgue_constant(std::int64_t n) {
 
 namespace {
 
+// What the taps between half columns err and grow, at their places 1 / phases, 2 / phases .. .
+struct HalfColumnTaps {
+  double norm = 1;  // largest sum of magnitudes
+  double sup = 0;   // |interpolant - q| <= sup times the largest |q|, for every row q
+};
+
+HalfColumnTaps facts_of_taps(int phases) {
+  HalfColumnTaps out;
+  for (int p = 1; 2 * p <= phases; ++p) {  // the others mirror these
+    const double place = static_cast<double>(p) / phases;
+    const std::vector<double> taps = taps_between_half_columns(place);
+    double norm = 0;
+    for (const double t : taps) norm += std::abs(t);
+    out.norm = std::max(out.norm, norm);
+    out.sup = std::max(out.sup, sup_constant({taps, 1 - half_column_taps / 2 - place, 0}, pi / 2));
+  }
+  return out;
+}
+
+const HalfColumnTaps& half_column_facts(int phases) {
+  static std::mutex guard;
+  static std::map<int, HalfColumnTaps> known;
+  const std::scoped_lock lock(guard);
+  if (const auto found = known.find(phases); found != known.end()) return found->second;
+  return known.emplace(phases, facts_of_taps(phases)).first->second;
+}
+
+}  // namespace
+
+double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
+                    double largest, double sup) {
+  if (!upsampler.transforms(columns))
+    return unit_roundoff * (product_error(detector_columns, upsampler.run()) + 2) * upsampler.gain_u() *
+           largest;
+  const HalfColumnTaps& taps = half_column_facts(columns.rate / 2);
+  // Rounded once; before that in double precision, 32 products of the taps' magnitudes among them.
+  const double half = half_column_error(detector_columns) * std::sqrt(static_cast<double>(detector_columns));
+  return unit_roundoff * 1.001 * sup + (taps.sup + 0x1p-46) * sup + taps.norm * half * largest;
+}
+
+namespace {
+
 // fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
 // samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
 // more.
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
                            int order, double view_max) {
   const ParallelGeometry& g = scan.geometry;
-  return unit_roundoff * (product_error(g.columns, column_run) + product_error(g.rows, row_run) + 2) *
-             upsampler.gain_u(columns, order) * lebesgue_constant(g.rows) * view_max +
-         underflow(g, upsampler.gain_u(columns, order));
+  const double gain = upsampler.gain_u(columns, order), row_max = lebesgue_constant(g.rows) * view_max;
+  const double of_columns =
+      order == 0 ? column_error(upsampler, g.columns, columns, row_max, gain * row_max)
+                 : unit_roundoff * (product_error(g.columns, upsampler.run()) + 2) * gain * row_max;
+  return unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * row_max + of_columns +
+         underflow(g, gain);
 }
 
 // Views per chunk so that slabs of derivatives stay near 64 MiB.
@@ -172,18 +220,8 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   return sups;
 }
 
-namespace {
-
-// Row sums of the matrix are samples of a function of the position; between columns it rises by no more than
-// this (Ehlich, Zeller).
-double gain_anywhere(Upsampler& upsampler, const UpsampledColumns& columns) {
-  return upsampler.gain_u(columns, 0) / std::cos(pi / (2.0 * columns.rate));
-}
-
-}  // namespace
-
-double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns) {
-  return scan.ramp_error * gain_anywhere(upsampler, columns) * lebesgue_constant(scan.geometry.rows);
+double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan) {
+  return scan.ramp_error * upsampler.gain_u() * lebesgue_constant(scan.geometry.rows);
 }
 
 namespace {
@@ -225,7 +263,7 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
                          const UpsampledColumns& columns, const ColumnBlocks& blocks,
                          Interpolation interpolation) {
   const ParallelGeometry& g = scan.geometry;
-  const double gain_u = gain_anywhere(upsampler, columns);
+  const double gain_u = upsampler.gain_u();
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
   const Weights w = weights_of(interpolation);
@@ -233,8 +271,8 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   // An upsampled column is at most the samples times the gain, and the sup of the signal.
   const double largest = std::min(gain_u * samples, sups.value);
   ChainErrors out;
-  out.ramp = filter_error_bound(upsampler, scan, columns);
-  out.columns = w.gain * unit_roundoff * (product_error(g.columns, upsampler.run()) + 2) * gain_u * samples;
+  out.ramp = filter_error_bound(upsampler, scan);
+  out.columns = w.gain * column_error(upsampler, g.columns, columns, samples, sups.value);
   // Six taps: in compensated runs, and their own roundings known; else a rounding for each run, and eight for
   // weights.
   const double terms = interpolation == Interpolation::six_taps
@@ -253,16 +291,15 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         Interpolation interpolation) {
   const ParallelGeometry& g = scan.geometry;
-  const double gain_u = gain_anywhere(upsampler, columns), gain_v = lebesgue_constant(g.rows);
+  const double gain_u = upsampler.gain_u(), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
   const Weights w = weights_of(interpolation);
   const double weight_gain = w.gain;
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
-  const double upsampling =
-      unit_roundoff * ((product_error(g.rows, row_run) + 2) * gain_v * gain_u * samples +
-                       (product_error(g.columns, column_run) + 2) * gain_u * sups.value);
+  const double upsampling = unit_roundoff * (product_error(g.rows, row_run) + 2) * gain_v * gain_u * samples +
+                            column_error(upsampler, g.columns, columns, sups.value, sups.value);
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
   const double runs =
@@ -280,7 +317,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                                ? 2 * interpolation_error(g, sups, columns.rate, interpolation)
                                : 0.0);
   const double views = static_cast<double>(g.views());
-  return filter_error_bound(upsampler, scan, columns) + weight_gain * upsampling + summation + position +
+  return filter_error_bound(upsampler, scan) + weight_gain * upsampling + summation + position +
          views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
 }
 

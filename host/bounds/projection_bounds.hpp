@@ -34,9 +34,14 @@ double lebesgue_constant(std::int64_t n);
 
 /// How far the field of the computed filtered samples lies from F, anywhere: part of arithmetic_bound. It is
 /// a band-limited field itself, so bounds of curvature made from those samples need not pay for it again.
-double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns);
+double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan);
 
 constexpr double unit_roundoff = 0x1p-24;
+
+/// How much an upsampled column may err, weights not included, where a detector row is at most `largest` at
+/// the columns and `sup` between them.
+double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
+                    double largest, double sup);
 
 /// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
 /// (kernels/fbp/batched_product.cl).

@@ -1,6 +1,7 @@
 // Matrices of the cosine series.
 #include "host/fbp/cosine_series.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -8,15 +9,6 @@ namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-
-// g(d) in closed form: sin((n - 1/2) t) / (2 n sin(t / 2)), t = pi d / n.
-double dirichlet(std::int64_t n, double d) {
-  const double period = 2.0 * static_cast<double>(n);
-  const double reduced = d - period * std::round(d / period);  // the closed form loses digits far from 0
-  const double count = static_cast<double>(n), t = pi * reduced / count, s = std::sin(t / 2);
-  if (std::abs(s) < 1e-9) return (count - 0.5) / count;
-  return std::sin((count - 0.5) * t) / (2 * count * s);
-}
 
 // The derivative of g at d, by its sum.
 double derivative(std::int64_t n, double d, int order, double pitch) {
@@ -30,6 +22,39 @@ double derivative(std::int64_t n, double d, int order, double pitch) {
 }
 
 }  // namespace
+
+// sin((n - 1/2) t) / (2 n sin(t / 2)), t = pi d / n.
+double cosine_kernel(std::int64_t n, double d) {
+  const double period = 2.0 * static_cast<double>(n);
+  const double reduced = d - period * std::round(d / period);  // the closed form loses digits far from 0
+  const double count = static_cast<double>(n), t = pi * reduced / count, s = std::sin(t / 2);
+  if (std::abs(s) < 1e-9) return (count - 0.5) / count;
+  return std::sin((count - 0.5) * t) / (2 * count * s);
+}
+
+double cosine_gain(std::int64_t n) {
+  if (n == 1) return 1;
+  constexpr std::int64_t density = 8;  // positions to a sample
+  std::vector<double> kernel;          // at eighths of a sample, half a period
+  for (std::int64_t i = 0; i <= density * n; ++i)
+    kernel.push_back(cosine_kernel(n, static_cast<double>(i) / density));
+  const auto at = [&](std::int64_t i) {
+    const std::int64_t period = 2 * density * n, m = ((i % period) + period) % period;
+    return kernel[static_cast<std::size_t>(std::min(m, period - m))];
+  };
+  double largest = 0;
+  // By symmetry half of the positions will do, from the edge at -1/2.
+  for (std::int64_t i = 0; i <= (density * n + 1) / 2; ++i) {
+    const std::int64_t position = i - density / 2;
+    double sum = 0;
+    for (std::int64_t r = 0; r < n; ++r)
+      sum += std::abs(at(position - density * r) + at(position + density * (r + 1)));
+    largest = std::max(largest, sum);
+  }
+  // A product with a sign pattern is a series of n terms, which rises by no more than this between the
+  // positions (Ehlich and Zeller 1964).
+  return largest / std::cos(pi / (2.0 * density));
+}
 
 UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixels) {
   UpsampledColumns c;
@@ -74,7 +99,7 @@ std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> po
     }
   }
   const auto g = [&](double d) {
-    if (order == 0) return dirichlet(n, d);
+    if (order == 0) return cosine_kernel(n, d);
     const auto j = static_cast<std::int64_t>(std::llround(d * lattice));
     return table[static_cast<std::size_t>(((j % period) + period) % period)];
   };

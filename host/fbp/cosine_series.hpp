@@ -32,6 +32,13 @@ UpsampledColumns upsampled_columns(std::int64_t n, int rate, double margin_pixel
 std::vector<double> resampling_matrix(std::int64_t n, std::span<const double> positions, int order,
                                       double pitch, int lattice);
 
+/// What a sample at distance d contributes, on both sides of every mirror: the g of the head, in closed form.
+double cosine_kernel(std::int64_t n, double d);
+
+/// How much errors of n samples, each by itself, can grow anywhere: the largest sum of magnitudes of a row of
+/// the matrix for order 0, over all real positions. Cost: 4 n^2 additions.
+double cosine_gain(std::int64_t n);
+
 /// double matrix[m][i]: the cosine coefficients a_m, q(x) = sum_m a_m cos(pi m (x + 1/2) / n).
 std::vector<double> analysis_matrix(std::int64_t n);
 

@@ -1,10 +1,12 @@
-// Ramp filter (filter_rows.cpp) and upsampling by dense cosine-series products (batched_product.cpp).
+// Ramp filter (filter_rows.cpp) and upsampling: rows by dense cosine-series products (batched_product.cpp),
+// columns alike or by transforms (upsample_columns.cpp).
 #include "host/fbp/filter_projections.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "host/fbp/batched_product.hpp"
 #include "host/fbp/ramp_kernel.hpp"
@@ -16,6 +18,9 @@
 
 namespace vdvr {
 namespace {
+
+// Products of more columns take longer than transforms; they are the less exact anyway.
+constexpr std::int64_t fast_product_columns = 768;
 
 // The detector row or column at which a position lies, mirrored about the outer edges; -1 where it lies
 // between two. A position is taken for a whole one when it misses it by no more than its own rounding.
@@ -185,9 +190,24 @@ const Upsampler::Matrix& Upsampler::matrix_u(const UpsampledColumns& columns, in
   return matrices_.emplace(key, std::move(m)).first->second;
 }
 
-double Upsampler::gain_u(const UpsampledColumns& columns, int order) { return matrix_u(columns, order).gain; }
+bool Upsampler::transforms(const UpsampledColumns& columns) const {
+  const bool wanted = method_ == ColumnMethod::accurate || scan_->geometry.columns > fast_product_columns;
+  return wanted && columns.rate % 2 == 0 && ColumnUpsampling::is_possible(*state_);
+}
 
-opencl::DeviceArray<float> Upsampler::row_matrix(std::span<const double> rows, int order, int lattice) {
+double Upsampler::gain_u() {
+  if (gain_ == 0) gain_ = cosine_gain(scan_->geometry.columns);
+  return gain_;
+}
+
+double Upsampler::gain_u(const UpsampledColumns& columns, int order) {
+  return order == 0 ? gain_u() : matrix_u(columns, order).gain;
+}
+
+const opencl::DeviceArray<float>& Upsampler::row_matrix(std::span<const double> rows, int order,
+                                                        int lattice) {
+  if (rows_.values.size() > 0 && rows_.order == order && std::ranges::equal(rows_.rows, rows))
+    return rows_.values;
   // v and z lie in the same order everywhere, so the transposed matrix is float [z / 16][v][16].
   const ParallelGeometry& g = scan_->geometry;
   const auto exact = resampling_matrix(g.rows, rows, order, g.pitch_v, lattice);
@@ -196,21 +216,23 @@ opencl::DeviceArray<float> Upsampler::row_matrix(std::span<const double> rows, i
   for (std::size_t z = 0; z < rows.size(); ++z)
     for (std::size_t v = 0; v < height; ++v)
       transposed[(z / 16 * height + v) * 16 + z % 16] = static_cast<float>(exact[z * height + v]);
-  return {*state_, std::span<const float>(transposed), "row resampling matrix"};
+  rows_ = {{rows.begin(), rows.end()},
+           order,
+           {*state_, std::span<const float>(transposed), "row resampling matrix"}};
+  return rows_.values;
 }
 
-void Upsampler::copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u,
-                          std::span<const std::int64_t> v) {
+void Upsampler::copy(opencl::DeviceArray<float>& values, std::int64_t first_view, std::int64_t views,
+                     std::span<const std::int64_t> u, std::span<const std::int64_t> v) {
   const ParallelGeometry& g = scan_->geometry;
-  const std::size_t chunks = static_cast<std::size_t>(slab.rows_padded / 16);
-  slab.values.write_mapped([&](std::span<float> values) {
-    parallel_for(slab.views, {}, "", [&](std::int64_t k) {
-      const float* view = scan_->samples.data() + (slab.first_view + k) * g.columns * g.rows;
+  const std::size_t chunks = opencl::round_up(v.size(), 16) / 16;
+  values.write_mapped([&](std::span<float> mapped) {
+    parallel_for(views, {}, "", [&](std::int64_t k) {
+      const float* view = scan_->samples.data() + (first_view + k) * g.columns * g.rows;
       for (std::size_t c = 0; c < chunks; ++c) {
         const bool straight = consecutive(v, 16 * c);
-        float* target =
-            values.data() +
-            (c * static_cast<std::size_t>(slab.views) + static_cast<std::size_t>(k)) * u.size() * 16;
+        float* target = mapped.data() +
+                        (c * static_cast<std::size_t>(views) + static_cast<std::size_t>(k)) * u.size() * 16;
         for (std::size_t n = 0; n < u.size(); ++n, target += 16) {
           const float* column = view + u[n] * g.rows;
           if (straight) std::copy_n(column + v[16 * c], 16, target);
@@ -219,6 +241,30 @@ void Upsampler::copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u,
       }
     });
   });
+}
+
+void Upsampler::resample_rows(opencl::DeviceArray<float>& values, std::int64_t first_view, std::int64_t views,
+                              std::span<const double> rows, int order, int lattice) {
+  const ParallelGeometry& g = scan_->geometry;
+  if (const auto v = pixels_at(rows, g.rows, order); !v.empty()) {
+    std::vector<std::int64_t> u(static_cast<std::size_t>(g.columns));
+    std::iota(u.begin(), u.end(), 0);
+    copy(values, first_view, views, u, v);
+    return;
+  }
+  const std::int64_t per_view = g.columns * g.rows;
+  const opencl::DeviceArray<float> filtered(*state_,
+                                            std::span<const float>(scan_->samples)
+                                                .subspan(static_cast<std::size_t>(first_view * per_view),
+                                                         static_cast<std::size_t>(views * per_view)),
+                                            "filtered chunk");
+  batched_product(*state_, values, filtered, row_matrix(rows, order, lattice),
+                  {.rows = views * g.columns,
+                   .terms = g.rows,
+                   .z_padded = static_cast<std::int64_t>(opencl::round_up(rows.size(), 16)),
+                   .run = row_run,
+                   .out_chunk = static_cast<std::uint64_t>(views * g.columns * 16),
+                   .v_chunk = static_cast<std::uint64_t>(g.rows * 16)});
 }
 
 UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<const double> rows,
@@ -230,41 +276,38 @@ UpsampledSlab Upsampler::operator()(const UpsampledColumns& columns, std::span<c
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const auto u = pixels_at(positions_of(columns), g.columns, order_u), v = pixels_at(rows, g.rows, order_v);
   if (!u.empty() && !v.empty()) {
-    copy_slab(slab, u, v);
+    copy(slab.values, first_view, views, u, v);
     return slab;
   }
 
   const std::int64_t per_view = g.columns * (g.rows + slab.rows_padded) * 4;
   const std::int64_t chunk = std::clamp<std::int64_t>((std::int64_t{32} << 20) / per_view, 1, views);
-  opencl::DeviceArray<float> filtered(*state_, count(chunk * g.columns * g.rows), "filtered chunk");
-  opencl::DeviceArray<float> resampled(*state_, count(chunk * g.columns * slab.rows_padded),
-                                       "rows of a slab");
-  const opencl::DeviceArray<float> matrix_v = row_matrix(rows, order_v, row_lattice);
-  const Matrix& matrix = matrix_u(columns, order_u);
+  opencl::DeviceArray<float> resampled;
   for (std::int64_t first = 0; first < views; first += chunk) {
     const std::int64_t n = std::min(chunk, views - first);
-    filtered.write(std::span<const float>(scan_->samples)
-                       .subspan(static_cast<std::size_t>((first_view + first) * g.columns * g.rows),
-                                static_cast<std::size_t>(n * g.columns * g.rows)));
-    const std::uint64_t resampled_chunk = count(n * g.columns * 16);
-    batched_product(*state_, resampled, filtered, matrix_v,
-                    {.rows = n * g.columns,
-                     .terms = g.rows,
-                     .z_padded = slab.rows_padded,
-                     .run = row_run,
-                     .out_chunk = resampled_chunk,
-                     .v_chunk = count(g.rows * 16)});
-    batched_product(*state_, slab.values, matrix.values, resampled,
+    // Of these views to the element: what is written is written whole.
+    if (resampled.size() != count(n * g.columns * slab.rows_padded))
+      resampled =
+          opencl::DeviceArray<float>(*state_, count(n * g.columns * slab.rows_padded), "rows of a slab");
+    resample_rows(resampled, first_view + first, n, rows, order_v, row_lattice);
+    const VdvrChunks in{0, count(g.columns * 16), count(n * g.columns * 16)},
+        out{count(first * columns.count * 16), count(columns.count * 16), count(views * columns.count * 16)};
+    if (order_u == 0 && transforms(columns)) {
+      const auto [of_rate, fresh] = transforms_.try_emplace(columns.rate, *state_, g.columns, columns.rate);
+      of_rate->second(slab.values, out, resampled, in, columns, n, slab.rows_padded / 16);
+      continue;
+    }
+    batched_product(*state_, slab.values, matrix_u(columns, order_u).values, resampled,
                     {.rows = columns.count,
                      .terms = g.columns,
                      .z_padded = slab.rows_padded,
                      .batches = n,
-                     .run = run_,
-                     .out_first = count(first * columns.count * 16),
-                     .out_batch = count(columns.count * 16),
-                     .out_chunk = count(views * columns.count * 16),
-                     .v_batch = count(g.columns * 16),
-                     .v_chunk = resampled_chunk});
+                     .run = run(),
+                     .out_first = out.first,
+                     .out_batch = out.batch,
+                     .out_chunk = out.chunk,
+                     .v_batch = in.batch,
+                     .v_chunk = in.chunk});
   }
   return slab;
 }

@@ -12,6 +12,7 @@
 
 #include "host/fbp/cosine_series.hpp"
 #include "host/fbp/filter_rows.hpp"
+#include "host/fbp/upsample_columns.hpp"
 #include "host/opencl/array.hpp"
 #include "host/opencl/column_tuning.hpp"
 #include "host/scan/units.hpp"
@@ -87,27 +88,38 @@ class DirectFilter {
   std::unique_ptr<RowFilter> filter_;
 };
 
+/// How columns are made finer: `accurate` by transforms in double precision where the device has it
+/// (upsample_columns.hpp), else by a product in short runs; `fast` by a product in long runs, or by
+/// transforms where columns are many.
+enum class ColumnMethod { fast, accurate };
+
 /// Terms of a run of the products along rows and along columns (batched_product.hpp). The former's errors are
 /// grown by the latter's matrix, and it is the smaller one.
-constexpr int row_run = 4, column_run = 16;
+constexpr int row_run = 4, column_run = 16, accurate_column_run = 4;
 
 /// Evaluates the filtered projections, or even derivatives of them, on upsampled columns and at any rows.
 class Upsampler {
  public:
-  /// Products along columns in runs of `run` terms: the shorter, the slower and the more exact.
-  Upsampler(opencl::State& state, const FilteredScan& scan, int run = column_run)
-      : state_(&state), scan_(&scan), run_(run) {}
-  [[nodiscard]] int run() const { return run_; }
+  Upsampler(opencl::State& state, const FilteredScan& scan, ColumnMethod method = ColumnMethod::fast)
+      : state_(&state), scan_(&scan), method_(method) {}
+  /// Whether values at such columns are made by transforms in double precision.
+  [[nodiscard]] bool transforms(const UpsampledColumns& columns) const;
+  /// Terms of a run where they are not.
+  [[nodiscard]] int run() const {
+    return method_ == ColumnMethod::accurate ? accurate_column_run : column_run;
+  }
 
   /// `rows` are detector row positions (real). Derivative orders 0, 2 or 4 in world units. `row_lattice` > 0:
-  /// the rows are multiples of 1 / row_lattice. Views [first_view, first_view + views). Cost: views * rows *
-  /// U * (V + columns) multiply-adds.
+  /// the rows are multiples of 1 / row_lattice. Views [first_view, first_view + views). Cost: for rows
+  /// between the detector's own views * rows * U * V multiply-adds; then those of ColumnUpsampling, or views
+  /// * rows * U * columns.
   UpsampledSlab operator()(const UpsampledColumns& columns, std::span<const double> rows, int order_u = 0,
                            int order_v = 0, int row_lattice = 0, std::int64_t first_view = 0,
                            std::int64_t views = -1);
 
-  /// The largest absolute row sum of the matrix in u of a value or derivative: how much an error of the
-  /// samples can grow.
+  /// How much an error of the samples can grow along u: cosine_gain of the columns.
+  double gain_u();
+  /// The same of a derivative, at these columns: the largest absolute row sum of its matrix.
   double gain_u(const UpsampledColumns& columns, int order);
 
   /// Bytes of one slab.
@@ -118,15 +130,27 @@ class Upsampler {
     opencl::DeviceArray<float> values;
     double gain = 0;
   };
-  opencl::DeviceArray<float> row_matrix(std::span<const double> rows, int order, int lattice);
-  /// The slab where every column and row is one of the detector's: u, v.
-  void copy_slab(UpsampledSlab& slab, std::span<const std::int64_t> u, std::span<const std::int64_t> v);
+  struct RowMatrix {
+    std::vector<double> rows;
+    int order = 0;
+    opencl::DeviceArray<float> values;
+  };
+  const opencl::DeviceArray<float>& row_matrix(std::span<const double> rows, int order, int lattice);
+  /// float values[chunk][view][u][16]: detector columns u and rows v as they are.
+  void copy(opencl::DeviceArray<float>& values, std::int64_t first_view, std::int64_t views,
+            std::span<const std::int64_t> u, std::span<const std::int64_t> v);
+  /// The same of all columns, at any rows.
+  void resample_rows(opencl::DeviceArray<float>& values, std::int64_t first_view, std::int64_t views,
+                     std::span<const double> rows, int order, int lattice);
   const Matrix& matrix_u(const UpsampledColumns& columns, int order);
 
   opencl::State* state_;
   const FilteredScan* scan_;
-  int run_;
+  ColumnMethod method_;
+  double gain_ = 0;  // 0: not known yet
+  RowMatrix rows_;   // of the last rows
   std::map<std::tuple<int, std::int64_t, std::int64_t, int>, Matrix> matrices_;
+  std::map<int, ColumnUpsampling> transforms_;  // by rate
 };
 
 }  // namespace vdvr

@@ -31,7 +31,7 @@ PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, con
       state(device),
       filtered(
           filter_projections(device, scan, field, progress, FilterMethod::automatic, Precision::fp64, units)),
-      upsampler(device, filtered),
+      upsampler(device, filtered, ColumnMethod::accurate),
       sups(derivatives ? field_sups(device, upsampler, filtered) : value_sups(device, upsampler, filtered)),
       host_(device),
       field_(field),

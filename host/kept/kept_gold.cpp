@@ -28,9 +28,6 @@ constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
 // Kept heights around those asked for: boxes of other halos will read them.
 constexpr std::int64_t run_margin = 32;
 
-// Terms of a run of the upsampled columns, whose errors what follows multiplies.
-constexpr int exact_run = 4;
-
 std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
 // Kept nodes to a cell of the grid: their spacing is at most half a pixel.
@@ -40,32 +37,13 @@ std::int64_t rate_of(double spacing, double pitch) {
   return rate;
 }
 
-// How much errors of rows by themselves can grow anywhere between them and beyond: the largest sum of
-// magnitudes at eighths of a row, and what a cosine series can rise to between these (Ehlich, Zeller).
-double row_gain(std::int64_t rows) {
-  if (rows == 1) return 1;
-  constexpr std::int64_t density = 8;
-  // By symmetry half of them will do; a product with a sign pattern is a series of `rows` terms.
-  std::vector<double> positions;
-  for (std::int64_t i = 0; i <= (density * rows + 1) / 2; ++i)
-    positions.push_back(-0.5 + static_cast<double>(i) / static_cast<double>(density));
-  const std::vector<double> matrix = resampling_matrix(rows, positions, 0, 1.0, 2 * density);
-  double largest = 0;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    double sum = 0;
-    for (std::int64_t r = 0; r < rows; ++r) sum += std::abs(matrix[i * at(rows) + at(r)]);
-    largest = std::max(largest, sum);
-  }
-  return largest / std::cos(pi / (2.0 * density));
-}
-
 }  // namespace
 
 KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
                    double reach, int upsampling, Interpolation interpolation)
     : state_(state),
       scan_(scan),
-      upsampler_(state, scan, exact_run),
+      upsampler_(state, scan, ColumnMethod::accurate),
       sups_(sups),
       grid_(grid),
       reach_(reach),
@@ -128,7 +106,7 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   constexpr double curved_apart = 1.5;
 
   const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
-  const double gain_v = row_gain(g.rows);
+  const double gain_v = cosine_gain(g.rows);
   const double filters = ((1 + x.sup) * (1 + y.sup) * (1 + z.sup) - 1) * S;
   GoldErrors out;
   out.ramp = chain.ramp;
