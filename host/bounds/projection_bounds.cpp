@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -119,18 +120,18 @@ double column_error(Upsampler& upsampler, std::int64_t detector_columns, const U
 
 namespace {
 
-// fp32 error of an upsampled derivative along u of one view whose samples do not exceed `view_max`: the
+// fp32 error of an upsampled derivative along u of views whose samples do not exceed `view_max`, summed: the
 // samples' own error and two products, each relative to the matrices' gain. Along v, (pi / pitch_v)^order
 // more.
 double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                           int order, double view_max) {
+                           int order, double view_max, double views) {
   const ParallelGeometry& g = scan.geometry;
   const double gain = upsampler.gain_u(columns, order), row_max = lebesgue_constant(g.rows) * view_max;
   const double of_columns =
       order == 0 ? column_error(upsampler, g.columns, columns, row_max, gain * row_max)
                  : unit_roundoff * (product_error(g.columns, upsampler.run()) + 2) * gain * row_max;
   return unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * row_max + of_columns +
-         underflow(g, gain);
+         views * underflow(g, gain);
 }
 
 // Views per chunk so that slabs of derivatives stay near 64 MiB.
@@ -169,14 +170,40 @@ FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
                                               std::min(chunk, g.views() - first)),
                                     0))
       sups.value += dense.rise * m;
-  for (const double m : scan.view_max)
-    sups.value += derivative_rounding(upsampler, scan, dense.columns, 0, m);
+  double samples = 0;
+  for (const double m : scan.view_max) samples += m;
+  sups.value +=
+      derivative_rounding(upsampler, scan, dense.columns, 0, samples, static_cast<double>(g.views()));
   sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
   if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
   return sups;
 }
 
-FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
+namespace {
+
+// Calls with each run of views to look at: all, or every step-th one by one.
+void for_views(std::int64_t views, std::int64_t together, std::int64_t step,
+               const std::function<void(std::int64_t, std::int64_t)>& look) {
+  const std::int64_t n = step == 1 ? together : 1;
+  for (std::int64_t first = 0; first < views; first += step == 1 ? n : step)
+    look(first, std::min(n, views - first));
+}
+
+// What sums over every step-th view have to be multiplied by.
+double share_of_views(std::int64_t views, std::int64_t step) {
+  return static_cast<double>(views) / static_cast<double>((views + step - 1) / step);
+}
+
+}  // namespace
+
+double cost_of_sups(const ParallelGeometry& g) {
+  constexpr double dense = DenseGrid::density * DenseGrid::density;
+  return 3 * dense * static_cast<double>(g.views() * g.rows * g.columns) *
+         static_cast<double>(g.rows + g.columns);
+}
+
+FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                     std::int64_t step) {
   const ParallelGeometry& g = scan.geometry;
   const DenseGrid grid(scan);
   constexpr int dense = DenseGrid::density;
@@ -187,36 +214,36 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   const double rise = grid.rise;
 
   FieldSups sups;
-  std::vector<double> second_u, second_v;  // by view
-  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
-  const auto sum = [](const std::vector<double>& v) {
-    double s = 0;
-    for (const double x : v) s += x;
-    return s;
+  const auto sups_of = [&](const UpsampledColumns& c, const std::vector<double>& r, int order_u, int order_v,
+                           int lattice, std::int64_t first, std::int64_t n) {
+    double sum = 0;
+    for (const double m :
+         view_sups(state, upsampler(c, r, order_u, order_v, lattice, first, n), std::max(order_u, order_v)))
+      sum += m;
+    return sum;
   };
-  for (std::int64_t first = 0; first < g.views(); first += chunk) {
-    const std::int64_t n = std::min(chunk, g.views() - first);
-    sups.value += rise * sum(view_sups(state, upsampler(columns, rows, 0, 0, dense, first, n), 0));
-    for (const double m : view_sups(state, upsampler(columns, rows, 2, 0, dense, first, n), 2))
-      second_u.push_back(rise * m);
-    sups.sampled_second_u += sum(view_sups(state, upsampler(own, own_rows, 2, 0, 1, first, n), 2));
-    if (g.rows > 1) {
-      for (const double m : view_sups(state, upsampler(columns, rows, 0, 2, dense, first, n), 2))
-        second_v.push_back(rise * m);
-      sups.sampled_second_v += sum(view_sups(state, upsampler(own, own_rows, 0, 2, 1, first, n), 2));
-    }
-  }
-  second_v.resize(second_u.size(), 0.0);  // a single row does not vary along v
+  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
+  for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
+    sups.value += rise * sups_of(columns, rows, 0, 0, dense, first, n);
+    sups.second_u += rise * sups_of(columns, rows, 2, 0, dense, first, n);
+    sups.sampled_second_u += sups_of(own, own_rows, 2, 0, 1, first, n);
+    if (g.rows == 1) return;  // a single row does not vary along v
+    sups.second_v += rise * sups_of(columns, rows, 0, 2, dense, first, n);
+    sups.sampled_second_v += sups_of(own, own_rows, 0, 2, 1, first, n);
+  });
+  const double share = share_of_views(g.views(), step);
+  for (double* sum :
+       {&sups.value, &sups.second_u, &sups.second_v, &sups.sampled_second_u, &sups.sampled_second_v})
+    *sum *= share;
   // Rounding of the evaluation, relative to the sums of magnitudes it adds up.
-  for (std::size_t k = 0; k < scan.view_max.size(); ++k) {
-    const double value = derivative_rounding(upsampler, scan, columns, 0, scan.view_max[k]);
-    sups.value += value;
-    second_u[k] += derivative_rounding(upsampler, scan, columns, 2, scan.view_max[k]);
-    // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
-    if (g.rows > 1) second_v[k] += value * std::pow(pi / g.pitch_v, 2);
-  }
-  sups.second_u = sum(second_u);
-  sups.second_v = sum(second_v);
+  double samples = 0;
+  for (const double m : scan.view_max) samples += m;
+  const double views = static_cast<double>(g.views());
+  const double value = derivative_rounding(upsampler, scan, columns, 0, samples, views);
+  sups.value += value;
+  sups.second_u += derivative_rounding(upsampler, scan, columns, 2, samples, views);
+  // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
+  if (g.rows > 1) sups.second_v += value * std::pow(pi / g.pitch_v, 2);
   return sups;
 }
 
@@ -321,14 +348,16 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
          views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
 }
 
-AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates) {
+AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates,
+                                 std::int64_t step) {
   const ParallelGeometry& g = scan.geometry;
   const std::int64_t U = g.columns, V = g.rows;
   const auto du = analysis_matrix(U), dv = analysis_matrix(V);
   const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
   // [view][rate], summed in the order of views: a build made twice says the same to the bit.
   std::vector<std::vector<double>> projection(at(g.views())), gold(at(g.views()));
-  parallel_for(g.views(), {}, "amplitude", [&](std::int64_t k) {
+  parallel_for((g.views() + step - 1) / step, {}, "amplitude", [&](std::int64_t i) {
+    const std::int64_t k = i * step;
     const float* q = scan.samples.data() + k * U * V;
     std::vector<double> a(at(U * V)), b(at(U * V));  // [m][v], then [m][l]
     for (std::int64_t m = 0; m < U; ++m)
@@ -357,10 +386,11 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
     gold[at(k)] = std::move(f);
   });
   AmplitudeBounds out;
-  const auto sum = [](const std::vector<std::vector<double>>& by_view, std::size_t r) {
+  const auto sum = [&](const std::vector<std::vector<double>>& by_view, std::size_t r) {
     double total = 0;
-    for (const auto& view : by_view) total += view[r];
-    return total;
+    for (const auto& view : by_view)
+      if (!view.empty()) total += view[r];
+    return total * share_of_views(g.views(), step);
   };
   for (std::size_t r = 0; r < rates.size(); ++r) {
     out.projection.emplace_back(rates[r], sum(projection, r));

@@ -24,9 +24,13 @@ struct FieldSups {
 
 /// Throws InputError where a derivative's sup is no finite number: no bound can be made of it.
 /// Cost: values and derivatives on a grid 4 times denser than the detector both ways.
-FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
+/// `step`: of every step-th view, times all views over those: an estimate where it is not 1.
+FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                     std::int64_t step = 1);
 /// Derivatives by Bernstein's inequality, at a third of the cost: what rates of six taps and gold need.
 FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
+/// Multiply-adds of field_sups.
+double cost_of_sups(const ParallelGeometry& geometry);
 
 /// Bounds the growth of sample errors by band-limited interpolation of n samples (Lebesgue constant of the
 /// mirror extension).
@@ -38,8 +42,8 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan);
 
 constexpr double unit_roundoff = 0x1p-24;
 
-/// How much an upsampled column may err, weights not included, where a detector row is at most `largest` at
-/// the columns and `sup` between them.
+/// How much an upsampled column may err, weights not included, where the rows of its view are at most
+/// `largest` at the detector's columns and its own is at most `sup` between them.
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
                     double largest, double sup);
 
@@ -67,10 +71,11 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
 
 /// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, e the proved worst error of a
 /// wave (error_map.hpp), for interpolation in u at each rate and for gold at each rate. Cost: views * rows *
-/// columns per rate, on the host.
+/// columns per rate, on the host, of every `step`-th view as for field_sups.
 struct AmplitudeBounds {
   std::vector<std::pair<int, double>> projection, gold;
 };
-AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates);
+AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates,
+                                 std::int64_t step = 1);
 
 }  // namespace vdvr

@@ -50,10 +50,21 @@ struct Base {
   [[nodiscard]] bool rounds() const { return lattice.step > 0; }
 };
 
-// The base on the lattice of integer samples.
-Base stored_base(const Plan& plan, const Units& units, StorageChoice storage) {
+// Where bricks of the region read it, the base that suits the trilinear filter best; elsewhere F.
+std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, const Plan& plan,
+                               const GoldSettings& settings, const std::vector<std::uint8_t>& selected,
+                               const Progress& progress) {
+  std::vector<float> base = take_base(plan.base, plan.layout.coarsening);
+  if (plan.settings.comparison.coefficients == Coefficients::midrange)
+    fit_base_samples(state, from.filtered, from.sups, settings, selected, base, progress,
+                     from.source(settings));
+  return base;
+}
+
+// On the lattice of integer samples.
+Base stored_base(std::vector<float> samples, const Plan& plan, const Units& units, StorageChoice storage) {
   Base base;
-  base.samples = plan.fitted.empty() ? take_base(plan.base, plan.layout.coarsening) : plan.fitted;
+  base.samples = std::move(samples);
   base.lattice = choose_lattice(base.samples, storage,
                                 most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
                                 units.density());
@@ -323,7 +334,7 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
   host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, as read,");
-  host.count(4 * (2 * plan.base.samples.size() + plan.fitted.size()), "the base samples");
+  host.count(4 * 4 * plan.base.samples.size(), "the base samples");
 }
 
 SamplerTerms with_reserve(SamplerTerms terms) {
@@ -341,20 +352,26 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   Stopwatch watch(result.seconds);
   HostMemory host(state);
   count_inputs(host, scan, plan);
-  Base base = stored_base(plan, units, options.storage);
   const std::vector<std::uint8_t> selected = bricks_of(options.roi, plan.grid, plan.layout.granularity);
   if (std::find(selected.begin(), selected.end(), 1) == selected.end())
     throw InputError("`roi` meets no brick of the grid");
 
   // Six taps need values alone.
   const bool prepared = plan.prepared && plan.prepared->is_of(state, scan, plan.field, units);
-  const auto from = prepared ? plan.prepared
-                             : std::make_shared<PreparedScan>(
-                                   state, scan, plan.field, units,
-                                   plan.rates.interpolation != Interpolation::six_taps, progress);
+  const auto from = prepared
+                        ? plan.prepared
+                        : std::make_shared<PreparedScan>(state, scan, plan.field, units,
+                                                         plan.rates.interpolation == Interpolation::six_taps
+                                                             ? PreparedScan::Sups::of_values
+                                                             : PreparedScan::Sups::of_derivatives,
+                                                         progress);
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
-  const GoldSettings settings = gold_settings(plan, options, base.lattice);
+  GoldSettings settings = gold_settings(plan, options, {});
+  const std::vector<float> fitted = fitted_base(state, *from, plan, settings, selected, progress);
+  watch.lap("fit");
+  Base base = stored_base(fitted, plan, units, options.storage);
+  settings.lattice = base.lattice;
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
@@ -380,7 +397,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     } catch (const ToleranceError&) {
       // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
       if (!base.rounds() || options.storage != StorageChoice::automatic) throw;
-      base = stored_base(plan, units, StorageChoice::f32);
+      base = stored_base(fitted, plan, units, StorageChoice::f32);
       continue;
     }
     const SamplerTerms sampler = sampler_of(measured.volume, atlas_length(device.info(), measured.volume));
@@ -399,6 +416,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
                   const Progress& progress) {
   check_line_integrals(scan);
+  if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
   const Units units = units_of(scan);
   if (units.are_world()) return build_in_units(device, scan, units, plan, options, progress);
   BuildOptions wanted = options;

@@ -29,7 +29,6 @@ std::string digest(const ProjectionSet& scan, const Plan& plan) {
   Sha256 sha;
   update(sha, scan.geometry.theta_rad);
   update(sha, plan.base.samples);
-  update(sha, plan.fitted);
   return sha.hex();
 }
 

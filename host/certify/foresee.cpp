@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "host/opencl/host_memory.hpp"
@@ -16,6 +17,9 @@ namespace {
 
 constexpr std::int64_t layers = 6, timed_blocks = 3;
 constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
+// Of a large grid: columns of blocks to look at, samples times views that may be back-projected for them, and
+// kept nodes around a block.
+constexpr double fewest_columns = 4, most_back_projected = 6e9, kept_around = 40;
 
 // The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
 // trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
@@ -65,17 +69,26 @@ struct Stratum {
 };
 
 // Whole blocks of the middle slab, at several radii.
-std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n) {
+std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n,
+                                      const std::vector<std::uint8_t>& looked_at) {
   std::vector<std::uint8_t> selected(at(n[0] * n[1] * n[2]), 0);
   const Index3 block = stream.block_bricks();
-  const auto begin = [&](std::size_t a, double f) {
-    return static_cast<std::int64_t>(f * static_cast<double>(n[a])) / block[a] * block[a];
-  };
-  const std::int64_t z0 = begin(2, 0.5);
-  for (std::int64_t i = 0; i < timed_blocks; ++i) {
-    // Radii that stand for equal areas of the covered disc: blocks on the axis fit more than most.
-    const double f = 0.5 - 0.5 * std::sqrt((2.0 * static_cast<double>(i) + 1) / (2.0 * timed_blocks));
-    const std::int64_t x0 = begin(0, f), y0 = begin(1, 0.5);
+  const std::int64_t z0 = n[2] / 2 / block[2] * block[2];
+  // All blocks that are looked at, by their distance from the middle.
+  std::vector<std::array<std::int64_t, 3>> blocks;
+  for (std::int64_t y = 0; y < n[1]; y += block[1])
+    for (std::int64_t x = 0; x < n[0]; x += block[0]) {
+      const std::int64_t dx = 2 * x + block[0] - n[0], dy = 2 * y + block[1] - n[1];
+      const std::int64_t middle_y = std::min(n[1] - 1, y + block[1] / 2),
+                         middle_x = std::min(n[0] - 1, x + block[0] / 2);
+      if (looked_at[at((z0 * n[1] + middle_y) * n[0] + middle_x)])
+        blocks.push_back({dx * dx + dy * dy, y, x});
+    }
+  std::ranges::sort(blocks);
+  const auto size = static_cast<std::int64_t>(blocks.size());
+  // Ranks that stand for equal areas: blocks on the axis fit more than most.
+  for (std::int64_t i = 0; i < timed_blocks && size > 0; ++i) {
+    const auto& [distance, y0, x0] = blocks[at(size * (2 * i + 1) / (2 * timed_blocks))];
     for (std::int64_t z = z0; z < std::min(n[2], z0 + block[2]); ++z)
       for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)
         for (std::int64_t x = x0; x < std::min(n[0], x0 + block[0]); ++x)
@@ -109,17 +122,18 @@ class Paces {
 };
 
 // The strata of the bricks, and which of them to look at.
-std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const std::vector<double>& error,
+std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
+                                 const std::vector<std::uint8_t>& looked_at, const std::vector<double>& error,
                                  double tolerance, const Index3& n) {
-  const std::int64_t looked_at = std::min(layers, n[2]);
+  const std::int64_t some = std::min(layers, n[2]);
   std::vector<std::uint8_t> in_layer(at(n[2]), 0);
-  for (std::int64_t i = 0; i < looked_at; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * looked_at))] = 1;
+  for (std::int64_t i = 0; i < some; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * some))] = 1;
   std::map<int, Stratum> strata;
   for (std::size_t i = 0; i < near.size(); ++i) {
     if (!near[i]) continue;
     Stratum& s = strata[stratum_of(error[i], tolerance)];
     s.bricks.push_back(static_cast<std::int64_t>(i));
-    if (in_layer[at(static_cast<std::int64_t>(i) / (n[0] * n[1]))])
+    if (looked_at[i] && in_layer[at(static_cast<std::int64_t>(i) / (n[0] * n[1]))])
       s.candidates.push_back(static_cast<std::int64_t>(i));
   }
   // Tiles grow with the error to the power 3/2, and so does their spread: sample in that proportion (Neyman).
@@ -142,8 +156,40 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near, const st
 
 }  // namespace
 
+std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry) {
+  const GoldSettings& settings = stream.settings();
+  const Index3 n = Bricks(settings.grid, settings.granularity).along(), block = stream.block_bricks();
+  std::vector<std::uint8_t> near = stream.bricks_near_coverage();
+  // Back-projected samples of a column of blocks: nodes at twice the cells, with what their filters and fits
+  // read around them.
+  const auto side = [&](std::size_t a) {
+    return 2 * static_cast<double>(block[a] * settings.granularity) + 2 * kept_around;
+  };
+  const double of_column = side(0) * side(1) * static_cast<double>(geometry.rows * geometry.views());
+  const double columns = static_cast<double>((n[0] + block[0] - 1) / block[0]) *
+                         static_cast<double>((n[1] + block[1] - 1) / block[1]);
+  const auto wanted = static_cast<std::int64_t>(std::max(fewest_columns, most_back_projected / of_column));
+  if (static_cast<double>(wanted) >= 0.5 * columns) return near;
+  std::vector<std::uint8_t> chosen(at(n[0] * n[1]), 0);
+  for (std::int64_t i = 0; i < wanted; ++i) {
+    // Turning by the golden angle spreads points evenly over a disc.
+    const double r = 0.5 * std::sqrt((static_cast<double>(i) + 0.5) / static_cast<double>(wanted)),
+                 angle = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0));
+    const auto first = [&](std::size_t a, double f) {
+      return std::min(static_cast<std::int64_t>(f * static_cast<double>(n[a])), n[a] - 1) / block[a] *
+             block[a];
+    };
+    const std::int64_t x0 = first(0, 0.5 + r * std::cos(angle)), y0 = first(1, 0.5 + r * std::sin(angle));
+    for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)
+      for (std::int64_t x = x0; x < std::min(n[0], x0 + block[0]); ++x) chosen[at(y * n[0] + x)] = 1;
+  }
+  for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && chosen[i % chosen.size()];
+  return near;
+}
+
 Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
-                       const std::vector<float>& stored, double tolerance) {
+                       const std::vector<float>& stored, const std::vector<std::uint8_t>& looked_at,
+                       double tolerance) {
   const GoldSettings& settings = gold.fine().settings();
   const Index3 n = Bricks(settings.grid, settings.granularity).along();
   const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
@@ -175,17 +221,20 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   // One brick builds the kernels; then whole blocks tell the pace of the first pass, and bricks of every
   // stratum what follows it.
   std::vector<std::uint8_t> one(near.size(), 0);
-  one[at((n[2] / 2 * n[1] + n[1] / 2) * n[0] + n[0] / 2)] = 1;
+  // The middle one of those that are looked at.
+  std::int64_t before = std::count(looked_at.begin(), looked_at.end(), 1) / 2;
+  for (std::size_t i = 0; i < one.size() && before >= 0; ++i)
+    if (looked_at[i] && before-- == 0) one[i] = 1;
   classify(one);
   const bool screens = gold.coarse() != nullptr;
   GoldStream& first = screens ? *gold.coarse() : gold.fine();
   const auto first_purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
   Paces large(gold);
-  classify(some_blocks(first, n));
+  classify(some_blocks(first, n, looked_at));
   const double first_pass = large.seconds(!screens, first_purpose, near);
 
   const auto error = expected_error(base, settings.granularity, n);
-  std::map<int, Stratum> strata = strata_of(near, error, tolerance, n);
+  std::map<int, Stratum> strata = strata_of(near, looked_at, error, tolerance, n);
   std::vector<std::uint8_t> sampled(near.size(), 0);
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
@@ -226,6 +275,8 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   // What will be kept and was not needed so far.
   const KeptGold& kept = gold.fine().source()->kept;
   const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
+  out.kept_bytes =
+      kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
   out.seconds = first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
                                  static_cast<double>(kept.tiles() + missing);
   const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -22,6 +23,7 @@
 #include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
+#include "host/scan/row_window.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/volume_problem.hpp"
@@ -83,16 +85,18 @@ void check_granularity(int granularity) {
 
 // Global bounds at every rate, the paper's beside ours.
 std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                                 const Volume& base, bool with_paper) {
+                                 const Volume& base, bool with_paper, bool estimate) {
   const Grid& grid = base.grid;
   std::vector<Bound> out;
   const ParallelGeometry& g = scan.geometry;
-  // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take
-  // minutes.
+  // Each view costs rows * columns * (rows + columns) multiply-adds: beyond this the table would take half a
+  // minute.
   const double amplitude_cost =
       static_cast<double>(g.views() * g.rows * g.columns) * static_cast<double>(g.rows + g.columns);
-  if (amplitude_cost < 4e10) {
-    const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates);
+  const std::int64_t step =
+      estimate ? std::max<std::int64_t>(1, g.views() / PreparedScan::estimate_views) : 1;
+  if (amplitude_cost < 4e9 * static_cast<double>(step)) {
+    const AmplitudeBounds a = amplitude_bounds(scan, grid, bound_rates, step);
     for (const auto& [rate, value] : a.projection)
       out.push_back({"projection", "amplitude, linear in u", rate, value, true});
     for (const auto& [rate, value] : a.gold) out.push_back({"gold", "amplitude", rate, value, true});
@@ -126,8 +130,25 @@ struct Trial {
   double slack = 0, projection = 0, gold = 0, arithmetic = 0;
 };
 
-// A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest.
-std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int gold) {
+// Of the bricks that are looked at and as high, the one nearest to a place; the place where there is none.
+Index3 nearest(const Bricks& bricks, const Index3& place, const std::vector<std::uint8_t>& looked_at) {
+  const Index3 n = bricks.along();
+  std::int64_t least = std::numeric_limits<std::int64_t>::max();
+  Index3 out = place;
+  for (std::int64_t y = 0; y < n[1]; ++y)
+    for (std::int64_t x = 0; x < n[0]; ++x) {
+      const std::int64_t dx = x - place[0], dy = y - place[1], distance = dx * dx + dy * dy;
+      if (distance >= least || !looked_at[at(bricks.number({x, y, place[2]}))]) continue;
+      least = distance;
+      out = {x, y, place[2]};
+    }
+  return out;
+}
+
+// A few large blocks at different radii, on at most two slabs: what a brick of each holds for the rest. Those
+// around bricks that are looked at anyway, where these are not all.
+std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int gold,
+                                       const std::vector<std::uint8_t>& looked_at) {
   const Bricks bricks(grid, granularity);
   const Index3 n = bricks.along();
   std::vector<std::uint8_t> selected(at(bricks.size()), 0);
@@ -137,15 +158,16 @@ std::vector<std::uint8_t> trial_bricks(const Grid& grid, int granularity, int go
        {std::array{0.5, 0.5, 0.5}, std::array{0.25, 0.5, 0.5}, std::array{0.5, 0.2, 0.5},
         std::array{0.72, 0.7, 0.5}, std::array{0.35, 0.35, 0.5}}) {
     const std::array<double, 3> f{fx, fy, fz};
-    Index3 first{};
+    Index3 first{}, middle{};
     for (std::size_t a = 0; a < 3; ++a)
-      first[a] =
-          std::clamp<std::int64_t>(static_cast<std::int64_t>(f[a] * static_cast<double>(n[a])) - side / 2, 0,
-                                   std::max<std::int64_t>(0, n[a] - side));
+      middle[a] = static_cast<std::int64_t>(f[a] * static_cast<double>(n[a]));
+    middle = nearest(bricks, middle, looked_at);
+    for (std::size_t a = 0; a < 3; ++a)
+      first[a] = std::clamp<std::int64_t>(middle[a] - side / 2, 0, std::max<std::int64_t>(0, n[a] - side));
     for (std::int64_t z = first[2]; z < std::min(n[2], first[2] + side); ++z)
       for (std::int64_t y = first[1]; y < std::min(n[1], first[1] + side); ++y)
         for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x)
-          selected[at(bricks.number({x, y, z}))] = 1;
+          if (looked_at[at(bricks.number({x, y, z}))]) selected[at(bricks.number({x, y, z}))] = 1;
   }
   return selected;
 }
@@ -167,14 +189,15 @@ double least_needed(const Trial& t, const Volume& base) {
   return t.slack + t.arithmetic + std::min(2 * t.arithmetic, 0x1p-15 * largest);
 }
 
-Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, double epsilon) {
+Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, double epsilon,
+                const std::vector<std::uint8_t>& looked_at) {
   GoldStream& stream = gold.fine();
   const GoldSettings& settings = stream.settings();
   Trial t;
   t.arithmetic = gold.arithmetic();
   t.projection = gold.projection();
   const DeviceField field(state, as_mixed(base, settings.granularity));
-  const auto selected = trial_bricks(settings.grid, settings.granularity, settings.rate);
+  const auto selected = trial_bricks(settings.grid, settings.granularity, settings.rate, looked_at);
   const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
                                                           "trial bricks");
   stream.run(
@@ -278,8 +301,9 @@ class Planner {
     plan_.settings = settings;
     plan_.layout = {fitting_granularity(settings.granularity, grid), {}, settings.levels};
     report(progress_, "plan", 0.0);
-    preparation_ = seconds_of(
-        [&] { prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, true, Progress{}); });
+    preparation_ = seconds_of([&] {
+      prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, sups_wanted(scan), Progress{});
+    });
     coverage_.emplace(prepared_->filtered.geometry);
   }
 
@@ -291,8 +315,8 @@ class Planner {
                     ? largest_of_gold(state_, prepared_->filtered, prepared_->sups, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
-    plan_.bounds =
-        global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base, plan_.settings.foresee);
+    plan_.bounds = global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base,
+                                 plan_.settings.foresee, estimates_views_);
     report(progress_, "plan", 0.6);
     const Chosen chosen = choose_rates(all);
     take(chosen);
@@ -301,14 +325,43 @@ class Planner {
     if (plan_.settings.foresee) foresee(chosen.trial);
     report(progress_, "plan", 1.0);
     plan_.prepared = prepared_;
+    if (estimates_views_) {
+      plan_.estimated = true;
+      plan_.notes.push_back(fmt::format("bounds estimated from {} of {} views", PreparedScan::estimate_views,
+                                        prepared_->filtered.geometry.views()));
+    }
     return std::move(plan_);
   }
 
  private:
+  // Derivatives bound what other interpolations in u would do: worth their cost in small scans, and of some
+  // views.
+  [[nodiscard]] PreparedScan::Sups sups_wanted(const ProjectionSet& scan) {
+    const bool large = cost_of_sups(scan.geometry) > 2e10;
+    estimates_views_ = large && plan_.settings.estimate;
+    if (estimates_views_) return PreparedScan::Sups::estimated;
+    const bool small_or_paper = !large || plan_.settings.comparison.terms == Terms::grid;
+    return small_or_paper ? PreparedScan::Sups::of_derivatives : PreparedScan::Sups::of_values;
+  }
+
+  // What trials and foresight look at: kept from the first trial on, all at once.
+  const std::vector<std::uint8_t>& look(GoldRates& gold) {
+    if (looked_at_.empty()) {
+      looked_at_ = gold.fine().bricks_near_coverage();
+      if (plan_.settings.foresee) {
+        looked_at_ =
+            bricks_to_look_at(gold.coarse() ? *gold.coarse() : gold.fine(), prepared_->filtered.geometry);
+        gold.fine().prepare(looked_at_, GoldStream::For::samples, {});
+      }
+    }
+    return looked_at_;
+  }
+
   // The reference range and the coverage, at rates whose own error cannot matter.
   void reconstruct_reference() {
+    // Estimates do with the cubic, which is off by some hundredths of what bounds allow.
     plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid, 8,
-                                   Interpolation::six_taps, {});
+                                   estimates_views_ ? Interpolation::cubic : Interpolation::six_taps, {});
     check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
@@ -334,7 +387,7 @@ class Planner {
 
   Trial try_out(const Rates& r) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(r), source_at(r));
-    const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs);
+    const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs, look(gold));
     add_trial_bounds(plan_.bounds, r, t);
     return t;
   }
@@ -382,36 +435,41 @@ class Planner {
     plan_.gold_samples = 1;
     for (const std::int64_t cells : plan_.grid.cells)
       plan_.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
-    if (r.upsampling != 8 || r.interpolation != Interpolation::six_taps)
+    if (!estimates_views_ && (r.upsampling != 8 || r.interpolation != Interpolation::six_taps))
       plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid,
                                      r.upsampling, r.interpolation, {});
   }
 
-  // How coarse the base is, and its samples.
+  // How coarse the base is.
   void lay_out_base(const Trial& t) {
     plan_.layout.coarsening = coarsening_of(plan_, *coverage_, settings_at(plan_.rates), t);
-    if (plan_.settings.comparison.coefficients != Coefficients::midrange) return;
-    preparation_ += seconds_of([&] {
-      plan_.fitted = take_base(plan_.base, plan_.layout.coarsening);
-      fit_base_samples(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates), plan_.fitted,
-                       {}, source_at(plan_.rates));
-    });
   }
 
   // Storage, memory and time.
   void foresee(const Trial& t) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates),
                    source_at(plan_.rates));
+    const std::vector<std::uint8_t>& looked_at = look(gold);
+    std::vector<float> stored = take_base(plan_.base, plan_.layout.coarsening);
+    const auto size = [](const std::vector<std::uint8_t>& bricks) {
+      return static_cast<double>(std::count(bricks.begin(), bricks.end(), 1));
+    };
+    const double fitting = seconds_of([&] {
+      if (plan_.settings.comparison.coefficients == Coefficients::midrange)
+        fit_base_samples(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates), looked_at,
+                         stored, {}, source_at(plan_.rates));
+    });
+    const double all = size(gold.fine().bricks_near_coverage());
     const Foreseen foreseen =
-        foresee_build(state_, gold, plan_.base,
-                      plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,
-                      plan_.epsilon_abs - t.arithmetic);
+        foresee_build(state_, gold, plan_.base, stored, looked_at, plan_.epsilon_abs - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
     const double probing = seconds_of([&] { probe_sampler(device_); });  // as build will
-    plan_.seconds = preparation_ + foreseen.seconds + probing;
-    // What the trial took, the scan and the base samples twice included; the base samples once more, the
-    // stored field on the device, and the tiles before and after closing.
-    plan_.memory_bytes = state_.memory.peak() + 3 * foreseen.tile_bytes + 4 * plan_.base.samples.size();
+    plan_.seconds =
+        preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
+    // What the trial took, the scan and the base samples twice included, and the gold that was not kept yet;
+    // the base samples once more, the stored field on the device, and the tiles before and after closing.
+    plan_.memory_bytes =
+        state_.memory.peak() + foreseen.kept_bytes + 3 * foreseen.tile_bytes + 4 * plan_.base.samples.size();
   }
 
   Device& device_;
@@ -423,13 +481,52 @@ class Planner {
   std::shared_ptr<PreparedScan> prepared_;
   std::optional<Coverage> coverage_;
   double preparation_ = 0;  // seconds that build will take again
+  std::vector<std::uint8_t> looked_at_;
+  bool estimates_views_ = false;
 };
+
+}  // namespace
+
+namespace {
+
+// A scan of more samples is judged from a window of its rows.
+constexpr std::int64_t most_samples_planned = std::int64_t{64} << 20;
+
+// The plan of a window of rows, for the whole scan.
+Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, const Grid& grid) {
+  const ParallelGeometry& g = scan.geometry;
+  plan.estimated = true;
+  plan.prepared = nullptr;
+  plan.notes.push_back(
+      fmt::format("estimated from the rows {} to {} of {}: the range, the bounds and what is foreseen may "
+                  "differ in other rows",
+                  window.first, window.first + window.rows - 1, g.rows));
+  // What is kept and computed grows with the rows.
+  const double all_rows = static_cast<double>(g.rows) / static_cast<double>(window.rows);
+  plan.seconds *= all_rows;
+  plan.memory_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.memory_bytes) * all_rows);
+  plan.grid = grid;
+  plan.gold_samples = 1;
+  for (const std::int64_t cells : grid.cells)
+    plan.gold_samples *= static_cast<std::uint64_t>(cells * plan.rates.gold + 1);
+  ParallelGeometry used = g;
+  if (plan.field.center) used.center = *plan.field.center;
+  plan.not_covered_count = count_not_covered(grid, Coverage(used));
+  plan.not_covered_fraction =
+      static_cast<double>(plan.not_covered_count) / static_cast<double>(grid.sample_count());
+  return plan;
+}
 
 }  // namespace
 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
                const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
                const Progress& progress) {
+  if (settings.estimate)
+    if (const auto window = row_window(scan, grid, most_samples_planned))
+      return of_all_rows(
+          make_plan(device, window->scan, window->grid, field, rates, tolerance, settings, progress), *window,
+          scan, grid);
   check_rates(rates);
   check_granularity(settings.granularity);
   check_tolerance(tolerance);

@@ -44,7 +44,6 @@ Plan to_world(Plan plan, const Units& units) {
   plan.grid = to_world(plan.grid, units);
   plan.base.grid = to_world(plan.base.grid, units);
   scale(plan.base.samples, density);
-  scale(plan.fitted, density);
   plan.epsilon_abs = to_world(plan.epsilon_abs, units);
   plan.reference_range = to_world(plan.reference_range, units);
   scale(plan.bounds, density);

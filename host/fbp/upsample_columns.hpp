@@ -17,8 +17,8 @@ constexpr int half_column_taps = 32;
 /// A sinc in a Kaiser window: frequencies up to pi / 2 a node pass, those above 3 pi / 2 do not.
 std::vector<double> taps_between_half_columns(double place);
 
-/// What the transforms err: a value half-way between columns is this times the norm of its row off, before
-/// it is used; that of a detector column is exact.
+/// What the transforms err: a value half-way between columns is this times the largest norm of a row of its
+/// view off, before it is used; that of a detector column is exact.
 double half_column_error(std::int64_t columns);
 
 class ColumnUpsampling {

@@ -393,19 +393,22 @@ void GoldBatch::fit_base(std::vector<float>& base) {
   const VdvrLattice& l = fitted.shape;
   const std::vector<float> samples = fitted.samples.to_host(), &margins = margins_;
   const auto kept = static_cast<float>(-kept_margin(grid, 1));
-  for (std::size_t b = 0; b < first_brick_.size(); ++b) {
-    const auto& first = first_brick_[b];
-    for (std::int64_t z = 0; z <= std::min(bricks_z_ * g, grid.cells[2] - first[2] * g); ++z)
-      for (std::int64_t y = 0; y <= std::min(bricks_y_ * g, grid.cells[1] - first[1] * g); ++y)
-        for (std::int64_t x = 0; x <= std::min(bricks_x_ * g, grid.cells[0] - first[0] * g); ++x) {
+  // Brick by brick: beside those that are wanted nothing is fitted.
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, bx, by, bz] = place(brick);
+    const auto& first = first_brick_[at(b)];
+    const auto end = [&](std::int64_t in_block, std::size_t a) {
+      return std::min((in_block + 1) * g, grid.cells[a] - first[a] * g);
+    };
+    for (std::int64_t z = bz * g; z <= end(bz, 2); ++z)
+      for (std::int64_t y = by * g; y <= end(by, 1); ++y)
+        for (std::int64_t x = bx * g; x <= end(bx, 0); ++x) {
           const std::int64_t column =
-              (static_cast<std::int64_t>(b) * (shape_.ny + 2 * shape_.halo) + y * rate + shape_.halo) *
-                  (shape_.nx + 2 * shape_.halo) +
+              (b * (shape_.ny + 2 * shape_.halo) + y * rate + shape_.halo) * (shape_.nx + 2 * shape_.halo) +
               x * rate + shape_.halo;
           if (!(margins[at(column)] >= kept)) continue;
           const std::int64_t from =
-              ((static_cast<std::int64_t>(b) * l.cy + y + l.reach_y) * l.cx + x + l.reach_x) * l.cz + z +
-              l.reach_z;
+              ((b * l.cy + y + l.reach_y) * l.cx + x + l.reach_x) * l.cz + z + l.reach_z;
           base[at(((first[2] * g + z) * n[1] + first[1] * g + y) * n[0] + first[0] * g + x)] =
               samples[at(from)];
         }

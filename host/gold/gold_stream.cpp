@@ -140,6 +140,11 @@ std::int64_t GoldStream::missing_tiles(const std::vector<std::uint8_t>& selected
   return source_->kept.missing(lattice_, boxes(partition(selected)));
 }
 
+void GoldStream::prepare(const std::vector<std::uint8_t>& selected, For purpose, const Progress& progress) {
+  begin(purpose);
+  source_->kept.prepare(lattice_, boxes(partition(selected)), progress);
+}
+
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
   run_unknown(
@@ -307,9 +312,38 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
   spent.seconds += watch.lap();
 }
 
+namespace {
+
+// Bricks of a coarser grid of the same cells that hold cells of selected ones.
+std::vector<std::uint8_t> meeting(const Bricks& coarse, const Bricks& fine, const LevelTriple& coarsening,
+                                  const std::vector<std::uint8_t>& selected) {
+  const Index3 m = fine.along();
+  std::vector<std::uint8_t> out(at(coarse.size()), 0);
+  for (std::int64_t i = 0; i < coarse.size(); ++i) {
+    const Index3 b = coarse.position(i);
+    Index3 low{}, high{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      // Cells of the finer grid, to bricks of it.
+      const std::int64_t width = coarse.granularity() << coarsening[2 - a];
+      low[a] = std::max<std::int64_t>(0, b[a] * width / fine.granularity());
+      high[a] = std::min<std::int64_t>(m[a] - 1, ((b[a] + 1) * width - 1) / fine.granularity());
+    }
+    for (std::int64_t z = low[2]; z <= high[2] && !out[at(i)]; ++z)
+      for (std::int64_t y = low[1]; y <= high[1] && !out[at(i)]; ++y)
+        for (std::int64_t x = low[0]; x <= high[0]; ++x)
+          if (selected[at(fine.number({x, y, z}))]) out[at(i)] = 1;
+  }
+  return out;
+}
+
+}  // namespace
+
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                      GoldSettings settings, std::vector<float>& base, const Progress& progress,
+                      GoldSettings settings, const std::vector<std::uint8_t>& selected,
+                      std::vector<float>& base, const Progress& progress,
                       std::shared_ptr<GoldSource> source) {
+  const Bricks fine(settings.grid, settings.granularity);
+  const LevelTriple coarsening = settings.coarsening;
   // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
   settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
@@ -318,8 +352,11 @@ void fit_base_samples(opencl::State& state, const FilteredScan& scan, const Fiel
   settings.coarsening = {};
   settings.midrange = settings.base_only = true;
   GoldStream stream(state, scan, sups, settings, std::move(source));
+  std::vector<std::uint8_t> wanted = stream.bricks_near_coverage();
+  const auto read = meeting(Bricks(settings.grid, settings.granularity), fine, coarsening, selected);
+  for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && read[i];
   stream.run(
-      stream.bricks_near_coverage(), [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
+      wanted, [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
       GoldStream::For::samples);
 }
 

@@ -94,6 +94,8 @@ class GoldStream {
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
+  /// Keeps what `run` would need to keep for these bricks.
+  void prepare(const std::vector<std::uint8_t>& selected, For purpose, const Progress& progress);
   /// Samples that `run` would compute for these bricks, and tiles of kept gold that it would add.
   [[nodiscard]] double samples(const std::vector<std::uint8_t>& selected, For purpose);
   [[nodiscard]] std::int64_t missing_tiles(const std::vector<std::uint8_t>& selected, For purpose);
@@ -128,11 +130,13 @@ class GoldStream {
   std::shared_ptr<GoldSource> source_;
 };
 
-/// Base samples fitted to the trilinear filter where they are kept; elsewhere `base` stays. Gold at 2x their
-/// own rate serves: the error between base samples peaks near the middles of edges, faces and cells, and a
-/// fit to those alone stored less than one to denser gold. Cost: a fiftieth of a pass of gold at 8x.
+/// Base samples fitted to the trilinear filter where they are kept and these bricks read them; elsewhere
+/// `base` stays. Gold at 2x their own rate serves: the error between base samples peaks near the middles of
+/// edges, faces and cells, and a fit to those alone stored less than one to denser gold. Cost: a fiftieth of
+/// a pass of gold at 8x.
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                      GoldSettings settings, std::vector<float>& base, const Progress& progress,
+                      GoldSettings settings, const std::vector<std::uint8_t>& selected,
+                      std::vector<float>& base, const Progress& progress,
                       std::shared_ptr<GoldSource> source = nullptr);
 
 }  // namespace vdvr

@@ -1,5 +1,6 @@
 #include "host/gold/prepared_scan.hpp"
 
+#include <algorithm>
 #include <bit>
 
 namespace vdvr {
@@ -23,16 +24,25 @@ bool is_same_grid(const Grid& a, const Grid& b) {
   return a.cells == b.cells && a.origin == b.origin && a.spacing == b.spacing;
 }
 
+FieldSups sups_of(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                  PreparedScan::Sups wanted) {
+  if (wanted == PreparedScan::Sups::of_values) return value_sups(state, upsampler, scan);
+  const std::int64_t views = scan.geometry.views();
+  const bool all = wanted == PreparedScan::Sups::of_derivatives;
+  return field_sups(state, upsampler, scan,
+                    all ? 1 : std::max<std::int64_t>(1, views / PreparedScan::estimate_views));
+}
+
 }  // namespace
 
 PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
-                           const Units& units, bool derivatives, const Progress& progress)
+                           const Units& units, Sups wanted, const Progress& progress)
     : shared(device.shared_from_this()),
       state(device),
       filtered(
           filter_projections(device, scan, field, progress, FilterMethod::automatic, Precision::fp64, units)),
       upsampler(device, filtered, ColumnMethod::accurate),
-      sups(derivatives ? field_sups(device, upsampler, filtered) : value_sups(device, upsampler, filtered)),
+      sups(sups_of(device, upsampler, filtered, wanted)),
       host_(device),
       field_(field),
       units_(units),

@@ -14,10 +14,15 @@
 namespace vdvr {
 
 struct PreparedScan {
-  /// Filters and bounds. `derivatives`: sups of these too, which the plan's bounds and interpolation by two
-  /// or four taps need. Keeps the state: a plan that has it may outlive its Device.
+  /// Of which views sups are taken, and whether of derivatives too, which interpolation by two or four taps
+  /// needs.
+  enum class Sups { of_values, of_derivatives, estimated };
+  /// Views that an estimate looks at.
+  static constexpr std::int64_t estimate_views = 24;
+
+  /// Filters and bounds. Keeps the state: a plan that has it may outlive its Device.
   PreparedScan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field, const Units& units,
-               bool derivatives, const Progress& progress);
+               Sups sups, const Progress& progress);
   PreparedScan(const PreparedScan&) = delete;
   PreparedScan& operator=(const PreparedScan&) = delete;
 

@@ -277,6 +277,10 @@ void KeptGold::require_run(const Span& z) {
   run_ = std::move(run);
 }
 
+std::uint64_t KeptGold::bytes() const {
+  return 4 * count(side * side * stride_) * tiles_.size() + run_bytes();
+}
+
 std::uint64_t KeptGold::run_bytes() const {
   std::uint64_t bytes = 0;
   if (run_)

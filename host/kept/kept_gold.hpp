@@ -68,6 +68,8 @@ class KeptGold {
   /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
   [[nodiscard]] double seconds() const { return seconds_; }
   [[nodiscard]] std::int64_t tiles() const { return static_cast<std::int64_t>(tiles_.size()); }
+  /// Of all tiles, with the heights made of them.
+  [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::int64_t missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
 
  private:

@@ -17,6 +17,7 @@ class Bricks {
 
   /// Bricks along x, y, z.
   [[nodiscard]] const Index3& along() const { return along_; }
+  [[nodiscard]] std::int64_t granularity() const { return granularity_; }
   [[nodiscard]] std::int64_t size() const { return along_[0] * along_[1] * along_[2]; }
   [[nodiscard]] std::int64_t number(const Index3& p) const {
     return (p[2] * along_[1] + p[1]) * along_[0] + p[0];

@@ -37,6 +37,9 @@ struct PlanSettings {
   std::optional<LevelTriple> coarsening{};
   bool foresee =
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
+  /// Of a large scan judge by a part: some views for bounds, a window of rows for everything. What is
+  /// foreseen then are estimates, as the plan's notes say, and it cannot be built.
+  bool estimate = false;
 };
 
 struct PreparedScan;
@@ -56,8 +59,8 @@ struct Plan {
   double samples_ratio = 0;        ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
-  Volume base;                ///< the 1x reconstruction it rests on
-  std::vector<float> fitted;  ///< the base samples to store, where those are not F: midrange coefficients
+  Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows
+  bool estimated = false;  ///< from a part of the scan
   std::vector<std::string> notes;
   /// The filtered scan and the gold that was kept, on the device: a build of the same scan on it goes on from
   /// there. Reset it to free their memory.

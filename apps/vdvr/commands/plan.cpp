@@ -38,6 +38,7 @@ Json plan_json(const Planned& p) {
           {"grid", grid_json(plan.grid)},
           {"geometry", geometry_json(p.scan.geometry)},
           {"report", report_json(p.scan.report)},
+          {"estimated", plan.estimated},
           {"notes", plan.notes}};
 }
 
@@ -103,7 +104,9 @@ int plan_command(Arguments& args) {
   refuse(args, {"roi", "window"},
          "a plan is for the whole grid; use --size and --origin, or give it to build");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
-  const Wanted wanted = wanted_of(args);
+  Wanted wanted = wanted_of(args);
+  // Pictures show the whole volume.
+  wanted.options.plan.estimate = !args.has("pictures");
   std::optional<OutputFolder> folder;
   if (args.has("pictures")) {
     kind_of(args.path("IN"), args);

@@ -1,0 +1,51 @@
+#include "host/scan/row_window.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vdvr {
+namespace {
+
+// Fewer rows say little of what lies between them.
+constexpr std::int64_t fewest_rows = 24;
+
+ProjectionSet rows_of(const ProjectionSet& scan, std::int64_t first, std::int64_t rows) {
+  const ParallelGeometry& g = scan.geometry;
+  ProjectionSet out;
+  out.geometry = g;
+  out.geometry.rows = rows;
+  out.report = scan.report;
+  out.data.reserve(static_cast<std::size_t>(g.views() * rows * g.columns));
+  for (std::int64_t k = 0; k < g.views(); ++k) {
+    const auto begin = scan.data.begin() + (k * g.rows + first) * g.columns;
+    out.data.insert(out.data.end(), begin, begin + rows * g.columns);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<RowWindow> row_window(const ProjectionSet& scan, const Grid& grid, std::int64_t most_samples) {
+  const ParallelGeometry& g = scan.geometry;
+  RowWindow out;
+  out.rows = std::max(fewest_rows, most_samples / (g.views() * g.columns));
+  if (out.rows >= g.rows) return std::nullopt;
+  out.first = (g.rows - out.rows) / 2;
+  // Heights of the outermost of these rows, and the nodes of the grid between them.
+  const auto height = [&](std::int64_t row) {
+    return (static_cast<double>(row) - 0.5 * static_cast<double>(g.rows - 1)) * g.pitch_v;
+  };
+  const double low = height(out.first), high = height(out.first + out.rows - 1), h = grid.spacing[2];
+  const auto first =
+      std::max<std::int64_t>(0, static_cast<std::int64_t>(std::ceil((low - grid.origin[2]) / h - 1e-9)));
+  const auto last = std::min<std::int64_t>(
+      grid.cells[2], static_cast<std::int64_t>(std::floor((high - grid.origin[2]) / h + 1e-9)));
+  if (last <= first) return std::nullopt;
+  out.grid = grid;
+  out.grid.cells[2] = last - first;
+  out.grid.origin[2] += static_cast<double>(first) * h - 0.5 * (low + high);
+  out.scan = rows_of(scan, out.first, out.rows);
+  return out;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,22 @@
+// Some rows of a scan, taken for a scan of their own: what a plan of a large scan judges from. Called by
+// plan.cpp.
+#pragma once
+
+#include <optional>
+
+#include "vdvr/grid.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+struct RowWindow {
+  ProjectionSet scan;
+  Grid grid;                         ///< the cells that these rows cover, in the window's own coordinates
+  std::int64_t first = 0, rows = 0;  ///< of the detector
+};
+
+/// The middle rows of the detector that hold about `most_samples`; nothing where all rows do, or where the
+/// grid has no cell between them. Copies those rows.
+std::optional<RowWindow> row_window(const ProjectionSet& scan, const Grid& grid, std::int64_t most_samples);
+
+}  // namespace vdvr
