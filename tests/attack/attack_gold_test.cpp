@@ -228,7 +228,7 @@ BOOST_AUTO_TEST_CASE(columns_interpolated_by_six_taps_err_by_no_more_than_the_ch
       const FilteredScan f = given_samples(
           g, [&](auto, auto, auto) { return static_cast<double>(random()) / 4294967296.0 - 0.5; });
       opencl::State& state = device().state();
-      Upsampler upsampler(state, f, 4);
+      Upsampler upsampler(state, f, ColumnMethod::accurate);
       const FieldSups sups = field_sups(state, upsampler, f);
       const UpsampledColumns upsampled = upsampled_columns(columns, 8, 3);
       const UpsampledSlab slab = upsampler(upsampled, std::array{0.0});
