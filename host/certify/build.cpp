@@ -360,7 +360,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
-  const SamplerProbe probe = probe_sampler(device);
+  const SamplerProbe probe = probe_filters(device);
   watch.lap("probe");
 
   const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), progress, watch};

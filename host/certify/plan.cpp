@@ -407,7 +407,7 @@ class Planner {
                       plan_.fitted.empty() ? take_base(plan_.base, plan_.layout.coarsening) : plan_.fitted,
                       plan_.epsilon_abs - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
-    const double probing = seconds_of([&] { probe_sampler(device_); });  // as build will
+    const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds = preparation_ + foreseen.seconds + probing;
     // What the trial took, the scan and the base samples twice included; the base samples once more, the
     // stored field on the device, and the tiles before and after closing.
