@@ -45,9 +45,10 @@ __kernel void take_targets(__global float* targets, __global const float* gold, 
   const int block = (int)get_global_id(2) / deep, gy = (int)get_global_id(2) - block * deep;
   if (k >= l.cz || gx >= row || block >= g.blocks) return;
   const size_t column = ((size_t)block * deep + gy) * row + gx;
-  if (margin[column] < g.lowest) return;
+  const int of_sample = 2 * (k - l.reach_z);
+  if (margin[column] < g.lowest || of_sample < g.z_first || of_sample - 1 > g.z_last) return;
   const int has_across = gx > 0 && gy > 0 && gx + 1 < row && gy + 1 < deep;
-  const int to_y = row * g.gold_stride, node = 2 * (k - l.reach_z) + g.halo;
+  const int to_y = row * g.gold_stride, node = of_sample + g.halo;
   __global const float* c = gold + column * g.gold_stride + node;
   __global float* to = targets + column * 2 * stride + k + 1;
   // The ends of a column have no second differences along it; nobody asks for theirs.
@@ -137,6 +138,13 @@ __kernel void fit_step(__global float* out, __global const float* lattice, __glo
   if (k >= l.cz || x >= l.cx || block >= g.blocks) return;
   const size_t column = ((size_t)block * l.cy + y) * l.cx + x;
   if (last[column] < step) return;
+  __global const float* c = lattice + column * stride + k + 1;
+  // Beyond what is tested samples stay what gold is.
+  const int lowest = 2 * (k - l.reach_z) - 1, highest = lowest + 2 * VDVR_LANES;
+  if (highest < g.z_first || lowest > g.z_last) {
+    WRITE(READ(c), out + column * stride + k + 1);
+    return;
+  }
   const INT sample = k + INDEX, node = 2 * (sample - l.reach_z);
   const INT at_node = (node >= g.z_first) & (node <= g.z_last) & (sample < l.cz),
             at_below = (node - 1 >= g.z_first) & (node - 1 <= g.z_last) & (sample > 0) & (sample < l.cz),
@@ -154,7 +162,6 @@ __kernel void fit_step(__global float* out, __global const float* lattice, __glo
   // A neighbour that is not there is not counted either.
   const long to_west = west ? stride : 0, to_east = east ? stride : 0,
              to_north = north ? (long)l.cx * stride : 0, to_south = south ? (long)l.cx * stride : 0;
-  __global const float* c = lattice + column * stride + k + 1;
   __global const float* t = targets + of_gold * 2 * stride + k + 1;
   const long to_x = 2 * stride, to_y = (long)row * 2 * stride;
   const VEC unlimited = (VEC)(INFINITY);
