@@ -204,20 +204,22 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   Measured out;
   MixedVolume before;
   HostMemory closed(in.state);
+  CloseBoundaries close(bricks, in.plan.settings.comparison.closing);
+  std::vector<std::uint8_t> raised;
   for (int round = 0;; ++round) {
     // A repair compares with the volume before it.
     if (round < 2) closed.count(4 * bricks.base.size() + test.tile_bytes(), "the closed volume");
-    MixedVolume volume = close_boundaries(bricks, in.plan.settings.comparison.closing);
+    MixedVolume volume = round > 0 ? close.again(before, raised) : close.first();
     // Where integers round, a raised brick can change more than those it touches.
-    const std::vector<std::uint8_t> changed =
-        round > 0 ? changed_bricks(before, volume) : std::vector<std::uint8_t>(pending.size(), 1);
+    const std::vector<std::uint8_t> changed = round > 0 ? changed_bricks(before, volume, close.made())
+                                                        : std::vector<std::uint8_t>(pending.size(), 1);
     for (std::size_t i = 0; i < pending.size(); ++i)
       pending[i] = bricks.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
     in.watch.lap("close");
     const DeviceField field(in.state, volume);
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
     in.watch.lap("verify");
-    const std::vector<std::uint8_t> raised = raise_violating(in, test, bricks, tolerance);
+    raised = raise_violating(in, test, bricks, tolerance);
     out.repaired += std::count(raised.begin(), raised.end(), 1);
     if (std::find(raised.begin(), raised.end(), 1) == raised.end()) {
       test.sharpen(field, tolerance);
@@ -375,7 +377,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
-  const SamplerProbe probe = probe_sampler(device);
+  const SamplerProbe probe = probe_filters(device);
   watch.lap("probe");
 
   const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), progress, watch};

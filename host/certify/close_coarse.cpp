@@ -17,11 +17,9 @@ float fraction(std::int64_t part, std::int64_t whole) {
 
 class Closer {
  public:
-  Closer(const StoredAs& stored, std::int64_t brick, const std::array<int, 3>& side, std::vector<float>& tile)
-      : stored_(stored),
-        entity_(stored, brick, side),
-        own_(stored.open, brick, stored.level[at(brick)]),
-        tile_(tile) {
+  Closer(const StoredAs& stored, const Surroundings& of, const TileView& own, const std::array<int, 3>& side,
+         std::vector<float>& tile)
+      : stored_(stored), entity_(stored, of, side), own_(own), tile_(tile) {
     lowest_ = own_.level;
     for (const std::int64_t i : entity_.incident())
       for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min<int>(lowest_[a], stored.level[at(i)][2 - a]);
@@ -36,7 +34,7 @@ class Closer {
     owner_ = entity_.incident().front();
     for (const std::int64_t i : entity_.incident())
       if (rank(i) < rank(owner_)) owner_ = i;
-    bool unchanged = owner_ == brick && stored.open.lattice.step == 0;
+    bool unchanged = owner_ == of.brick && stored.open.lattice.step == 0;
     for (const std::size_t a : entity_.along()) unchanged = unchanged && lowest_[a] == own_.level[a];
     if (unchanged) return;
     take_from_owner();
@@ -75,11 +73,11 @@ class Closer {
   // Level by level among those that meet here, each from the one below as it is stored: the field of every
   // incident brick along the edge then runs through the stored samples of the next finer.
   void fill_edge(std::size_t a) {
-    std::vector<int> levels;
+    Few<int, 8> levels;
     for (const std::int64_t i : entity_.incident())
       if (stored_.level[at(i)][2 - a] <= own_.level[a]) levels.push_back(stored_.level[at(i)][2 - a]);
     std::sort(levels.begin(), levels.end());
-    levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+    levels.cut_from(std::unique(levels.begin(), levels.end()));
     for (std::size_t n = 1; n < levels.size(); ++n) {
       const std::int64_t coarse = std::int64_t{1} << (own_.level[a] - levels[n - 1]);
       Index3 step{1, 1, 1};
@@ -118,7 +116,7 @@ class Closer {
 
   const StoredAs& stored_;
   Entity entity_;
-  TileView own_;
+  const TileView& own_;
   std::vector<float>& tile_;
   std::int64_t owner_ = 0;
   std::array<int, 3> lowest_{};  // level of the entity
@@ -128,8 +126,10 @@ class Closer {
 
 std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick) {
   std::vector<float> tile = stored.open.samples[at(brick)];
-  for_each_part([&](const std::array<int, 3>& side) { Closer(stored, brick, side, tile); });
-  repeat_last_planes(TileView(stored.open, brick, stored.level[at(brick)]), tile);
+  const Surroundings around(stored.open, brick);
+  const TileView own(stored.open, around.position, stored.level[at(brick)]);
+  for_each_part([&](const std::array<int, 3>& side) { Closer(stored, around, own, side, tile); });
+  repeat_last_planes(own, tile);
   return tile;
 }
 

@@ -76,9 +76,9 @@ std::vector<LevelTriple> levels_by_paper(const OpenBricks& b) {
   std::vector<LevelTriple> levels = b.level;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     if (!b.involved[i]) continue;
+    const Surroundings around(b, static_cast<std::int64_t>(i));
     for (int part = 0; part < 27; ++part)
-      for (const std::int64_t j :
-           incident_bricks(b, static_cast<std::int64_t>(i), {part % 3, part / 3 % 3, part / 9}))
+      for (const std::int64_t j : incident_bricks(b, around, {part % 3, part / 3 % 3, part / 9}))
         for (std::size_t a = 0; a < 3; ++a) levels[i][a] = std::max(levels[i][a], b.level[at(j)][a]);
   }
   return levels;
@@ -86,6 +86,7 @@ std::vector<LevelTriple> levels_by_paper(const OpenBricks& b) {
 
 std::vector<float> tile_by_paper(const StoredAs& stored, std::int64_t brick) {
   const OpenBricks& b = stored.open;
+  const Surroundings around(b, brick);
   const int own = b.level[at(brick)][0], top = stored.level[at(brick)][0];
   TileView view(b, brick, isotropic(own));
   std::vector<float> tile = own_tile(b, brick, view);
@@ -96,7 +97,7 @@ std::vector<float> tile_by_paper(const StoredAs& stored, std::int64_t brick) {
       view = finer;
     }
     for_each_part([&](const std::array<int, 3>& side) {
-      feed(stored, Entity(stored, brick, side), view, level, tile);
+      feed(stored, Entity(stored, around, side), view, level, tile);
     });
   }
   repeat_last_planes(view, tile);

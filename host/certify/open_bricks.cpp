@@ -8,33 +8,44 @@
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {
-namespace {}  // namespace
 
 Index3 OpenBricks::counts() const { return Bricks(grid, granularity).along(); }
 
 Index3 OpenBricks::position(std::int64_t brick) const { return Bricks(grid, granularity).position(brick); }
 
-std::vector<std::int64_t> incident_bricks(const OpenBricks& b, std::int64_t brick,
-                                          const std::array<int, 3>& side, bool all) {
-  const Index3 n = b.counts(), p = b.position(brick);
-  std::array<std::vector<std::int64_t>, 3> range;
-  for (std::size_t a = 0; a < 3; ++a) {
-    range[a].push_back(p[a]);
-    if (side[a] == 0 && p[a] > 0) range[a].push_back(p[a] - 1);
-    if (side[a] == 2 && p[a] + 1 < n[a]) range[a].push_back(p[a] + 1);
-  }
-  std::vector<std::int64_t> out;
-  for (const std::int64_t z : range[2])
-    for (const std::int64_t y : range[1])
-      for (const std::int64_t x : range[0]) {
-        const std::int64_t i = (z * n[1] + y) * n[0] + x;
-        if (all || i == brick || b.involved[at(i)]) out.push_back(i);
+Surroundings::Surroundings(const OpenBricks& b, std::int64_t of) : brick(of) {
+  const Bricks bricks(b.grid, b.granularity);
+  const Index3& n = bricks.along();
+  position = bricks.position(of);
+  std::size_t next = 0;
+  for (std::int64_t z = position[2] - 1; z <= position[2] + 1; ++z)
+    for (std::int64_t y = position[1] - 1; y <= position[1] + 1; ++y)
+      for (std::int64_t x = position[0] - 1; x <= position[0] + 1; ++x) {
+        const bool there = z >= 0 && y >= 0 && x >= 0 && z < n[2] && y < n[1] && x < n[0];
+        around[next++] = there ? (z * n[1] + y) * n[0] + x : -1;
+      }
+}
+
+FewBricks incident_bricks(const OpenBricks& b, const Surroundings& of, const std::array<int, 3>& side,
+                          bool all) {
+  const auto low = [&](std::size_t a) { return side[a] == 0 ? 0 : 1; };
+  const auto high = [&](std::size_t a) { return side[a] == 2 ? 2 : 1; };
+  FewBricks out;
+  for (int z = low(2); z <= high(2); ++z)
+    for (int y = low(1); y <= high(1); ++y)
+      for (int x = low(0); x <= high(0); ++x) {
+        const std::int64_t i = of.around[static_cast<std::size_t>(9 * z + 3 * y + x)];
+        if (i >= 0 && (all || i == of.brick || b.involved[at(i)])) out.push_back(i);
       }
   return out;
 }
 
-TileView::TileView(const OpenBricks& b, std::int64_t brick, const LevelTriple& l)
-    : position(b.position(brick)), level{l[2], l[1], l[0]} {
+FewBricks incident_bricks(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side, bool all) {
+  return incident_bricks(b, Surroundings(b, brick), side, all);
+}
+
+TileView::TileView(const OpenBricks& b, const Index3& brick, const LevelTriple& l)
+    : position(brick), level{l[2], l[1], l[0]} {
   for (std::size_t a = 0; a < 3; ++a) {
     const std::int64_t width =
         std::min<std::int64_t>(b.granularity, b.grid.cells[a] - position[a] * b.granularity);
@@ -62,17 +73,19 @@ void repeat_last_planes(const TileView& t, std::vector<float>& tile) {
             tile[t.index({std::min(x, t.end[0]), std::min(y, t.end[1]), std::min(z, t.end[2])})];
 }
 
-Entity::Entity(const StoredAs& stored, std::int64_t brick, const std::array<int, 3>& side)
+Entity::Entity(const StoredAs& stored, const Surroundings& of, const std::array<int, 3>& side)
     : stored_(stored),
       side_(side),
-      incident_(incident_bricks(stored.open, brick, side)),
-      all_(incident_bricks(stored.open, brick, side, true)) {
-  std::sort(incident_.begin(), incident_.end());
+      incident_(incident_bricks(stored.open, of, side)),
+      all_(incident_bricks(stored.open, of, side, true)) {
   for (std::size_t a = 0; a < 3; ++a)
     if (side[a] == 1) along_.push_back(a);
+  for (const std::int64_t brick : all_)
+    one_unit_ = one_unit_ && stored.unit[at(brick)] == stored.unit[at(of.brick)];
 }
 
 double Entity::unit(const TileView& tile, const Index3& i) const {
+  if (one_unit_) return stored_.unit[at(all_.front())];
   double unit = 0;
   for (const std::int64_t brick : all_) {
     const LevelTriple& l = stored_.level[at(brick)];

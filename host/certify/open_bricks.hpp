@@ -3,6 +3,9 @@
 // raise_levels.cpp and the closings.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -34,11 +37,41 @@ struct OpenBricks {
   [[nodiscard]] Index3 position(std::int64_t brick) const;
 };
 
-/// Bricks of the grid that share a part of a closed brick: side per axis x, y, z is 0 (low border), 1
-/// (inside) or 2 (high border). Only those that take part, the brick itself included; with `all`, the others
-/// too.
-std::vector<std::int64_t> incident_bricks(const OpenBricks& bricks, std::int64_t brick,
-                                          const std::array<int, 3>& side, bool all = false);
+/// At most `most` of something, without an allocation: closing asks for millions of such lists.
+template <class T, std::size_t most>
+class Few {
+ public:
+  void push_back(const T& item) { items_[size_++] = item; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] const T& front() const { return items_[0]; }
+  [[nodiscard]] const T& operator[](std::size_t i) const { return items_[i]; }
+  [[nodiscard]] const T* begin() const { return items_.data(); }
+  [[nodiscard]] const T* end() const { return items_.data() + size_; }
+  [[nodiscard]] T* begin() { return items_.data(); }
+  [[nodiscard]] T* end() { return items_.data() + size_; }
+  void cut_from(const T* first) { size_ = static_cast<std::size_t>(first - items_.data()); }
+
+ private:
+  std::array<T, most> items_{};
+  std::size_t size_ = 0;
+};
+using FewBricks = Few<std::int64_t, 8>;
+
+/// A brick among its neighbours.
+struct Surroundings {
+  Surroundings(const OpenBricks& bricks, std::int64_t brick);
+  std::int64_t brick;
+  Index3 position;
+  std::array<std::int64_t, 27> around{};  ///< 9 z + 3 y + x, the brick itself in the middle; -1: none there
+};
+
+/// Bricks of the grid that share a part of a closed brick, ascending: side per axis x, y, z is 0 (low
+/// border), 1 (inside) or 2 (high border). Only those that take part, the brick itself included; with `all`,
+/// the others too.
+FewBricks incident_bricks(const OpenBricks& bricks, const Surroundings& of, const std::array<int, 3>& side,
+                          bool all = false);
+FewBricks incident_bricks(const OpenBricks& bricks, std::int64_t brick, const std::array<int, 3>& side,
+                          bool all = false);
 
 /// One brick's samples at some level, under their own index.
 struct TileView {
@@ -48,7 +81,9 @@ struct TileView {
   Index3 last{};             // last index of the tile: beyond `end` planes repeat
   std::int64_t stride_y = 0, stride_z = 0;
 
-  TileView(const OpenBricks& bricks, std::int64_t brick, const LevelTriple& level_zyx);
+  TileView(const OpenBricks& bricks, const Index3& position, const LevelTriple& level_zyx);
+  TileView(const OpenBricks& bricks, std::int64_t brick, const LevelTriple& level_zyx)
+      : TileView(bricks, bricks.position(brick), level_zyx) {}
   [[nodiscard]] std::size_t index(const Index3& i) const {
     return static_cast<std::size_t>(i[2] * stride_z + i[1] * stride_y + i[0]);
   }
@@ -72,14 +107,14 @@ struct StoredAs {
 /// A face, an edge or a corner of a brick, without its own border.
 class Entity {
  public:
-  Entity(const StoredAs& stored, std::int64_t brick, const std::array<int, 3>& side);
+  Entity(const StoredAs& stored, const Surroundings& of, const std::array<int, 3>& side);
 
   /// The bricks that share it and take part, ascending.
-  [[nodiscard]] const std::vector<std::int64_t>& incident() const { return incident_; }
+  [[nodiscard]] const FewBricks& incident() const { return incident_; }
   /// Whether bricks that take no part share it as well.
   [[nodiscard]] bool has_outsiders() const { return all_.size() > incident_.size(); }
   /// Axes along it, ascending.
-  [[nodiscard]] const std::vector<std::size_t>& along() const { return along_; }
+  [[nodiscard]] const Few<std::size_t, 3>& along() const { return along_; }
   /// Calls visit(index) for the samples of `tile` on it whose index along it is a multiple of `step`.
   template <class Visit>
   void for_each(const TileView& tile, const Index3& step, Visit&& visit) const {
@@ -103,8 +138,9 @@ class Entity {
  private:
   const StoredAs& stored_;
   std::array<int, 3> side_;
-  std::vector<std::size_t> along_;
-  std::vector<std::int64_t> incident_, all_;
+  Few<std::size_t, 3> along_;
+  FewBricks incident_, all_;
+  bool one_unit_ = true;  // whether all of them round alike
 };
 
 /// Calls visit(side) for the 8 corners, then the 12 edges, then the 6 faces.

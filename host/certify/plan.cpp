@@ -463,7 +463,7 @@ class Planner {
     const Foreseen foreseen =
         foresee_build(state_, gold, plan_.base, stored, looked_at, plan_.epsilon_abs - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
-    const double probing = seconds_of([&] { probe_sampler(device_); });  // as build will
+    const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
     // What the trial took, the scan and the base samples twice included, and the gold that was not kept yet;

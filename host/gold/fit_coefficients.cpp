@@ -1,8 +1,9 @@
-// Fits lattices on the device. Launches kernels/gold/fit_coefficients.cl.
+// Fits lattices on the device. Launches kernels/gold/fit_coefficients.cl and kernels/gold/fit_at_twice.cl.
 #include "host/gold/fit_coefficients.hpp"
 
 #include <algorithm>
 
+#include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 
@@ -73,7 +74,10 @@ void LatticeFit::mark(const std::vector<NodeBox>& wanted, int steps) {
   const std::int64_t halves = std::max(2 * steps - 1, 0), dx = (halves * l.spacing_x + 1) / 2,
                      dy = (halves * l.spacing_y + 1) / 2, dz = (halves * l.spacing_z + 1) / 2;
   for (const NodeBox& w : wanted) {
-    const cl_uint runs = runs_between(w.first[2] - dz, w.last[2] + dz);
+    // Errors count where the field is tested alone.
+    const std::int64_t top = std::max(std::min(w.last[2] + dz, b.z_last), b.z_first),
+                       bottom = std::min(std::max(w.first[2] - dz, b.z_first), top);
+    const cl_uint runs = runs_between(bottom, top);
     const std::int64_t x0 = std::max(w.first[0] - dx + b.halo, std::int64_t{0}),
                        x1 = std::min(w.last[0] + dx + b.halo, wide - 1),
                        y0 = std::max(w.first[1] - dy + b.halo, std::int64_t{0}),
@@ -133,13 +137,85 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
         low_.buffer(), high_.buffer(), needed_.buffer(), blocks, l, share);
 }
 
+// How many steps a column's samples take part in: all on the boxes, and one less a sample further.
+void LatticeFit::mark_last_steps(const std::vector<NodeBox>& wanted, int steps) {
+  const VdvrLattice& l = level_.shape;
+  constexpr cl_int none = -1;
+  host_last_.assign(at(blocks_.count * l.cx * l.cy), none);
+  const auto last = [&](std::int64_t block, std::int64_t y, std::int64_t x) -> cl_int& {
+    return host_last_[at((block * l.cy + y) * l.cx + x)];
+  };
+  for (const NodeBox& w : wanted)
+    for (std::int64_t y = w.first[1] / 2 + l.reach_y; 2 * (y - l.reach_y) <= w.last[1] && y < l.cy; ++y)
+      for (std::int64_t x = w.first[0] / 2 + l.reach_x; 2 * (x - l.reach_x) <= w.last[0] && x < l.cx; ++x)
+        last(w.block, y, x) = steps - 1;
+  // The distance of the nearest, by the larger of both axes: there and back over the block.
+  const auto spread = [&](std::int64_t block, std::int64_t y, std::int64_t x, std::int64_t back) {
+    cl_int& own = last(block, y, x);
+    const auto from = [&](std::int64_t ny, std::int64_t nx) {
+      if (ny >= 0 && nx >= 0 && ny < l.cy && nx < l.cx) own = std::max(own, last(block, ny, nx) - 1);
+    };
+    from(y, x - back);
+    for (const std::int64_t dx : {-1, 0, 1}) from(y - back, x + dx);
+  };
+  for (std::int64_t block = 0; block < blocks_.count; ++block) {
+    for (std::int64_t i = 0; i < std::int64_t{l.cy} * l.cx; ++i) spread(block, i / l.cx, i % l.cx, 1);
+    for (std::int64_t i = std::int64_t{l.cy} * l.cx - 1; i >= 0; --i) spread(block, i / l.cx, i % l.cx, -1);
+  }
+  grow(state_, last_, host_last_.size(), "steps of a lattice's columns");
+  last_.write(host_last_);
+  host_needed_.assign(host_last_.begin(), host_last_.end());
+  for (cl_uint& needed : host_needed_) needed = needed != static_cast<cl_uint>(none);
+  grow(state_, needed_, host_needed_.size(), "columns of a lattice");
+  needed_.write(host_needed_);
+}
+
+// Every second node of all axes is a sample: a step is one pass.
+void LatticeFit::fit_at_twice(const opencl::DeviceArray<float>& gold,
+                              const opencl::DeviceArray<float>& margin, int steps, float curvature) {
+  const VdvrLattice& l = level_.shape;
+  const VdvrGoldBlocks blocks = blocks_on_device();
+  const int most = std::min(column_tuning(state_.info).lanes, 8), lanes = most >= 8 ? 8 : most >= 4 ? 4 : 1;
+  const opencl::Defines defines{{"VDVR_LANES", std::to_string(lanes)}};
+  // A sample more at either end than vectors hold.
+  const std::uint64_t stride = opencl::round_up(count(l.cz), 8) + 8,
+                      wide = count(blocks_.nx + 2 * blocks_.halo),
+                      deep = count((blocks_.ny + 2 * blocks_.halo) * blocks_.count),
+                      rows = count(l.cy * blocks_.count), columns = rows * count(l.cx);
+  grow(state_, targets_, wide * deep * 2 * stride, "what samples are fitted to");
+  grow(state_, here_, columns * stride, "samples before a step");
+  grow(state_, there_, columns * stride, "samples after a step");
+  const cl_int along = to_int(static_cast<std::int64_t>(stride));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_int, cl_float> targets(
+      state_, "gold/fit_at_twice", "take_targets", defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_int> take(
+      state_, "gold/fit_at_twice", "take_samples", defines),
+      give(state_, "gold/fit_at_twice", "give_samples", defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice,
+                 cl_int, cl_int, cl_float>
+      fit_step(state_, "gold/fit_at_twice", "fit_step", defines);
+  const opencl::Range samples{{count(l.cz), count(l.cx), rows}, {16, 4, 1}};
+  targets({{count(l.cz), wide, deep}, {16, 4, 1}}, targets_.buffer(), gold.buffer(), margin.buffer(), blocks,
+          l, along, curvature);
+  take(samples, here_.buffer(), gold.buffer(), blocks, l, along);
+  for (int step = 0; step < steps; ++step) {
+    fit_step({{(count(l.cz) + count(lanes) - 1) / count(lanes), count(l.cx), rows}, {1, 4, 4}},
+             there_.buffer(), here_.buffer(), targets_.buffer(), margin.buffer(), last_.buffer(), blocks, l,
+             along, step, share);
+    std::swap(here_, there_);
+  }
+  give(samples, level_.samples.buffer(), here_.buffer(), blocks, l, along);
+}
+
 const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gold,
                                            const opencl::DeviceArray<float>& margin,
                                            const std::vector<NodeBox>& wanted, const Index3& spacing,
                                            int steps, float curvature) {
   shape_for(spacing);
-  mark(wanted, steps);
-  reserve(gold.size(), steps);
+  const bool at_twice = spacing == Index3{2, 2, 2} && steps > 0;
+  if (at_twice) mark_last_steps(wanted, steps);
+  else mark(wanted, steps);
+  reserve(gold.size(), at_twice ? 0 : steps);
   const GoldBlocks& b = blocks_;
   const VdvrLattice& l = level_.shape;
   const VdvrGoldBlocks blocks = blocks_on_device();
@@ -147,8 +223,12 @@ const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gol
       state_, "gold/fit_coefficients", "take_lattice");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice> interpolate(
       state_, "gold/fit_coefficients", "interpolate_lattice");
-  take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
-       gold.buffer(), needed_.buffer(), blocks, l);
+  if (at_twice) {
+    fit_at_twice(gold, margin, steps, curvature);
+    steps = 0;
+  } else
+    take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
+         gold.buffer(), needed_.buffer(), blocks, l);
   for (int step = 0;; ++step) {
     interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, level_.along.buffer(),
                 level_.samples.buffer(), needed_.buffer(), blocks, l);

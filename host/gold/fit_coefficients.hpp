@@ -49,8 +49,8 @@ class LatticeFit {
   /// `margin`: the blocks' margins. Right on the boxes wanted, and undefined further out, where halo >=
   /// steps * spacing; along an axis with less halo samples near the rim rest on the gold that is there. Valid
   /// until the next call. Cost: per step about two evaluations of the interpolant per gold node of the boxes,
-  /// widened by as many spacings less a half. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the
-  /// gold, and as much as the gold.
+  /// widened by as many spacings less a half; with a spacing of 2 on every axis, as base samples have it, a
+  /// tenth of that. Memory: (3 + 1 / spacing z) / (spacing x spacing y) of the gold, and as much as the gold.
   const LevelSamples& operator()(const opencl::DeviceArray<float>& gold,
                                  const opencl::DeviceArray<float>& margin, const std::vector<NodeBox>& wanted,
                                  const Index3& spacing, int steps, float curvature);
@@ -63,6 +63,9 @@ class LatticeFit {
   void mark(const std::vector<NodeBox>& wanted, int steps);
   void reserve(std::uint64_t gold, int steps);
   void fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin, float curvature);
+  void fit_at_twice(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
+                    int steps, float curvature);
+  void mark_last_steps(const std::vector<NodeBox>& wanted, int steps);
 
   opencl::State& state_;
   const GoldBlocks& blocks_;
@@ -70,8 +73,11 @@ class LatticeFit {
   [[nodiscard]] cl_uint runs_between(std::int64_t low, std::int64_t high) const;
 
   std::vector<cl_uint> host_wanted_, host_needed_;
+  std::vector<cl_int> host_last_;
   opencl::DeviceArray<float> errors_, low_, high_;
+  opencl::DeviceArray<float> targets_, here_, there_;  // of fit_at_twice
   opencl::DeviceArray<cl_uint> wanted_, needed_;
+  opencl::DeviceArray<cl_int> last_;
 };
 
 }  // namespace vdvr

@@ -17,10 +17,17 @@ namespace {
 
 constexpr std::int64_t taps = taps_before + 1 + taps_after, lanes_of_group = 16;
 
-opencl::Defines defines(opencl::State& state, int phases) {
-  return {{"VDVR_LANES", std::to_string(column_tuning(state.info).lanes)},
+opencl::Defines defines(int lanes, int phases) {
+  return {{"VDVR_LANES", std::to_string(lanes)},
           {"VDVR_RUN", std::to_string(AlongZ::run)},
           {"VDVR_PHASES", std::to_string(phases)}};
+}
+
+// Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
+// not fit into those of a CPU with 8 lanes.
+int lanes_along_z(opencl::State& state) {
+  const int tuned = column_tuning(state.info).lanes;
+  return tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8 ? 8 : tuned;
 }
 
 // Whole groups of the phases that a work-item makes together.
@@ -70,10 +77,10 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
                         const opencl::DeviceArray<float>& out, VdvrAlongZ shape) const {
   shape.terms = to_int(terms_);
   shape.groups = to_int(groups_);
-  const auto lanes = count(column_tuning(state.info).lanes);
+  const int lanes = lanes_along_z(state);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "kept/interpolate", "along_z", defines(state, 1));
-  kernel({{count(groups_ * lanes_of_group) / lanes, count((shape.columns_x + 7) / 8), count(shape.columns_y)},
+      state, "kept/interpolate", "along_z", defines(lanes, 1));
+  kernel({{count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8), count(shape.columns_y)},
           {1, 4, 1}},
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), shape);
 }
@@ -83,10 +90,10 @@ Across::Across(opencl::State& state, int phases, std::span<const float> weights)
 
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
-  const auto lanes = count(column_tuning(state.info).lanes);
+  const int lanes = column_tuning(state.info).lanes;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
-                                                                        defines(state, phases_));
-  kernel({{count(shape.z) / lanes, count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
+                                                                        defines(lanes, phases_));
+  kernel({{count(shape.z / lanes), count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
          in.buffer(), weights_.buffer(), shape);
 }
 

@@ -1,12 +1,12 @@
 // What the device's texture unit does to weights and constants, and which sampler is faster (method:
-// docs/error-bounds.md, samplers). Called by `devices --probe`, the certificate's sampler term and raycast()
-// for --sampler auto. Launches: read_points, rate_image, rate_buffer of kernels/sampler/probe_sampler.cl.
+// docs/error-bounds.md, samplers). Called by `devices --probe`, the certificate's sampler term, which needs
+// no rates, and raycast() for --sampler auto. Launches: read_points, rate_image, rate_buffer of
+// kernels/sampler/probe_sampler.cl.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -69,7 +69,8 @@ Tile make_tile(opencl::State& state, const std::vector<float>& values, SampleTyp
   return {{values.begin(), values.end()}, make_image(state, values, CL_FLOAT)};
 }
 
-std::vector<float> cube(const std::function<double(double, double, double)>& f) {
+template <class Field>
+std::vector<float> cube(const Field& f) {
   std::vector<float> values;
   values.reserve(kSide * kSide * kSide);
   for (std::uint32_t z = 0; z < kSide; ++z)
@@ -122,8 +123,8 @@ std::vector<ProbePoint> scattered_points() {
 
 // The weight itself: a comb of 0 and 1 along one axis, constant along the others. Returns the largest error.
 double measure_weights(opencl::State& state, std::size_t axis, SampleType type) {
-  const auto tile = cube([axis](double x, double y, double z) {
-    return std::fmod(axis == 0 ? x : axis == 1 ? y : z, 2.0);
+  const auto tile = cube([axis](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return static_cast<double>((axis == 0 ? x : axis == 1 ? y : z) % 2);
   });
   const auto points = weight_points(axis);
   const auto values = read_points(state, make_tile(state, tile, type).image, points);
@@ -245,16 +246,8 @@ double measure_rate(opencl::State& state, Kernel& kernel, const Field& field,
   return static_cast<double>(count) * steps / seconds;
 }
 
-SamplerProbe measure(opencl::State& state) {
+SamplerProbe measure_filters(opencl::State& state) {
   SamplerProbe p;
-  const auto tile =
-      cube([](double x, double y, double z) { return std::sin(0.3 * x) * std::cos(0.2 * y) + 0.01 * z; });
-  const DeviceArray<float> samples(state, std::span<const float>(tile), "probe samples");
-  const DeviceArray<float> sums(state, 1u << 14, "probe sums");
-  opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(
-      state, "sampler/probe_sampler", "rate_buffer", kDefines);
-  p.buffer_rate = measure_rate(state, buffer_kernel, samples.buffer(), sums);
-  p.chosen = "buffer";
   p.image3d = state.info.linear_float_image;
   if (!p.image3d) {
     p.note = "no CL_R / CL_FLOAT 3D image with the linear filter";
@@ -265,24 +258,40 @@ SamplerProbe measure(opencl::State& state) {
   p.u8.image3d = state.info.linear_u8_image;
   if (p.u16.image3d) measure_filter(state, p.u16, SampleType::u16);
   if (p.u8.image3d) measure_filter(state, p.u8, SampleType::u8);
+  return p;
+}
+
+void measure_rates(opencl::State& state, SamplerProbe& p) {
+  const auto tile =
+      cube([](double x, double y, double z) { return std::sin(0.3 * x) * std::cos(0.2 * y) + 0.01 * z; });
+  const DeviceArray<float> samples(state, std::span<const float>(tile), "probe samples");
+  const DeviceArray<float> sums(state, 1u << 14, "probe sums");
+  opencl::Kernel<cl::Buffer, cl_uint, cl_uint, cl_uint, cl::Buffer> buffer_kernel(
+      state, "sampler/probe_sampler", "rate_buffer", kDefines);
+  p.buffer_rate = measure_rate(state, buffer_kernel, samples.buffer(), sums);
+  p.chosen = "buffer";
+  if (!p.image3d) return;
   opencl::Kernel<cl::Image3D, cl_uint, cl_uint, cl_uint, cl::Buffer> image_kernel(
       state, "sampler/probe_sampler", "rate_image", kDefines);
   p.image3d_rate = measure_rate(state, image_kernel, make_tile(state, tile, SampleType::f32).image, sums);
   if (p.image3d_rate > p.buffer_rate && std::isfinite(p.weight_error)) p.chosen = "image3d";
-  return p;
+}
+
+// By device, for the process' life: the answer belongs to the hardware and its driver, not to a context.
+SamplerProbe known_probe(opencl::State& state, bool rates) {
+  static std::mutex mutex;
+  static std::map<cl_device_id, SamplerProbe> known;
+  const std::lock_guard lock(mutex);
+  auto found = known.find(state.device());
+  if (found == known.end()) found = known.emplace(state.device(), measure_filters(state)).first;
+  if (rates && found->second.chosen.empty()) measure_rates(state, found->second);
+  return found->second;
 }
 
 }  // namespace
 
-SamplerProbe probe_sampler(Device& device) {
-  // By device, for the process' life: the answer belongs to the hardware and its driver, not to a context.
-  static std::mutex mutex;
-  static std::map<cl_device_id, SamplerProbe> known;
-  const std::lock_guard lock(mutex);
-  opencl::State& state = device.state();
-  const auto found = known.find(state.device());
-  if (found != known.end()) return found->second;
-  return known[state.device()] = measure(state);
-}
+SamplerProbe probe_filters(Device& device) { return known_probe(device.state(), false); }
+
+SamplerProbe probe_sampler(Device& device) { return known_probe(device.state(), true); }
 
 }  // namespace vdvr

@@ -292,7 +292,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   const ExactField exact(scan, stored.field, progress);
   const FieldSlopes slopes = field_slopes(volume);
   const SamplerTerms sampler =
-      sampler_terms(slopes, volume.grid, probe_sampler(device), atlas_length(device.info(), volume),
+      sampler_terms(slopes, volume.grid, probe_filters(device), atlas_length(device.info(), volume),
                     stored.epsilon_abs, volume.rate, sampler_underflow(device.info()));
 
   VerifyResult result;

@@ -145,7 +145,63 @@ inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global 
 }
 #endif
 
+#if VDVR_LANES == 8
+// V on a row of columns at nodes begin .. begin + 8, where planes of samples lie four nodes apart or more:
+// three planes serve them all. The sampler's text in vectors, operation by operation: planes in the lanes of a
+// float4, then heights; a weight of 0 adds nothing.
+typedef struct {
+  int per_x, per_y;    // nodes to an interval of samples
+  float of_x, of_y;    // 1 / those
+  size_t first;        // the brick's first sample of the lowest plane
+  size_t to_1, to_2;   // the next planes
+  float8 low_0, low_1, low_2;     // weights of planes at nodes begin + 0 .. 7
+  float8 high_0, high_1, high_2;  // and begin + 1 .. 8
+} Planes;
+
+inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
+  const int8 second = from_plane >= per;
+  const float8 t = convert_float8(from_plane - (second ? (int8)per : (int8)0)) * (1.0f / (float)per);
+  const float8 none = (float8)(0.0f);
+  *w0 = second ? none : 1.0f - t;
+  *w1 = second ? 1.0f - t : t;
+  *w2 = second ? t : none;
+}
+
+inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, int begin) {
+  Planes f;
+  f.per_x = (rate << grid.coarse_x) >> p->brick.level_x;
+  f.per_y = (rate << grid.coarse_y) >> p->brick.level_y;
+  f.of_x = 1.0f / (float)f.per_x;
+  f.of_y = 1.0f / (float)f.per_y;
+  const int per = (rate << grid.coarse_z) >> p->brick.level_z, lowest = begin / per;
+  const size_t stride = p->brick.stride_z;
+  f.first = p->brick.place + lowest * stride;
+  f.to_1 = stride;
+  f.to_2 = min(2, p->last_z / per - lowest) * stride;
+  const int8 from_plane = begin - lowest * per + INDEX;
+  weights_of(&f.low_0, &f.low_1, &f.low_2, from_plane, per);
+  weights_of(&f.high_0, &f.high_1, &f.high_2, from_plane + 1, per);
+  return f;
+}
+
+inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
+  if (VDVR_HOLDS(*b, VDVR_F32)) return ((__global const float*)samples)[i];
+  const float code = VDVR_HOLDS(*b, VDVR_U16) ? (float)((__global const ushort*)samples)[i] : (float)samples[i];
+  return code * b->scale + b->bias;
+}
+inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples, const VdvrBrick* b,
+                                      size_t i) {
+  return (float4)(stored(samples, b, i), stored(samples, b, i + f->to_1), stored(samples, b, i + f->to_2),
+                  0.0f);
+}
+#define LERP(a, b, t) ((1.0f - (t)) * (a) + (t) * (b))
+#endif
+
 // --- the test ---
+
+// NaN comes through where it is the second.
+#define MORE(a, b) ((a) > (b) ? (a) : (b))
+#define LESS(a, b) ((a) < (b) ? (a) : (b))
 
 // What corners give: the largest of V - gold and of its negative, of second differences along x, y, z and of
 // their negatives, and of gold and its negative for the window.
@@ -158,41 +214,54 @@ inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global 
 typedef struct {
   FOR_PARTS(DECLARE)
 } Corners;
-#define LARGER(part) out.part = fmax(a.part, b.part);
+#define LARGER(part) out.part = MORE(a.part, b.part);
 inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
   Corners out;
   FOR_PARTS(LARGER)
   return out;
 }
 
-// Of both ends of edges along z from node z of a column on.
-inline ALWAYS_INLINE Corners ends_of(__global const float* c, VEC low_v, VEC high_v, INT low_tested,
-                                     INT high_tested, int to_x, int to_y) {
-  const VEC low = READ(c), high = READ(c + 1);
+// Gold at both ends of edges along z.
+typedef struct {
+  VEC low, high;
+} Ends;
+inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
+  Ends e;
+  e.low = READ(c);
+  e.high = READ(c + 1);
+  return e;
+}
+
+// Of both ends of edges along z from node z of a column on, between the columns before and after it in x.
+inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after, int to_y) {
+  const VEC low2 = 2.0f * here.low, high2 = 2.0f * here.high;
+  const VEC x0 = before.low + after.low - low2, x1 = before.high + after.high - high2,
+            y0 = READ(c - to_y) + READ(c + to_y) - low2,
+            y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - high2, z0 = READ(c - 1) + here.high - low2,
+            z1 = here.low + READ(c + 2) - high2;
+  Corners out;
+  out.xp = MORE(x0, x1);
+  out.xm = -LESS(x0, x1);
+  out.yp = MORE(y0, y1);
+  out.ym = -LESS(y0, y1);
+  out.zp = MORE(z0, z1);
+  out.zm = -LESS(z0, z1);
+#if VDVR_WINDOWED
+  out.gp = MORE(here.low, here.high);
+  out.gm = -LESS(here.low, here.high);
+#endif
+  return out;
+}
+// V - gold there.
+inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends gold, INT low_tested,
+                                     INT high_tested) {
   const VEC unlimited = (VEC)(INFINITY);
-  VEC e0 = low_v - low, e1 = high_v - high;
+  VEC e0 = low_v - gold.low, e1 = high_v - gold.high;
   // NaN would drop out of a maximum.
   e0 = select(unlimited, e0, fabs(e0) <= FLT_MAX);
   e1 = select(unlimited, e1, fabs(e1) <= FLT_MAX);
-  const VEC x0 = READ(c - to_x) + READ(c + to_x) - 2.0f * low,
-            x1 = READ(c + 1 - to_x) + READ(c + 1 + to_x) - 2.0f * high,
-            y0 = READ(c - to_y) + READ(c + to_y) - 2.0f * low,
-            y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - 2.0f * high, z0 = READ(c - 1) + high - 2.0f * low,
-            z1 = low + READ(c + 2) - 2.0f * high;
-  Corners out;
-  out.ep = fmax(select(-unlimited, e0, low_tested), select(-unlimited, e1, high_tested));
-  out.em = fmax(select(-unlimited, -e0, low_tested), select(-unlimited, -e1, high_tested));
-  out.xp = fmax(x0, x1);
-  out.xm = -fmin(x0, x1);
-  out.yp = fmax(y0, y1);
-  out.ym = -fmin(y0, y1);
-  out.zp = fmax(z0, z1);
-  out.zm = -fmin(z0, z1);
-#if VDVR_WINDOWED
-  out.gp = fmax(low, high);
-  out.gm = -fmin(low, high);
-#endif
-  return out;
+  out->ep = MORE(select(-unlimited, e0, low_tested), select(-unlimited, e1, high_tested));
+  out->em = MORE(select(-unlimited, -e0, low_tested), select(-unlimited, -e1, high_tested));
 }
 
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
@@ -231,41 +300,85 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                   first_brick, selected, s) ||
       begin >= p.last_z)
     return;
-  const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY);
+  const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
   const int to_x = s.gold_stride, to_y = p.row * s.gold_stride;
   const INT node = begin + p.z * VDVR_BRICK_NODES + INDEX, cell = begin + INDEX;
   const INT low_tested = (node >= test.z_first) & (node <= test.z_last),
-            high_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last), inside = cell < p.last_z;
+            inside = cell < p.last_z,
+            end_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last) & inside;
   VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
   int parts = 0;
   Corners before[VDVR_BRICK_NODES];
+#if VDVR_LANES == 8
+  const bool by_planes = (s.rate << grid.coarse_z) >> p.brick.level_z >= 4;
+  Planes f;
+  if (by_planes) f = planes_of(&p, grid, s.rate, begin);
+#endif
   for (int iy = 0; iy <= p.last_y; ++iy) {
     Corners left;
+    __global const float* c = p.gold + (size_t)iy * p.row * s.gold_stride + begin;
+    Ends gold_before = gold_at(c - to_x), gold = gold_at(c);
+#if VDVR_LANES == 8
+    // Samples below and above this row, at the near and the far end of an interval of columns.
+    float4 near_0 = (float4)(0.0f), near_1 = near_0, far_0 = near_0, far_1 = near_0;
+    int interval = 0, in_interval = 0, jy = 0;
+    float fy = 0;
+    size_t row_first = 0;
+    if (by_planes) {
+      jy = min(iy, p.last_y - 1) / f.per_y;
+      fy = (float)(iy - jy * f.per_y) * f.of_y;
+      row_first = f.first + (size_t)jy * p.brick.stride_y;
+      near_0 = planes_at(&f, samples, &p.brick, row_first);
+      near_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y);
+      far_0 = planes_at(&f, samples, &p.brick, row_first + 1);
+      far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + 1);
+    }
+#endif
     for (int ix = 0; ix <= p.last_x; ++ix) {
       const size_t column = (size_t)iy * p.row + ix;
-      __global const float* c = p.gold + column * s.gold_stride + begin;
       const int tested = p.margin[column] >= s.lowest;
-      const Column at = column_of(&p, ix, iy, grid, s.rate);
-#if VDVR_LANES == 1
-      const float low_v = tested ? field_at(&p, &at, samples, begin) : 0.0f,
-                  high_v = tested ? field_at(&p, &at, samples, begin + 1) : 0.0f;
-      const Corners here = ends_of(c, low_v, high_v, tested && low_tested, tested && high_tested, to_x, to_y);
-#else
-      float v[VDVR_LANES + 12];
-      if (tested) field_along(&p, &at, samples, begin, v);
-      else
-        for (int i = 0; i < VDVR_LANES + 1; ++i) v[i] = 0.0f;
-      const VEC low_v = READ(v), high_v = READ(v + 1);
-      const INT of_column = (INT)(tested ? -1 : 0);
-      const Corners here = ends_of(c, low_v, high_v, of_column & low_tested,
-                                   of_column & high_tested & (cell + 1 <= p.last_z), to_x, to_y);
+      const Ends gold_after = gold_at(c + to_x);
+      Corners here = ends_of(c, gold_before, gold, gold_after, to_y);
+      here.ep = here.em = -unlimited;
+#if VDVR_LANES == 8
+      if (by_planes) {
+        // The last column belongs to the interval below it.
+        if (in_interval == f.per_x && ix < p.last_x) {
+          in_interval = 0;
+          ++interval;
+          near_0 = far_0;
+          near_1 = far_1;
+          far_0 = planes_at(&f, samples, &p.brick, row_first + interval + 1);
+          far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + interval + 1);
+        }
+        const float fx = (float)in_interval * f.of_x;
+        ++in_interval;
+        const float4 q = LERP(LERP(near_0, far_0, fx), LERP(near_1, far_1, fx), fy);
+        if (tested)
+          add_errors(&here, q.s0 * f.low_0 + q.s1 * f.low_1 + q.s2 * f.low_2,
+                     q.s0 * f.high_0 + q.s1 * f.high_1 + q.s2 * f.high_2, gold, low_tested, end_tested);
+      } else
 #endif
+          if (tested) {
+        const Column at = column_of(&p, ix, iy, grid, s.rate);
+#if VDVR_LANES == 1
+        const float low_v = field_at(&p, &at, samples, begin), high_v = field_at(&p, &at, samples, begin + 1);
+#else
+        float v[VDVR_LANES + 12];
+        field_along(&p, &at, samples, begin, v);
+        const VEC low_v = READ(v), high_v = READ(v + 1);
+#endif
+        add_errors(&here, low_v, high_v, gold, low_tested, end_tested);
+      }
+      c += to_x;
+      gold_before = gold;
+      gold = gold_after;
       if (ix > 0) {
         const Corners face = larger(left, here);
         if (iy > 0) {
           const Corners all = larger(before[ix - 1], face);
-          VEC below = (fmax(all.xp, 0.0f) + fmax(all.yp, 0.0f) + fmax(all.zp, 0.0f)) * 0.125f + rest,
-              above = (fmax(all.xm, 0.0f) + fmax(all.ym, 0.0f) + fmax(all.zm, 0.0f)) * 0.125f + rest;
+          VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * 0.125f + rest,
+              above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * 0.125f + rest;
           // Whatever is no number here is no bound.
           below = select(unlimited, below, below <= FLT_MAX);
           above = select(unlimited, above, above <= FLT_MAX);
@@ -277,10 +390,10 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           // slack.
           counts &= (-all.gm - below <= test.window_high) & (all.gp + above >= test.window_low);
 #endif
-          const VEC both = select(-unlimited, fmax(all.ep + below, all.em + above), counts);
-          largest_total = fmax(largest_total, both);
-          largest_error = fmax(largest_error, select(-unlimited, fmax(all.ep, all.em), counts));
-          if (test.parts && LARGEST(both) > test.tolerance) {
+          const VEC both = select(-unlimited, MORE(all.ep + below, all.em + above), counts);
+          largest_total = MORE(largest_total, both);
+          largest_error = MORE(largest_error, select(-unlimited, MORE(all.ep, all.em), counts));
+          if (test.parts && any(both > test.tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
             WRITE(below, belows);
@@ -290,7 +403,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                 parts |= failing_parts(&p, samples, grid, s, test, ix - 1, iy - 1, begin + i, belows[i],
                                        aboves[i]);
           }
-          largest_slack = fmax(largest_slack, select(-unlimited, fmax(below, above), counts));
+          largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));
         }
         before[ix - 1] = face;
       }

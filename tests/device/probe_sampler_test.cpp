@@ -27,6 +27,18 @@ BOOST_AUTO_TEST_CASE(charged_delta_is_never_below_what_was_measured) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(filters_are_the_same_with_and_without_rates) {
+  Device device;
+  const SamplerProbe filters = probe_filters(device), all = probe_sampler(device);
+  for (const SampleType type : {SampleType::f32, SampleType::u16, SampleType::u8}) {
+    BOOST_TEST(filters.of(type).image3d == all.of(type).image3d);
+    BOOST_TEST(filters.of(type).delta == all.of(type).delta);
+    BOOST_TEST(filters.of(type).constant_error == all.of(type).constant_error);
+  }
+  BOOST_TEST(filters.note == all.note);
+  BOOST_TEST(!all.chosen.empty());
+}
+
 BOOST_AUTO_TEST_CASE(probe_is_measured_once_per_device) {
   Device device;
   const SamplerProbe first = probe_sampler(device), second = probe_sampler(device);
