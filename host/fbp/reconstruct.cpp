@@ -202,6 +202,11 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   // it.
   std::optional<DirectFilter> direct;
   if (options.upsampling == 1) direct.emplace(state, scan, options.field, units);
+  // Without upsampling nothing is certified.
+  const Precision precision = options.upsampling == 1 ? Precision::fp32 : Precision::fp64;
+  // Of a scan that does not fit memory, only the rows of a slab, where they are the detector's.
+  std::optional<WindowFilter> window;
+  if (scan.data.scratch()) window.emplace(state, scan, options.field, precision, units);
   std::optional<FilteredScan> filtered;
   std::optional<Upsampler> upsampler;
   const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
@@ -210,10 +215,14 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
       watch.lap(state, "filter");
       if (slab) return std::move(*slab);
     }
+    if (window && !filtered) {
+      std::optional<UpsampledSlab> slab = (*window)(columns, rows, progress);
+      watch.lap(state, "filter");
+      if (slab) return std::move(*slab);
+    }
     if (!filtered) {
-      // Without upsampling nothing is certified.
-      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic,
-                                    direct ? Precision::fp32 : Precision::fp64, units);
+      filtered =
+          filter_projections(state, scan, options.field, progress, FilterMethod::automatic, precision, units);
       watch.lap(state, "filter");
       upsampler.emplace(state, *filtered);
     }
