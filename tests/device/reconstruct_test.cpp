@@ -130,6 +130,29 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_the_same_volume) {
   BOOST_TEST(small.peak_memory() <= (std::uint64_t{24} << 20));
 }
 
+BOOST_AUTO_TEST_CASE(planes_one_slab_after_the_other_are_the_volume) {
+  ProjectionSet scan = noise_scan(12, 300, 24);
+  // Nanometres in metres are computed in other units.
+  for (const double pitch : {1.0, 1e-9}) {
+    scan.geometry.pitch_u = scan.geometry.pitch_v = pitch;
+    const Grid grid = make_grid(scan.geometry, {});
+    Device device("", std::uint64_t{24} << 20);
+    const Volume whole = reconstruct(device, scan, grid, {});
+    std::vector<float> planes;
+    std::int64_t slabs = 0;
+    const std::int64_t plane = grid.samples()[0] * grid.samples()[1];
+    reconstruct_planes(device, scan, grid, {}, [&](std::int64_t first, std::span<const float> next) {
+      BOOST_TEST(first * plane == static_cast<std::int64_t>(planes.size()));
+      planes.insert(planes.end(), next.begin(), next.end());
+      ++slabs;
+    });
+    BOOST_TEST(slabs > 1);
+    // A slab of another height is rounded alike: its rows are products by themselves.
+    BOOST_TEST((planes == whole.samples));
+    BOOST_TEST(device.peak_memory() <= (std::uint64_t{24} << 20));
+  }
+}
+
 // Of a scan in scratch only a slab's rows are filtered where the grid's heights are the detector's, and all
 // of them, into scratch, where they are not.
 BOOST_AUTO_TEST_CASE(scan_in_scratch_gives_the_same_volume) {
