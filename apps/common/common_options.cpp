@@ -2,22 +2,41 @@
 
 #include <fmt/format.h>
 
+#include "vdvr/scratch.hpp"
+
 namespace vdvr::cli {
 
 void add_common(Arguments& args) {
   args.group("Common")
       .value("device", "INDEX|cpu|gpu|NAME", "OpenCL device (default: a GPU if there is one)")
-      .value("max-memory", "2G", "limit of our host and device allocations together")
+      .value("max-memory", "2G",
+             "limit of our host and device allocations together (default: half of what is free)")
+      .value("scratch", "DIR",
+             "where what does not fit that limit is kept meanwhile (default: the output's folder)")
       .flag("json", "one JSON object on standard output, nothing else")
       .flag("quiet", "no progress and no summary")
       .flag("force", "overwrite existing outputs")
       .flag("help,h", "this text");
 }
 
+namespace {
+
+// The output's own disk is the one that is known to be large; what has no output takes the library's default.
+std::filesystem::path scratch_folder(const Arguments& args) {
+  if (args.has("scratch")) return args.path("scratch");
+  if (!args.has("output")) return {};
+  const std::filesystem::path output = args.path("output");
+  return output.has_parent_path() ? output.parent_path() : std::filesystem::path(".");
+}
+
+}  // namespace
+
 CommonOptions common_options(const Arguments& args) {
   CommonOptions common;
   common.device = args.text_or("device", "");
-  if (args.has("max-memory")) common.max_memory = parse_bytes("--max-memory", args.text("max-memory"));
+  common.max_memory =
+      args.has("max-memory") ? parse_bytes("--max-memory", args.text("max-memory")) : half_of_free_memory();
+  common.scratch = scratch_folder(args);
   common.json = args.has("json");
   common.quiet = args.has("quiet");
   common.force = args.has("force");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -16,6 +17,7 @@ using Json = nlohmann::ordered_json;
 struct CommonOptions {
   std::string device;
   std::uint64_t max_memory = 0;
+  std::filesystem::path scratch;  ///< empty: the library's default
   bool json = false, quiet = false, force = false;
 };
 

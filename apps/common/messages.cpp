@@ -36,6 +36,7 @@ const std::set<std::string>& fields_with_options() {
                                            "resume",
                                            "roi",
                                            "sampler",
+                                           "scratch",
                                            "show",
                                            "size",
                                            "slice_position",

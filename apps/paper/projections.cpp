@@ -137,7 +137,7 @@ void add_spectra(Report& run, const ProjectionSet& scan, const Grid& grid, const
 
   const FilteredView view = strongest_view(run.device, scan, {}, run.progress);
   const std::int64_t middle = view.rows / 2;
-  const auto row_of = [&](const std::vector<float>& samples, std::int64_t first) {
+  const auto row_of = [&](std::span<const float> samples, std::int64_t first) {
     const auto begin = samples.begin() + first;
     return std::vector<float>(begin, begin + view.columns);
   };

@@ -45,7 +45,9 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
   options.center = field.center;
-  options.max_memory_bytes = common_options(args).max_memory;
+  const CommonOptions common = common_options(args);
+  options.max_memory_bytes = common.max_memory;
+  options.scratch = common.scratch;
   ProjectionSet scan = read_scan(path, options, progress);
   for (auto& note : check_scan(scan.geometry)) scan.report.notes.push_back(std::move(note));
   return scan;

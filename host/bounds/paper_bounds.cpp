@@ -86,9 +86,22 @@ class Derivatives {
 std::vector<Bound> paper_projection_bounds(opencl::State& state, const FilteredScan& scan,
                                            const std::vector<int>& rates) {
   const ParallelGeometry& g = scan.geometry;
-  Derivatives d(state, scan.samples, {g.rows, g.columns, 1}, {g.pitch_v, g.pitch_u, 1}, g.views());
-  const double uu = d.maximum({0, 2, 0}), vv = d.maximum({2, 0, 0}), uuv = d.maximum({1, 2, 0}),
-               uvv = d.maximum({2, 1, 0});
+  // So many views at once that three times as much stays small, whatever the scan's size.
+  constexpr std::int64_t together_samples = std::int64_t{16} << 20;
+  const std::int64_t view = g.rows * g.columns,
+                     together = std::clamp<std::int64_t>(together_samples / view, 1, g.views());
+  double uu = 0, vv = 0, uuv = 0, uvv = 0;
+  for (std::int64_t first = 0; first < g.views(); first += together) {
+    const std::int64_t n = std::min(together, g.views() - first);
+    Derivatives d(state,
+                  std::span<const float>(scan.samples)
+                      .subspan(static_cast<std::size_t>(first * view), static_cast<std::size_t>(n * view)),
+                  {g.rows, g.columns, 1}, {g.pitch_v, g.pitch_u, 1}, n);
+    uu += d.maximum({0, 2, 0});
+    vv += d.maximum({2, 0, 0});
+    uuv += d.maximum({1, 2, 0});
+    uvv += d.maximum({2, 1, 0});
+  }
   std::vector<Bound> out;
   for (const int rate : rates) {
     const double step = std::max(g.pitch_u, g.pitch_v) / rate;

@@ -335,7 +335,7 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
 }
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
-  host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, as read,");
+  host.count(scan.data.resident_bytes(), "the projections, as read,");
   host.count(4 * 4 * plan.base.samples.size(), "the base samples");
 }
 

@@ -77,7 +77,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"window",
        options.window ? exact_list(std::array{options.window->first, options.window->second}) : "none"},
       {"roi", options.roi ? exact_list(*options.roi) : "none"},
-      {"bricks per block, by `max_memory`", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
+      {"bricks per block", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
       {"tolerance of a node", exact(tolerance)},
       {"plan", digest(scan, plan)}};
   return head;

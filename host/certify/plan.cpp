@@ -291,7 +291,7 @@ class Planner {
   Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
           const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
       : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
-    host_.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, as read,");
+    host_.count(scan.data.resident_bytes(), "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
     ParallelGeometry used = scan.geometry;
     if (field.center) used.center = *field.center;

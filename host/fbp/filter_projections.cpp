@@ -12,6 +12,7 @@
 #include "host/fbp/ramp_kernel.hpp"
 #include "host/fbp/view_weights.hpp"
 #include "host/opencl/fft.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "host/system/huge_pages.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -134,7 +135,9 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
 
   out.fft_length = fft::good_length(2 * g.columns - 1);
   const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method, precision);
-  out.samples = large_zeros(static_cast<std::size_t>(scan.size()));
+  const auto size = static_cast<std::size_t>(scan.size());
+  out.samples = scan.data.scratch() ? SampleArray(size, scan.data.scratch(), "the filtered projections")
+                                    : SampleArray(large_zeros(size));
   out.view_max.assign(static_cast<std::size_t>(g.views()), 0.0);
   const LineIntegrals line_integrals(scan, units);
   (*filter)(line_integrals.data(), weights.weight, out.samples, progress);
@@ -166,6 +169,45 @@ std::optional<UpsampledSlab> DirectFilter::operator()(const UpsampledColumns& co
   UpsampledSlab slab = empty_slab(*state_, columns, v.size(), 0, g.views());
   if (!filter_->to_device(data_.data(), weights_, {&slab.values, -columns.pad, columns.count, v}, progress))
     return std::nullopt;
+  return slab;
+}
+
+WindowFilter::WindowFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                           Precision precision, const Units& units)
+    : state_(&state), scan_(&scan), field_(field), precision_(precision), units_(units) {}
+
+// Rows first .. first + rows - 1 of all views, as a scan of their own.
+ProjectionSet WindowFilter::window(std::int64_t first, std::int64_t rows) const {
+  const ParallelGeometry& g = scan_->geometry;
+  ProjectionSet out;
+  out.geometry = g;
+  out.geometry.rows = rows;
+  out.data = SampleArray(large_zeros(static_cast<std::size_t>(out.size())));
+  const std::int64_t run = rows * g.columns;
+  parallel_for(g.views(), {}, "", [&](std::int64_t k) {
+    std::copy_n(scan_->data.data() + (k * g.rows + first) * g.columns, run, out.data.data() + k * run);
+  });
+  return out;
+}
+
+std::optional<UpsampledSlab> WindowFilter::operator()(const UpsampledColumns& columns,
+                                                      std::span<const double> rows,
+                                                      const Progress& progress) {
+  const auto v = pixels_at(rows, scan_->geometry.rows, 0);
+  if (v.empty()) return std::nullopt;
+  const auto [first, last] = std::minmax_element(v.begin(), v.end());
+  const std::int64_t count = *last - *first + 1;
+  std::vector<double> within;
+  for (const std::int64_t pixel : v) within.push_back(static_cast<double>(pixel - *first));
+  HostMemory host(*state_);
+  host.count(2 * sizeof(float) *
+                 static_cast<std::uint64_t>(scan_->geometry.views() * scan_->geometry.columns * count),
+             fmt::format("{} rows of all projections", count));
+  const ProjectionSet own = window(*first, count);
+  const FilteredScan filtered =
+      filter_projections(*state_, own, field_, progress, FilterMethod::automatic, precision_, units_);
+  UpsampledSlab slab = Upsampler(*state_, filtered)(columns, within);
+  state_->queue.finish();  // before what it reads goes
   return slab;
 }
 

@@ -25,7 +25,7 @@ namespace vdvr {
 /// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
 struct FilteredScan {
   ParallelGeometry geometry;     ///< with the centre in use, in the units of the samples
-  std::vector<float> samples;    ///< [view][u][v]
+  SampleArray samples;           ///< [view][u][v]; lies where the scan's data do
   std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
   std::vector<double> view_max;  ///< max |q| of each view's samples
   double ramp_error =
@@ -34,8 +34,8 @@ struct FilteredScan {
 };
 
 /// What is certified is filtered in double precision and rounded once; fp32 is faster. Geometry and samples
-/// are in `units`. Cost: as RowFilter's. Memory: the filtered scan on the host, one chunk on the device;
-/// where line integrals are scaled, those once more.
+/// are in `units`. Cost: as RowFilter's. Memory: the filtered scan, on the host or in scratch as the scan
+/// is; one chunk on the device; where line integrals are scaled, those once more.
 FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                                 const Progress& progress = {}, FilterMethod method = FilterMethod::automatic,
                                 Precision precision = Precision::fp64, const Units& units = {});
@@ -51,7 +51,7 @@ class LineIntegrals {
 
  private:
   const ProjectionSet* scan_;
-  std::vector<float> scaled_;
+  SampleArray scaled_;
 };
 
 /// float values[row / 16][view][column][16]: one slab of rows, upsampled in u.
@@ -92,6 +92,29 @@ class DirectFilter {
 /// (upsample_columns.hpp), else by a product in short runs; `fast` by a product in long runs, or by
 /// transforms where columns are many.
 enum class ColumnMethod { fast, accurate };
+
+/// Slabs of a scan that lies in scratch, where their rows are the detector's own: only these are read and
+/// filtered, when they are asked for. The values are those of filter_projections and Upsampler but for the
+/// rounding of a product with the identity.
+class WindowFilter {
+ public:
+  /// Keeps references to the state and the scan. Samples are in `units`.
+  WindowFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+               Precision precision, const Units& units);
+  /// Nothing where a row lies between two of the detector's. Cost: the rows from the first to the last, read
+  /// and filtered. Memory: these, twice. Throws InputError for a view that is not finite, ResourceError.
+  std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
+                                          const Progress& progress);
+
+ private:
+  [[nodiscard]] ProjectionSet window(std::int64_t first, std::int64_t rows) const;
+
+  opencl::State* state_;
+  const ProjectionSet* scan_;
+  FieldOptions field_;
+  Precision precision_;
+  Units units_;
+};
 
 /// Terms of a run of the products along rows and along columns (batched_product.hpp). The former's errors are
 /// grown by the latter's matrix, and it is the smaller one.

@@ -15,6 +15,7 @@
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/reconstruct.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/huge_pages.hpp"
@@ -64,13 +65,22 @@ UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int up
 
 namespace {
 
+// Where a slab's planes go, zeros so far, and what is done once they are there.
+struct Planes {
+  std::function<float*(std::int64_t first, std::int64_t count)> target;
+  std::function<void(std::int64_t first, std::int64_t count)> done = [](std::int64_t, std::int64_t) {};
+  std::uint64_t bytes = 0;  // that a plane takes beside the slab; 0: counted elsewhere
+};
+
 using SlabMaker = std::function<UpsampledSlab(const UpsampledColumns&, std::span<const double>)>;
 
-// Rows of a slab whose projections take half of what is left.
+// Rows of a slab whose projections, and planes, take half of what is left.
 std::int64_t slab_rows(const opencl::State& state, const ParallelGeometry& g, const UpsampledColumns& columns,
-                       std::int64_t all) {
+                       std::int64_t all, std::uint64_t plane_bytes) {
   const std::uint64_t budget = state.memory.left() / 2;
-  const auto bytes = [&](std::int64_t rows) { return slab_bytes(state.info, g, columns, rows); };
+  const auto bytes = [&](std::int64_t rows) {
+    return slab_bytes(state.info, g, columns, rows) + static_cast<std::uint64_t>(rows) * plane_bytes;
+  };
   std::int64_t rows = std::min<std::int64_t>(all, 256);
   while (rows > 16 && bytes(rows) > budget) rows = (rows + 1) / 2;
   if (bytes(rows) > std::min(budget, state.info.max_allocation)) {
@@ -119,28 +129,23 @@ void transpose_row(std::span<const float> columns, std::int64_t stride, std::int
   }
 }
 
-Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
-                         const Grid& grid, int upsampling, Interpolation interpolation,
-                         const Progress& progress, StageWatch& watch) {
+void reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
+                       const Grid& grid, int upsampling, Interpolation interpolation, const Planes& planes,
+                       const Progress& progress, StageWatch& watch) {
   const Index3 n = grid.samples();
   const UpsampledColumns columns = columns_for(g, grid, upsampling);
-  const std::int64_t rows = slab_rows(state, g, columns, n[2]);
+  const std::int64_t rows = slab_rows(state, g, columns, n[2], planes.bytes);
   // A slab's columns take at most a quarter of what it leaves.
   const std::int64_t wanted =
       static_cast<std::int64_t>(state.memory.left() / 8) / (n[0] * column_stride(rows) * 4);
   const std::int64_t band = std::clamp<std::int64_t>(wanted, 1, std::min<std::int64_t>(n[1], 64));
 
-  // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
-  // left.
-  std::future<std::vector<float>> samples = std::async(std::launch::async | std::launch::deferred, [&] {
-    return large_zeros(static_cast<std::size_t>(grid.sample_count()));
-  });
   const auto kept = kept_columns(g, grid);
   if (std::none_of(kept.begin(), kept.end(), [](const auto& k) { return k[0] <= k[1]; }))
     throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
-  Volume volume{grid, {}};
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += rows) {
     const std::int64_t nz = std::min(rows, n[2] - z0), stride = column_stride(nz);
+    float* target = nullptr;
     const UpsampledSlab slab = make_slab(
         columns,
         detector_rows(g, grid.origin[2] + static_cast<double>(z0) * grid.spacing[2], grid.spacing[2], nz));
@@ -160,19 +165,44 @@ Volume reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const 
           {kept.begin() + y0, kept.begin() + y0 + ny}};
       back_project(state, g, slab, blocks, interpolation, out);
       watch.lap(state, "back-project");
-      if (samples.valid()) volume.samples = samples.get();
+      if (target == nullptr) target = planes.target(z0, nz);
       out.read_mapped([&](std::span<const float> columns_host) {
         parallel_for(ny, {}, "", [&](std::int64_t y) {
           transpose_row(columns_host.subspan(static_cast<std::size_t>(y * n[0] * stride)), stride, nz,
-                        kept[static_cast<std::size_t>(y0 + y)],
-                        volume.samples.data() + (z0 * n[1] + y0 + y) * n[0], n[0] * n[1]);
+                        kept[static_cast<std::size_t>(y0 + y)], target + (y0 + y) * n[0], n[0] * n[1]);
         });
       });
       watch.lap(state, "read back");
     }
+    planes.done(z0, nz);
   }
-  return volume;
 }
+
+// All of them as a volume.
+class WholeVolume {
+ public:
+  // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
+  // left.
+  explicit WholeVolume(const Grid& grid)
+      : volume_{grid, {}},
+        samples_(std::async(std::launch::async | std::launch::deferred,
+                            [n = grid.sample_count()] { return large_zeros(static_cast<std::size_t>(n)); })) {
+  }
+  [[nodiscard]] Planes planes() {
+    Planes out;
+    out.target = [this](std::int64_t first, std::int64_t) {
+      if (samples_.valid()) volume_.samples = samples_.get();
+      const Index3 n = volume_.grid.samples();
+      return volume_.samples.data() + first * n[0] * n[1];
+    };
+    return out;
+  }
+  [[nodiscard]] Volume take() { return std::move(volume_); }
+
+ private:
+  Volume volume_;
+  std::future<std::vector<float>> samples_;
+};
 
 }  // namespace
 
@@ -185,23 +215,31 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
     watch.lap(state, "upsample");
     return slab;
   };
-  return reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, interpolation, progress,
-                           watch);
+  WholeVolume volume(grid);
+  reconstruct_slabs(state, filtered.geometry, make_slab, grid, upsampling, interpolation, volume.planes(),
+                    progress, watch);
+  return volume.take();
 }
 
-Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
-                   const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
-  StageWatch watch(seconds);
+namespace {
+
+// In `units`, as the grid is.
+void reconstruct_scan(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+                      const ReconstructOptions& options, const Planes& planes, const Progress& progress,
+                      StageWatch& watch) {
   if (options.upsampling < 1 || options.upsampling > 64 ||
       (options.upsampling & (options.upsampling - 1)) != 0)
     throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", options.upsampling));
   opencl::State& state = device.state();
-  check_line_integrals(scan);
-  const Units units = units_of(scan);
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;
   if (options.upsampling == 1) direct.emplace(state, scan, options.field, units);
+  // Without upsampling nothing is certified.
+  const Precision precision = options.upsampling == 1 ? Precision::fp32 : Precision::fp64;
+  // Of a scan that does not fit memory, only the rows of a slab, where they are the detector's.
+  std::optional<WindowFilter> window;
+  if (scan.data.scratch()) window.emplace(state, scan, options.field, precision, units);
   std::optional<FilteredScan> filtered;
   std::optional<Upsampler> upsampler;
   const auto make_slab = [&](const UpsampledColumns& columns, std::span<const double> rows) {
@@ -210,10 +248,14 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
       watch.lap(state, "filter");
       if (slab) return std::move(*slab);
     }
+    if (window && !filtered) {
+      std::optional<UpsampledSlab> slab = (*window)(columns, rows, progress);
+      watch.lap(state, "filter");
+      if (slab) return std::move(*slab);
+    }
     if (!filtered) {
-      // Without upsampling nothing is certified.
-      filtered = filter_projections(state, scan, options.field, progress, FilterMethod::automatic,
-                                    direct ? Precision::fp32 : Precision::fp64, units);
+      filtered =
+          filter_projections(state, scan, options.field, progress, FilterMethod::automatic, precision, units);
       watch.lap(state, "filter");
       upsampler.emplace(state, *filtered);
     }
@@ -223,13 +265,50 @@ Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
   };
   ParallelGeometry geometry = from_world(scan.geometry, units);
   if (options.field.center) geometry.center = *options.field.center;
-  Volume volume = reconstruct_slabs(state, geometry, make_slab, from_world(grid, units), options.upsampling,
-                                    options.interpolation, progress, watch);
+  reconstruct_slabs(state, geometry, make_slab, grid, options.upsampling, options.interpolation, planes,
+                    progress, watch);
+}
+
+}  // namespace
+
+Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
+                   const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
+  StageWatch watch(seconds);
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
+  WholeVolume whole(from_world(grid, units));
+  reconstruct_scan(device, scan, units, from_world(grid, units), options, whole.planes(), progress, watch);
+  Volume volume = whole.take();
   if (units.are_world()) return volume;
   volume.grid = grid;
   check_densities(to_world(largest_magnitude(volume.samples), units));
   scale(volume.samples, units.density());
   return volume;
+}
+
+void reconstruct_planes(Device& device, const ProjectionSet& scan, const Grid& grid,
+                        const ReconstructOptions& options, const TakePlanes& take, const Progress& progress) {
+  StageWatch watch(nullptr);
+  check_line_integrals(scan);
+  const Units units = units_of(scan);
+  const Index3 n = grid.samples();
+  HostMemory host(device.state());
+  std::vector<float> slab;
+  Planes planes;
+  planes.bytes = sizeof(float) * static_cast<std::uint64_t>(n[0] * n[1]);
+  planes.target = [&](std::int64_t, std::int64_t count) {
+    if (slab.empty()) host.count(static_cast<std::uint64_t>(count) * planes.bytes, "planes of the volume");
+    slab.assign(static_cast<std::size_t>(count * n[0] * n[1]), 0.0f);
+    return slab.data();
+  };
+  planes.done = [&](std::int64_t first, std::int64_t) {
+    if (!units.are_world()) {
+      check_densities(to_world(largest_magnitude(slab), units));
+      scale(slab, units.density());
+    }
+    take(first, slab);
+  };
+  reconstruct_scan(device, scan, units, from_world(grid, units), options, planes, progress, watch);
 }
 
 }  // namespace vdvr

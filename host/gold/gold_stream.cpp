@@ -53,16 +53,10 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const Fie
   if (settings.midrange)
     fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
   halo_ = fit_halo_;
-  // About 16 x 16 x 32 base cells at once: large enough that halos are cheap, small enough for caches and
-  // --max-memory.
-  block_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
-  slab_bricks_ = std::max<std::int64_t>(1, 256 / (g * settings.rate));
-  const auto block_bytes = [&] {
-    const std::int64_t width = block_bricks_ * g * settings.rate + 1 + 2 * halo_;
-    return count(20 * width * width * (slab_bricks_ * g * settings.rate + 62 + 2 * halo_));
-  };
-  while (slab_bricks_ > 1 && block_bytes() > state.memory.left() / 5) slab_bricks_ /= 2;
-  while (block_bricks_ > 1 && block_bytes() > state.memory.left() / 5) block_bricks_ /= 2;
+  // About 16 x 16 x 16 base cells at once: large enough that halos are cheap, small enough for caches. Never
+  // by memory: fits of levels that are coarse along an axis look further than the halo, so that samples near a
+  // block's rim depend on where it lies. The same scan, grid and tolerance give the same volume.
+  block_bricks_ = slab_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
 }
 
 GoldStream::~GoldStream() = default;
@@ -196,23 +190,27 @@ std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
   return near;
 }
 
-// Coverage margins of gold's columns; columns beyond the grid are nobody's.
-std::vector<float> GoldStream::margins(const ColumnBlocks& columns) const {
+// Coverage margins of gold's columns; columns beyond the grid are nobody's. A column's place follows from its
+// number on the grid alone: it has the same margin in every block.
+std::vector<float> GoldStream::margins(const std::vector<std::array<std::int64_t, 3>>& first_brick,
+                                       std::int64_t nx, std::int64_t ny) const {
   const Grid& grid = settings_.grid;
-  std::vector<float> out(columns.first.size() * at(columns.nx * columns.ny));
-  std::array<double, 2> low{}, high{};
-  for (std::size_t a = 0; a < 2; ++a) {
-    const double rounding = 1e-6 * grid.spacing[a];
-    low[a] = grid.origin[a] - rounding;
-    high[a] = grid.origin[a] + static_cast<double>(grid.cells[a]) * grid.spacing[a] + rounding;
-  }
-  parallel_for(static_cast<std::int64_t>(columns.first.size()) * columns.ny, {}, "", [&](std::int64_t row) {
-    const auto& first = columns.first[at(row / columns.ny)];
-    const double y = first[1] + static_cast<double>(row % columns.ny) * columns.step_y;
-    for (std::int64_t i = 0; i < columns.nx; ++i) {
-      const double x = first[0] + static_cast<double>(i) * columns.step_x;
-      const bool inside = x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1];
-      out[at(row * columns.nx + i)] = inside ? static_cast<float>(coverage_.margin(x, y)) : beyond_grid;
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
+  std::vector<float> out(first_brick.size() * at(nx * ny));
+  const auto is_inside = [&](std::int64_t node, std::size_t a) {
+    return node >= 0 && node <= grid.cells[a] * settings_.rate;
+  };
+  const auto place = [&](std::int64_t node, std::size_t a) {
+    return grid.origin[a] + static_cast<double>(node) * (grid.spacing[a] / settings_.rate);
+  };
+  parallel_for(static_cast<std::int64_t>(first_brick.size()) * ny, {}, "", [&](std::int64_t row) {
+    const auto& first = first_brick[at(row / ny)];
+    const std::int64_t y = first[1] * side - halo_ + row % ny;
+    for (std::int64_t i = 0; i < nx; ++i) {
+      const std::int64_t x = first[0] * side - halo_ + i;
+      out[at(row * nx + i)] = is_inside(x, 0) && is_inside(y, 1)
+                                  ? static_cast<float>(coverage_.margin(place(x, 0), place(y, 1)))
+                                  : beyond_grid;
     }
   });
   return out;
@@ -275,26 +273,16 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
                             const OnBatch& on_batch, const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
-  const Grid& grid = settings_.grid;
-  const std::int64_t g = settings_.granularity;
-  const double hx = grid.spacing[0] / static_cast<double>(settings_.rate),
-               hy = grid.spacing[1] / static_cast<double>(settings_.rate);
   Batch batch(state_, settings_);
   const std::int64_t together = begin_batch(batch, work, slab_of(work));
-  ColumnBlocks columns{batch.shape_.nx + 2 * halo_, batch.shape_.ny + 2 * halo_, hx, hy, {}, {}};
-  const std::uint64_t block = count(columns.nx * columns.ny * batch.shape_.gold_stride);
+  const std::int64_t nx = batch.shape_.nx + 2 * halo_, ny = batch.shape_.ny + 2 * halo_;
+  const std::uint64_t block = count(nx * ny * batch.shape_.gold_stride);
   for (std::size_t begin = from; begin < work.first.size(); begin += at(together)) {
     const std::size_t n = std::min(at(together), work.first.size() - begin);
     batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
                   work.first.begin() + static_cast<std::ptrdiff_t>(begin + n)},
                  work.z, selected);
-    columns.first.clear();
-    for (const auto& f : batch.first_brick_)
-      columns.first.push_back(
-          {grid.origin[0] + static_cast<double>(f[0] * g) * grid.spacing[0] - static_cast<double>(halo_) * hx,
-           grid.origin[1] + static_cast<double>(f[1] * g) * grid.spacing[1] -
-               static_cast<double>(halo_) * hy});
-    batch.margins_ = margins(columns);
+    batch.margins_ = margins(batch.first_brick_, nx, ny);
     batch.margin_.write(batch.margins_);
     for (std::size_t b = 0; b < n; ++b)
       source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block,

@@ -106,7 +106,8 @@ class GoldStream {
 
  private:
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
-  [[nodiscard]] std::vector<float> margins(const ColumnBlocks& columns) const;
+  [[nodiscard]] std::vector<float> margins(const std::vector<std::array<std::int64_t, 3>>& first_brick,
+                                           std::int64_t nx, std::int64_t ny) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const std::vector<float>& margins,
                                                                 std::int64_t nx, std::int64_t ny) const;
   std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);

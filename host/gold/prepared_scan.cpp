@@ -47,7 +47,7 @@ PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, con
       field_(field),
       units_(units),
       checksum_(checksum(scan)) {
-  host_.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, filtered,");
+  host_.count(filtered.samples.resident_bytes(), "the projections, filtered,");
 }
 
 bool PreparedScan::is_of(const opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,

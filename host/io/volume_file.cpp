@@ -52,7 +52,7 @@ std::string nrrd_header(const Grid& grid) {
       grid.origin[0], grid.origin[1], grid.origin[2]);
 }
 
-void append_little_endian(std::ofstream& file, const std::vector<float>& samples) {
+void append_little_endian(std::ofstream& file, std::span<const float> samples) {
   if constexpr (std::endian::native == std::endian::little) {
     file.write(reinterpret_cast<const char*>(samples.data()),
                static_cast<std::streamsize>(samples.size() * sizeof(float)));
@@ -121,22 +121,55 @@ Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_b
   return volume;
 }
 
-void write_volume(const std::filesystem::path& path, const Volume& volume) {
+struct VolumeWriter::File {
+  File(const std::filesystem::path& to, const Grid& of)
+      : path(to), grid(of), target(to), stream(target.temporary(), std::ios::binary | std::ios::trunc) {}
+  std::filesystem::path path;
+  Grid grid;
+  io::AtomicFile target;
+  std::ofstream stream;
+  std::int64_t samples = 0;
+};
+
+VolumeWriter::VolumeWriter(const std::filesystem::path& path, const Grid& grid) {
   const std::string extension = extension_of(path);
   if (extension != ".mha" && extension != ".nrrd")
     throw InputError(fmt::format("{}: volumes are written as .mha or .nrrd", path.string()));
-  if (static_cast<std::int64_t>(volume.samples.size()) != volume.grid.sample_count())
-    throw InputError(fmt::format("{}: {} samples for a grid of {}", path.string(), volume.samples.size(),
-                                 io::shape_text(volume.grid.samples())));
-  if (volume.grid.unit.find_first_of("\n\r\"") != std::string::npos)
+  if (grid.unit.find_first_of("\n\r\"") != std::string::npos)
     throw InputError(fmt::format("{}: a unit may not hold quotes or line ends", path.string()));
-  io::AtomicFile target(path);
-  std::ofstream file(target.temporary(), std::ios::binary | std::ios::trunc);
-  file << (extension == ".mha" ? mha_header(volume.grid) : nrrd_header(volume.grid));
-  append_little_endian(file, volume.samples);
-  file.close();
-  if (!file) throw ResourceError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
-  target.commit();
+  file_ = std::make_unique<File>(path, grid);
+  const std::uint64_t bytes = io::checked_bytes(grid.samples(), sizeof(float), path.string());
+  std::error_code unknown;
+  const std::filesystem::space_info disk = std::filesystem::space(file_->target.temporary(), unknown);
+  if (!unknown && disk.available < bytes)
+    throw ResourceError(fmt::format(
+        "{}: takes {:.1f} MiB, but only {:.1f} MiB of its disk are free; write it to another, or choose a "
+        "smaller `size`",
+        path.string(), static_cast<double>(bytes) / 0x1p20, static_cast<double>(disk.available) / 0x1p20));
+  file_->stream << (extension == ".mha" ? mha_header(grid) : nrrd_header(grid));
+}
+
+VolumeWriter::~VolumeWriter() = default;
+
+void VolumeWriter::append(std::span<const float> samples) {
+  append_little_endian(file_->stream, samples);
+  file_->samples += static_cast<std::int64_t>(samples.size());
+}
+
+void VolumeWriter::commit() {
+  const std::string path = file_->path.string();
+  if (file_->samples != file_->grid.sample_count())
+    throw InputError(fmt::format("{}: {} samples for a grid of {}", path, file_->samples,
+                                 io::shape_text(file_->grid.samples())));
+  file_->stream.close();
+  if (!file_->stream) throw ResourceError(fmt::format("{}: cannot be written; is the disk full?", path));
+  file_->target.commit();
+}
+
+void write_volume(const std::filesystem::path& path, const Volume& volume) {
+  VolumeWriter file(path, volume.grid);
+  file.append(volume.samples);
+  file.commit();
 }
 
 }  // namespace vdvr

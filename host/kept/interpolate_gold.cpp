@@ -52,15 +52,18 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
         low[at(i / lanes_of_group)] = std::min(low[at(i / lanes_of_group)], j);
         high[at(i / lanes_of_group)] = std::max(high[at(i / lanes_of_group)], j);
       }
-  out.terms = 1;
+  constexpr std::int64_t run = AlongZ::run;
+  const auto in_runs = [](std::int64_t n) { return (n + run - 1) / run * run; };
+  out.terms = run;
   for (std::int64_t group = 0; group < groups; ++group)
-    out.terms = std::max(out.terms, high[at(group)] - low[at(group)] + 1);
+    out.terms = std::max(out.terms, in_runs(high[at(group)] + 1) - low[at(group)] / run * run);
   out.weights.assign(at(groups * out.terms * lanes_of_group), 0.0f);
   for (std::int64_t group = 0; group < groups; ++group) {
-    const std::int64_t first = std::clamp<std::int64_t>(low[at(group)], 0, inputs - out.terms);
+    const std::int64_t first =
+        std::clamp<std::int64_t>(low[at(group)] / run * run, 0, in_runs(inputs) - out.terms);
     out.first.push_back(to_int(first));
     for (std::int64_t lane = 0; lane < lanes_of_group && group * lanes_of_group + lane < outputs; ++lane)
-      for (std::int64_t j = 0; j < out.terms; ++j)
+      for (std::int64_t j = 0; j < std::min(out.terms, inputs - first); ++j)
         out.weights[at((group * out.terms + j) * lanes_of_group + lane)] =
             static_cast<float>(matrix[at((group * lanes_of_group + lane) * inputs + first + j)]);
   }

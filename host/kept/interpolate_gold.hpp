@@ -21,7 +21,9 @@ struct HeightWeights {
 };
 
 /// Of float matrix[output][input] whose entries outside a band are 0: groups of 16 outputs, each over as many
-/// inputs as the widest has. Throws std::logic_error where there is no input.
+/// inputs as the widest has, in whole runs of AlongZ that begin at a multiple of one: an output is rounded in
+/// the same way whatever outputs share its group. Reads up to a run beyond the last input. Throws
+/// std::logic_error where there is no input.
 HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs);
 
 /// The same on the device.

@@ -141,6 +141,15 @@ KeptGold::Span KeptGold::span(const GoldLattice& lattice, std::size_t axis, cons
   return s;
 }
 
+// From a multiple of a run on, by the grid's own count: a node's height is summed up alike in every box.
+KeptGold::Span KeptGold::heights_span(const GoldLattice& lattice, const GoldBox& box) const {
+  Span s = span(lattice, 2, box);
+  const std::int64_t low = floor_div(s.low, AlongZ::run) * AlongZ::run, last = s.low + s.count;
+  s.count = (last - low + AlongZ::run - 1) / AlongZ::run * AlongZ::run;
+  s.low = low;
+  return s;
+}
+
 ColumnBlocks KeptGold::blocks_of(std::span<const TileAt> tiles) const {
   ColumnBlocks blocks{side, side, spacing_[0], spacing_[1], {}, {}};
   for (const auto& [y, x] : tiles)
@@ -290,6 +299,8 @@ std::uint64_t KeptGold::run_bytes() const {
 
 const opencl::DeviceArray<float>& KeptGold::heights_of(const TileAt& tile, const Place& place) {
   if (const auto known = run_->tiles.find(tile); known != run_->tiles.end()) return known->second;
+  // Tiles that came later than the run were not foreseen by it: heights can be made again.
+  if (run_bytes() > state_.memory.left() / 2) run_->tiles.clear();
   opencl::DeviceArray<float>& out =
       run_->tiles
           .emplace(tile, opencl::DeviceArray<float>(state_, count(side * side * run_->stride),
@@ -308,7 +319,8 @@ const opencl::DeviceArray<float>& KeptGold::heights_of(const TileAt& tile, const
 
 // Of all rows where they are few, else of heights at half a pixel.
 void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) {
-  const Span s = span(lattice, 2, box);
+  const Span s = heights_span(lattice, box);
+  const std::int64_t before = span(lattice, 2, box).low - s.low;
   if (!few_rows()) require_run(s);
   if (heights_ && heights_->first == box.first[2] && heights_->nodes == box.nodes[2] &&
       heights_->phases == lattice.phases[2] && heights_->step == lattice.step[2])
@@ -329,7 +341,7 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
     for (std::int64_t n = 0; n < h.nodes; ++n) {
       const std::int64_t position = n + s.skipped, interval = position / h.phases,
                          phase = position % h.phases;
-      double* row = between.data() + n * s.count + interval * h.step;
+      double* row = between.data() + n * s.count + before + interval * h.step;
       if (phase == 0) row[taps_before] = 1;
       else
         for (std::int64_t t = 0; t < f.taps; ++t)
@@ -366,7 +378,7 @@ const Across& KeptGold::across_of(int phases, std::size_t axis) {
 // float out[y][x][padded]: gold's heights on kept columns.
 void KeptGold::take_heights(const GoldLattice& lattice, const GoldBox& box,
                             const opencl::DeviceArray<float>& out) {
-  const Span x = span(lattice, 0, box), y = span(lattice, 1, box), z = span(lattice, 2, box);
+  const Span x = span(lattice, 0, box), y = span(lattice, 1, box), z = heights_span(lattice, box);
   const std::int64_t padded = heights_->padded;
   for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
     for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {

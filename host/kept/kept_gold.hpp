@@ -88,6 +88,8 @@ class KeptGold {
     std::int64_t intervals = 0, skipped = 0;
   };
   [[nodiscard]] Span span(const GoldLattice& lattice, std::size_t axis, const GoldBox& box) const;
+  /// Along z, in whole runs of products wherever the box begins.
+  [[nodiscard]] Span heights_span(const GoldLattice& lattice, const GoldBox& box) const;
   [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice,
                                               const std::vector<GoldBox>& boxes) const;
   [[nodiscard]] double margin_of(const TileAt& tile) const;

@@ -49,7 +49,7 @@ void check_options(const ParallelGeometry& g, const D2vrOptions& options) {
 }
 
 // A detector of one row has no second one to blend with: it stands twice.
-std::vector<float> two_rows(const std::vector<float>& one) {
+std::vector<float> two_rows(std::span<const float> one) {
   std::vector<float> both;
   both.reserve(2 * one.size());
   for (const float q : one) both.insert(both.end(), 2, q);
@@ -62,7 +62,8 @@ void store_as_filtered(Projections& p, const FilteredScan& filtered) {
   const bool single = filtered.geometry.rows == 1;
   p.samples = DeviceArray<float>(
       *p.state, static_cast<std::uint64_t>(p.geometry.views() * p.columns * p.rows), "filtered projections");
-  p.samples.write(single ? two_rows(filtered.samples) : filtered.samples);
+  if (single) p.samples.write(two_rows(filtered.samples));
+  else p.samples.write(filtered.samples);
 }
 
 // Slabs are [row / 16][view][column][16]; kernels here want [view][column][row].

@@ -105,18 +105,24 @@ ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
   return g;
 }
 
-// Views per block: about 32 MiB as double keeps reads long and memory small.
-std::int64_t block_views(const io::RawScan& raw) {
-  constexpr std::int64_t block_samples = std::int64_t{1} << 22;
+// Views per block: about 32 MiB as double, less under a small limit, keeps reads long and memory small.
+std::int64_t block_views(const io::RawScan& raw, std::uint64_t max_memory_bytes) {
+  constexpr std::int64_t most_samples = std::int64_t{1} << 22;
+  const std::int64_t block_samples =
+      max_memory_bytes == 0 ? most_samples
+                            : std::min(most_samples, static_cast<std::int64_t>(max_memory_bytes / 64));
   return std::clamp<std::int64_t>(block_samples / (raw.rows * raw.columns), 1, raw.projections.count);
 }
 
 void require_room(const io::RawScan& raw, const ScanOptions& options, const std::string& name) {
   const std::array<std::int64_t, 3> all{raw.projections.count, raw.rows, raw.columns};
-  const std::array<std::int64_t, 3> block{block_views(raw), raw.rows, raw.columns};
-  const std::uint64_t bytes =
-      io::checked_bytes(all, sizeof(float), name) + 2 * io::checked_bytes(block, sizeof(double), name);
-  io::require_memory(bytes, options.max_memory_bytes, name + ": the projections");
+  const std::array<std::int64_t, 3> block{block_views(raw, options.max_memory_bytes), raw.rows, raw.columns};
+  const std::uint64_t samples = io::checked_bytes(all, sizeof(float), name),
+                      resident = options.max_memory_bytes == 0
+                                     ? samples
+                                     : std::min(samples, options.max_memory_bytes / 8);
+  io::require_memory(resident + 2 * io::checked_bytes(block, sizeof(double), name), options.max_memory_bytes,
+                     name + ": the projections");
 }
 
 // --- samples ---
@@ -144,14 +150,18 @@ void require_finite(std::span<const double> view, const io::RawScan& raw, std::i
                                   static_cast<std::int64_t>(i) % raw.columns, view[i]));
 }
 
-void read_samples(const io::RawScan& raw, ProjectionSet& scan, const Progress& progress) {
-  const std::int64_t size = raw.rows * raw.columns, step = block_views(raw);
+void read_samples(const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan,
+                  const Progress& progress) {
+  const std::int64_t size = raw.rows * raw.columns, step = block_views(raw, options.max_memory_bytes);
   FlatField field;
   if (raw.counts) {
     field = make_flat_field(raw.flats, raw.darks, raw.rows, raw.columns, raw.integer);
     scan.report.transmission_floor = field.floor;
   }
-  scan.data.resize(static_cast<std::size_t>(raw.projections.count * size));
+  const auto samples = static_cast<std::size_t>(raw.projections.count * size);
+  scan.data =
+      SampleArray(samples, scratch_for(samples * sizeof(float), options.max_memory_bytes, options.scratch),
+                  "the projections");
   std::vector<double> block(static_cast<std::size_t>(step * size));
   std::vector<std::int64_t> dead(static_cast<std::size_t>(step));
   std::atomic<bool> rounds = false;
@@ -271,7 +281,7 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
   const io::RawScan raw = open_scan(path, options, folder);
   static_cast<void>(geometry_of(raw, path.string()));
   require_room(raw, options, path.string());
-  const std::int64_t step = block_views(raw);
+  const std::int64_t step = block_views(raw, options.max_memory_bytes);
   std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
   for (const io::Frames* frames : {&raw.projections, &raw.flats, &raw.darks})
     for (std::int64_t first = 0; first < frames->count; first += step)
@@ -289,7 +299,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.geometry = geometry_of(raw, path.string());
   require_room(raw, options, path.string());
   const auto before = stamps_of(raw);
-  read_samples(raw, scan, progress);
+  read_samples(raw, options, scan, progress);
   scan.report.sha256 = hash_of(raw, folder);
   if (const auto after = stamps_of(raw); after != before) {
     const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();

@@ -15,11 +15,10 @@ ProjectionSet rows_of(const ProjectionSet& scan, std::int64_t first, std::int64_
   out.geometry = g;
   out.geometry.rows = rows;
   out.report = scan.report;
-  out.data.reserve(static_cast<std::size_t>(g.views() * rows * g.columns));
-  for (std::int64_t k = 0; k < g.views(); ++k) {
-    const auto begin = scan.data.begin() + (k * g.rows + first) * g.columns;
-    out.data.insert(out.data.end(), begin, begin + rows * g.columns);
-  }
+  const std::int64_t run = rows * g.columns;
+  out.data = SampleArray(std::vector<float>(static_cast<std::size_t>(g.views() * run)));
+  for (std::int64_t k = 0; k < g.views(); ++k)
+    std::copy_n(scan.data.data() + (k * g.rows + first) * g.columns, run, out.data.data() + k * run);
   return out;
 }
 

@@ -36,7 +36,7 @@ void by_runs(std::size_t samples, Body&& body) {
 
 }  // namespace
 
-double largest_magnitude(const std::vector<float>& samples) {
+double largest_magnitude(std::span<const float> samples) {
   float largest = 0;
   std::mutex lock;
   by_runs(samples.size(), [&](std::size_t first, std::size_t last) {
@@ -56,7 +56,7 @@ Units units_of(const ProjectionSet& scan) {
   return units;
 }
 
-void scale(std::vector<float>& samples, int exponent) {
+void scale(std::span<float> samples, int exponent) {
   if (exponent == 0) return;
   by_runs(samples.size(), [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) samples[i] = std::ldexp(samples[i], exponent);

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -33,10 +34,10 @@ struct Units {
 Units units_of(const ProjectionSet& scan);
 
 /// The largest |sample|, 0 of none; a sample that is NaN does not count.
-double largest_magnitude(const std::vector<float>& samples);
+double largest_magnitude(std::span<const float> samples);
 
 /// 2^exponent times every sample; exact but for what leaves the normal numbers of fp32.
-void scale(std::vector<float>& samples, int exponent);
+void scale(std::span<float> samples, int exponent);
 
 /// What is given in `units` in world units.
 double to_world(double density, const Units& units);

@@ -88,7 +88,7 @@ FineDetector fine_detector(const SimulateOptions& o) {
   return d;
 }
 
-// Samples and bytes, checked in 64 bits before anything is allocated.
+// Samples and bytes, checked in 64 bits before anything is allocated. A result in scratch takes its share.
 void check_memory(const SimulateOptions& o, unsigned threads) {
   const auto limit = static_cast<double>(std::numeric_limits<std::int64_t>::max() / 1024);
   const double fine = static_cast<double>(o.columns) * o.binning * static_cast<double>(o.rows) * o.binning;
@@ -96,11 +96,12 @@ void check_memory(const SimulateOptions& o, unsigned threads) {
       static_cast<double>(o.angles) * static_cast<double>(o.columns) * static_cast<double>(o.rows) * 4;
   const double block =
       std::max(static_cast<double>(block_samples), static_cast<double>(o.columns) * o.binning * 16);
-  const double bytes =
-      result + threads * (fine * 8 * (o.median > 1 || o.gaussian_u > 0 || o.gaussian_v > 0 ? 3 : 2) +
-                          block * 8 + static_cast<double>(o.columns) * o.binning * 16 * 16 * 8);
+  const double share = static_cast<double>(o.max_memory_bytes / 8);
+  const double bytes = (o.max_memory_bytes > 0 ? std::min(result, share) : result) +
+                       threads * (fine * 8 * (o.median > 1 || o.gaussian_u > 0 || o.gaussian_v > 0 ? 3 : 2) +
+                                  block * 8 + static_cast<double>(o.columns) * o.binning * 12 * 16);
   const bool over = o.max_memory_bytes > 0 && bytes > static_cast<double>(o.max_memory_bytes);
-  if (over || !(bytes < limit))
+  if (over || !(bytes < limit) || !(result < limit))
     throw ResourceError(fmt::format(
         "simulate: {} views of {} x {} with binning {} need {:.1f} MiB on {} threads{}; use fewer "
         "views, a smaller detector or less binning",
@@ -189,7 +190,7 @@ class Simulator {
     return static_cast<float>(value);
   }
 
-  void run(double noise, double from, const Progress& progress, std::vector<float>& data) {
+  void run(double noise, double from, const Progress& progress, std::span<float> data) {
     const auto size = static_cast<std::size_t>(options_.columns * options_.rows);
     ViewLoop(options_.angles, threads_)
         .run(
@@ -306,7 +307,10 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
                      static_cast<double>(options.columns - 1) / 2,
                      options.unit,
                      simulator.theta()};
-    scan.data.resize(static_cast<std::size_t>(scan.size()));
+    const auto size = static_cast<std::size_t>(scan.size());
+    scan.data =
+        SampleArray(size, scratch_for(size * sizeof(float), options.max_memory_bytes, options.scratch),
+                    "the projections");
     const bool noisy = options.noise_sigma > 0;
     const double noise = noisy ? options.noise_sigma * simulator.largest(progress) : 0;
     simulator.run(noise, noisy ? 0.5 : 0, progress, scan.data);

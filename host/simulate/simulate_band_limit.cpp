@@ -1,87 +1,107 @@
-// The ideal low-pass as a matrix product, halved by its symmetry: w[i][n] = w[U-1-i][N-1-n], so the even and
-// odd parts of a row about the detector's middle give the even and odd parts of the result. Rows go through
-// in batches, so that a row of weights is built once for all of them. Equations in the header; called by
-// simulate.cpp.
+// The ideal low-pass by transforms. Equations in the header; called by simulate.cpp.
 #include "host/simulate/simulate_band_limit.hpp"
 
-#include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
 
+#include "host/system/casts.hpp"
+
 namespace vdvr {
 namespace {
 
-constexpr std::int64_t batch = 16;  // rows at once: tuning only
+using std::numbers::pi;
+using Complex = std::complex<double>;
 
-using Lane = std::array<double, batch>;
+// Two phases, f and 15 - f, share a transform.
+constexpr std::int64_t pairs = BandLimiter::rate / 2;
 
-// acc[r] = sum_n weights[n] part[n][r]
-Lane product(const std::vector<double>& weights, const double* part) {
-  Lane sum{};
-  for (const double w : weights) {
-    for (std::size_t r = 0; r < batch; ++r) sum[r] += w * part[r];
-    part += batch;
-  }
-  return sum;
+// The period itself where it is a power of two; else whatever holds every distance of a pixel from a sample.
+std::int64_t transform_length(std::int64_t columns) {
+  const std::uint64_t period = count(2 * columns);
+  return static_cast<std::int64_t>(std::has_single_bit(period) ? period
+                                                               : std::bit_ceil(count(3 * columns - 1)));
+}
+
+// D(pi q / (2 N)) / (2 N) at odd q.
+double dirichlet(std::int64_t q, std::int64_t columns) {
+  const std::int64_t n = BandLimiter::rate * columns;
+  // Even, and of period 4 N. The numerator's argument pi q (2U - 1) / (4N) is reduced in integers: its sine
+  // is right for wide detectors too.
+  q = std::abs(q) % (4 * n);
+  const std::int64_t turn = q * (2 * columns - 1) % (8 * n);
+  const double unit = pi / static_cast<double>(4 * n);
+  return std::sin(unit * static_cast<double>(turn)) /
+         (std::sin(unit * static_cast<double>(q)) * static_cast<double>(2 * n));
+}
+
+// std::complex's own product looks for NaN.
+Complex product(Complex a, Complex b) {
+  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
 }  // namespace
 
-BandLimiter::BandLimiter(std::int64_t columns) : columns_(columns) {
-  const std::int64_t n = rate * columns;
-  kernel_.resize(static_cast<std::size_t>(2 * n));
-  for (std::int64_t j = 0; j < 2 * n; ++j) {
-    // The numerator's argument pi q (2U - 1) / (4N) is reduced in integers: its sine is right for wide
-    // detectors too.
-    const std::int64_t q = 2 * j + 1, turn = (q % (8 * n)) * (2 * columns - 1) % (8 * n);
-    const double unit = std::numbers::pi / static_cast<double>(4 * n);
-    kernel_[static_cast<std::size_t>(j)] =
-        std::sin(unit * static_cast<double>(turn)) /
-        (std::sin(unit * static_cast<double>(q)) * static_cast<double>(2 * n));
+BandLimiter::BandLimiter(std::int64_t columns) : columns_(columns), transform_(transform_length(columns)) {
+  const std::int64_t length = transform_length(columns);
+  std::vector<std::size_t> element(at(length));  // by frequency
+  for (std::int64_t i = 0; i < length; ++i) element[at(transform_.bin_at(i))] = at(i);
+  for (std::int64_t i = 0; i < length; ++i)
+    negated_.push_back(element[at((length - transform_.bin_at(i)) % length)]);
+  for (std::int64_t f = 0; f < pairs; ++f) {
+    const std::vector<Complex> own = spectrum_of(f), mirrored = spectrum_of(rate - 1 - f);
+    forwards_.insert(forwards_.end(), own.begin(), own.end());
+    for (std::int64_t i = 0; i < length; ++i) {
+      // A sequence backwards has the frequencies negated, and begins 2 U - 1 later.
+      const std::int64_t turn = transform_.bin_at(i) * (2 * columns - 1) % length;
+      backwards_.push_back(product(mirrored[at(i)], std::polar(1.0, -2 * pi * static_cast<double>(turn) /
+                                                                        static_cast<double>(length))));
+    }
   }
 }
 
-void BandLimiter::apply(std::span<const double> fine, std::span<double> out) const {
-  const std::int64_t n = rate * columns_, rows = static_cast<std::int64_t>(out.size()) / columns_;
-  std::vector<double> parts(static_cast<std::size_t>(n * batch));
-  for (std::int64_t row = 0; row < rows; row += batch)
-    apply_batch(fine.data() + row * n, std::min(batch, rows - row), out.data() + row * columns_, parts);
+// Of D at the distances of pixels from the samples `phase` of all pixels, and of the inverse's 1 / length.
+std::vector<Complex> BandLimiter::spectrum_of(std::int64_t phase) const {
+  const std::int64_t length = transform_length(columns_),
+                     lowest = length == 2 * columns_ ? -columns_ : 1 - 2 * columns_;
+  std::vector<Complex> kernel(at(length));
+  for (std::int64_t lag = lowest; lag < columns_; ++lag)
+    kernel[at((lag + length) % length)] =
+        dirichlet(rate * (2 * lag + 1) - 2 * phase - 1, columns_) / static_cast<double>(length);
+  transform_.forward(kernel);
+  return kernel;
 }
 
-void BandLimiter::apply_batch(const double* fine, std::int64_t rows, double* out,
-                              std::vector<double>& parts) const {
-  const std::int64_t n = rate * columns_, half = n / 2;
-  double* even = parts.data();
-  double* odd = parts.data() + half * batch;
-  std::fill(parts.begin(), parts.end(), 0.0);
-  for (std::int64_t r = 0; r < rows; ++r)
-    for (std::int64_t k = 0; k < half; ++k) {
-      const double a = fine[r * n + k], b = fine[r * n + n - 1 - k];
-      even[k * batch + r] = (a + b) / 2;
-      odd[k * batch + r] = (a - b) / 2;
+void BandLimiter::apply(std::span<const double> fine, std::span<double> out) const {
+  const std::int64_t rows = static_cast<std::int64_t>(out.size()) / columns_;
+  std::vector<Complex> phase(negated_.size()), sum(negated_.size());
+  for (std::int64_t row = 0; row < rows; row += 2)
+    apply_pair(fine.data() + row * rate * columns_, row + 1 < rows, out.data() + row * columns_, phase, sum);
+}
+
+// One row as the real part, the next as the imaginary one: weights are real.
+void BandLimiter::apply_pair(const double* fine, bool two, double* out, std::vector<Complex>& phase,
+                             std::vector<Complex>& sum) const {
+  const double* second = fine + (two ? rate * columns_ : 0);
+  const std::size_t length = phase.size();
+  std::fill(sum.begin(), sum.end(), Complex{});
+  for (std::int64_t f = 0; f < pairs; ++f) {
+    for (std::int64_t i = 0; i < columns_; ++i) {
+      const std::int64_t own = rate * i + f, mirror = rate * i + rate - 1 - f;
+      phase[at(i)] = {fine[own], second[own]};
+      phase[at(2 * columns_ - 1 - i)] = {fine[mirror], second[mirror]};
     }
-  std::vector<double> even_weights(static_cast<std::size_t>(half)),
-      odd_weights(static_cast<std::size_t>(half));
-  const auto kernel = [this](std::int64_t q) {
-    return kernel_[static_cast<std::size_t>((std::abs(q) - 1) / 2)];
-  };
-  const auto weight = [&](std::int64_t i, std::int64_t k) {
-    const std::int64_t centre = rate * (2 * i + 1);  // of pixel i, in units of pi / (2 N)
-    return kernel(centre - 2 * k - 1) + kernel(centre + 2 * k + 1);
-  };
-  for (std::int64_t i = 0; i < (columns_ + 1) / 2; ++i) {
-    for (std::int64_t k = 0; k < half; ++k) {
-      const double a = weight(i, k), b = weight(i, n - 1 - k);
-      even_weights[static_cast<std::size_t>(k)] = a + b;
-      odd_weights[static_cast<std::size_t>(k)] = a - b;
-    }
-    const Lane e = product(even_weights, even), o = product(odd_weights, odd);
-    for (std::int64_t r = 0; r < rows; ++r) {
-      out[r * columns_ + i] = e[static_cast<std::size_t>(r)] + o[static_cast<std::size_t>(r)];
-      out[r * columns_ + columns_ - 1 - i] = e[static_cast<std::size_t>(r)] - o[static_cast<std::size_t>(r)];
-    }
+    std::fill(phase.begin() + 2 * columns_, phase.end(), Complex{});
+    transform_.forward(phase);
+    const Complex *ahead = forwards_.data() + at(f) * length, *back = backwards_.data() + at(f) * length;
+    for (std::size_t i = 0; i < length; ++i)
+      sum[i] += product(ahead[i], phase[i]) + product(back[i], phase[negated_[i]]);
+  }
+  transform_.inverse(sum);
+  for (std::int64_t i = 0; i < columns_; ++i) {
+    out[i] = sum[at(i)].real();
+    if (two) out[columns_ + i] = sum[at(i)].imag();
   }
 }
 

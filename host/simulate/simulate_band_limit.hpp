@@ -9,11 +9,16 @@
 //   out[i] = sum_n w[i][n] in[n],  w[i][n] = (D(b_i - b_n) + D(b_i + b_n)) / (2 N),
 //   D(x) = 1 + 2 sum_{m=1}^{U-1} cos(m x) = sin((U - 1/2) x) / sin(x / 2),  b_i = pi (i + 1/2) / U, b_n = pi
 //   (n + 1/2) / N.
+// Mirrored beyond the last pixel, samples f of all pixels are a sequence of period 2 U, on which D acts as a
+// convolution; samples 15 - f are the same sequence backwards. So eight transforms and one back do two rows.
 #pragma once
 
+#include <complex>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "host/opencl/host_fft.hpp"
 
 namespace vdvr {
 
@@ -23,15 +28,22 @@ class BandLimiter {
 
   explicit BandLimiter(std::int64_t columns);
 
-  /// double fine[rows][rate * columns] -> out[rows][columns]. Cost: rows * 8 columns^2 multiplications.
-  /// Thread-safe.
+  /// double fine[rows][rate * columns] -> out[rows][columns]. Cost: nine transforms of two to six times the
+  /// columns for every two rows. Thread-safe.
   void apply(std::span<const double> fine, std::span<double> out) const;
 
  private:
-  void apply_batch(const double* fine, std::int64_t rows, double* out, std::vector<double>& parts) const;
+  using Complex = std::complex<double>;
+
+  [[nodiscard]] std::vector<Complex> spectrum_of(std::int64_t phase) const;
+  void apply_pair(const double* fine, bool two, double* out, std::vector<Complex>& phase,
+                  std::vector<Complex>& sum) const;
 
   std::int64_t columns_;
-  std::vector<double> kernel_;  ///< D(pi q / (2 N)) / (2 N) at odd q = 2 j + 1, j = 0 .. 2 N - 1
+  fft::HostFft transform_;
+  std::vector<std::size_t> negated_;  ///< where the spectrum's order has the frequency -k of element i
+  std::vector<Complex> forwards_,
+      backwards_;  ///< [f < 8][element]: what samples f and 15 - f are multiplied by
 };
 
 }  // namespace vdvr

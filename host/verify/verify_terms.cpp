@@ -256,7 +256,7 @@ Differences compare_terms(Device& device, const ProjectionSet& scan, const Exact
                           const Progress& progress) {
   Differences out;
   HostMemory host(device.state());
-  host.count(4 * static_cast<std::uint64_t>(scan.size()), "the projections, filtered,");
+  host.count(scan.data.resident_bytes(), "the projections, filtered,");
   host.count(4 * static_cast<std::uint64_t>(volume.grid.sample_count()), "the base samples");
   const Units units = units_of(scan);
   if (!units.are_world()) host.count(volume.base.bytes(), "the stored field in other units");

@@ -9,6 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include "vdvr/sample_array.hpp"
+
 namespace vdvr {
 
 struct ParallelGeometry {
@@ -41,7 +43,7 @@ struct InputReport {
 /// Line integrals, float data[view][row v][column u].
 struct ProjectionSet {
   ParallelGeometry geometry;
-  std::vector<float> data;
+  SampleArray data;
   InputReport report;
 
   [[nodiscard]] std::int64_t size() const { return geometry.views() * geometry.rows * geometry.columns; }

@@ -15,6 +15,9 @@ struct ScanOptions {
   std::optional<std::filesystem::path> angles_file;  ///< for MHA/NRRD stacks; degrees, one per view
   std::optional<double> center;                      ///< overrides the file's; in columns
   std::uint64_t max_memory_bytes = 0;                ///< 0: no limit
+  /// Folder of the scratch files that hold a scan of more than an eighth of the limit, and what is made of it
+  /// as a whole; empty: default_scratch_folder().
+  std::filesystem::path scratch;
 };
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'

@@ -1,9 +1,13 @@
 // Uniform filtered back-projection, and the grid it runs on.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
@@ -48,6 +52,16 @@ struct ReconstructOptions {
 VDVR_API Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
                             const ReconstructOptions& options, const Progress& progress = {},
                             StageSeconds* seconds = nullptr);
+
+/// Planes first_z .. of a volume, float[z][y][x]; valid during the call. May throw to stop.
+using TakePlanes = std::function<void(std::int64_t first_z, std::span<const float> planes)>;
+
+/// The same, handed over from the first plane to the last in slabs that --max-memory leaves room for: of
+/// grids of any size. Of a scan in scratch whose rows the grid's planes coincide with, only these are
+/// filtered.
+VDVR_API void reconstruct_planes(Device& device, const ProjectionSet& scan, const Grid& grid,
+                                 const ReconstructOptions& options, const TakePlanes& take,
+                                 const Progress& progress = {});
 
 /// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
 /// Returns notes for the user: limited angle, grouped views.

@@ -81,11 +81,13 @@ struct SimulateOptions {
   int binning = 1;  ///< fine pixels per detector pixel, both ways; their mean is the pixel
 
   std::uint64_t max_memory_bytes = 0;  ///< 0: no limit
+  std::filesystem::path scratch;       ///< as ScanOptions::scratch
 };
 
 /// Views at k * arc / angles. Cost: angles * rows * columns (* binning^2, * 16 band-limited) line integrals
-/// over all cores, twice with noise (its size needs the largest integral first), plus angles * rows * 8
-/// columns^2 for the low-pass. Memory: the result, and per core about one fine view in double. The same
+/// over all cores, twice with noise (its size needs the largest integral first), plus for the low-pass nine
+/// transforms of two to six times the columns for every two rows. Memory: the result, in a scratch file where
+/// it takes more than an eighth of the limit, and per core about one fine view in double. The same
 /// options give the same noise on any number of cores. Progress is called from the calling thread only and
 /// may throw. Throws InputError, ResourceError.
 VDVR_API ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options,

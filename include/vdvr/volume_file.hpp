@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <span>
 
 #include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
@@ -19,6 +21,25 @@ VDVR_API bool is_volume_input(const std::filesystem::path& path);
 VDVR_API std::filesystem::path file_of_volume(const std::filesystem::path& path);
 /// float32, by extension .mha or .nrrd; whole or not at all.
 VDVR_API void write_volume(const std::filesystem::path& path, const Volume& volume);
+
+/// The same file from planes that come one after the other.
+class VDVR_API VolumeWriter {
+ public:
+  /// Throws InputError (extension, unit), ResourceError where the disk has no room for the whole.
+  VolumeWriter(const std::filesystem::path& path, const Grid& grid);
+  ~VolumeWriter();
+  VolumeWriter(const VolumeWriter&) = delete;
+  VolumeWriter& operator=(const VolumeWriter&) = delete;
+  /// The next samples, x fastest.
+  void append(std::span<const float> samples);
+  /// Puts the file in place. Throws InputError unless all samples of the grid have come, ResourceError.
+  void commit();
+
+ private:
+  struct File;
+  std::unique_ptr<File> file_;
+};
+
 /// True when the extension is one of MHA or NRRD.
 VDVR_API bool is_volume_path(const std::filesystem::path& path);
 

@@ -280,6 +280,36 @@ BOOST_AUTO_TEST_CASE(tiles_are_made_once_and_those_beyond_reach_never) {
   BOOST_TEST(finite);
 }
 
+// Of many rows heights are made in two steps, the second in groups of 16 from where the box begins: the
+// groups' terms must not show.
+BOOST_AUTO_TEST_CASE(node_is_the_same_in_every_box) {
+  for (const std::int64_t rows : {5, 70}) {
+    const ProjectionSet scan = noise_scan(11, rows, 40, 3);
+    Chain chain(scan);
+    const Grid grid = grid_in({8, 8, 8}, {1, 1, 1}, {-4, -4, -4});
+    KeptGold kept(device().state(), chain.filtered, chain.sups, grid, 1, 8, Interpolation::six_taps);
+    for (const int rate : {1, 2, 4, 8}) {
+      const GoldLattice lattice = kept.lattice(grid, rate);
+      const GoldBox all = whole(grid, rate, 0);
+      const Nodes expected = nodes_of(kept, lattice, all);
+      std::int64_t different = 0;
+      for (const std::int64_t skipped : {1, 3, 4, 7}) {
+        GoldBox part = all;
+        for (std::size_t a = 0; a < 3; ++a) {
+          part.first[a] += skipped;
+          part.nodes[a] = std::min<std::int64_t>(19, all.nodes[a] - skipped);
+        }
+        const Nodes made = nodes_of(kept, lattice, part);
+        for (std::int64_t z = part.first[2]; z < part.first[2] + part.nodes[2]; ++z)
+          for (std::int64_t y = part.first[1]; y < part.first[1] + part.nodes[1]; ++y)
+            for (std::int64_t x = part.first[0]; x < part.first[0] + part.nodes[0]; ++x)
+              different += made.at(x, y, z) != expected.at(x, y, z) ? 1 : 0;
+      }
+      BOOST_TEST(different == 0, different << " nodes of " << rows << " rows at rate " << rate);
+    }
+  }
+}
+
 // Rows go through the device in runs where memory is short.
 BOOST_AUTO_TEST_CASE(little_memory_changes_no_bit) {
   const ProjectionSet scan = noise_scan(24, 70, 40, 3);

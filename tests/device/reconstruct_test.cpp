@@ -130,6 +130,56 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_the_same_volume) {
   BOOST_TEST(small.peak_memory() <= (std::uint64_t{24} << 20));
 }
 
+BOOST_AUTO_TEST_CASE(planes_one_slab_after_the_other_are_the_volume) {
+  ProjectionSet scan = noise_scan(12, 300, 24);
+  // Nanometres in metres are computed in other units.
+  for (const double pitch : {1.0, 1e-9}) {
+    scan.geometry.pitch_u = scan.geometry.pitch_v = pitch;
+    const Grid grid = make_grid(scan.geometry, {});
+    Device device("", std::uint64_t{24} << 20);
+    const Volume whole = reconstruct(device, scan, grid, {});
+    std::vector<float> planes;
+    std::int64_t slabs = 0;
+    const std::int64_t plane = grid.samples()[0] * grid.samples()[1];
+    reconstruct_planes(device, scan, grid, {}, [&](std::int64_t first, std::span<const float> next) {
+      BOOST_TEST(first * plane == static_cast<std::int64_t>(planes.size()));
+      planes.insert(planes.end(), next.begin(), next.end());
+      ++slabs;
+    });
+    BOOST_TEST(slabs > 1);
+    // A slab of another height is rounded alike: its rows are products by themselves.
+    BOOST_TEST((planes == whole.samples));
+    BOOST_TEST(device.peak_memory() <= (std::uint64_t{24} << 20));
+  }
+}
+
+// Of a scan in scratch only a slab's rows are filtered where the grid's heights are the detector's, and all
+// of them, into scratch, where they are not.
+BOOST_AUTO_TEST_CASE(scan_in_scratch_gives_the_same_volume) {
+  const ProjectionSet scan = noise_scan(12, 300, 24);
+  ProjectionSet stored = scan;
+  // A disk, which a temporary folder need not be.
+  stored.data =
+      SampleArray(scan.data.size(), std::make_shared<Scratch>(".", std::uint64_t{1} << 20), "a scan");
+  std::copy(scan.data.begin(), scan.data.end(), stored.data.begin());
+  for (const double height : {0.0, 0.25})
+    for (const int upsampling : {1, 8}) {
+      Grid grid = make_grid(scan.geometry, {});
+      grid.origin[2] += (20 + height) * grid.spacing[2];
+      grid.cells[2] = 270;  // more than a slab
+      ReconstructOptions options;
+      options.upsampling = upsampling;
+      Device device("", std::uint64_t{24} << 20);
+      const Volume a = reconstruct(device, scan, grid, options),
+                   b = reconstruct(device, stored, grid, options);
+      double worst = 0;
+      for (std::size_t i = 0; i < a.samples.size(); ++i)
+        worst =
+            std::max(worst, std::abs(static_cast<double>(a.samples[i]) - static_cast<double>(b.samples[i])));
+      BOOST_TEST(worst <= tolerance::fp32_sum(400, field_scale(scan, {})));
+    }
+}
+
 // The acceptance of the project's contract: half a percent of the density, the same at any pitch.
 BOOST_AUTO_TEST_CASE(sphere_keeps_its_density_inside_and_nothing_outside_at_any_pitch) {
   constexpr double half_a_percent = 0.005;

@@ -72,7 +72,7 @@ BOOST_AUTO_TEST_CASE(folder_is_read_in_natural_order) {
   const ProjectionSet part = read_scan(folder.path());
   BOOST_TEST(part.geometry.theta_rad ==
              std::vector<double>(scan.geometry.theta_rad.begin() + 1, scan.geometry.theta_rad.begin() + 3));
-  BOOST_TEST(part.data == std::vector<float>(scan.data.begin() + V * U, scan.data.begin() + 3 * V * U));
+  BOOST_TEST((part.data == std::vector<float>(scan.data.begin() + V * U, scan.data.begin() + 3 * V * U)));
 }
 
 BOOST_AUTO_TEST_CASE(natural_order_counts) {
@@ -147,7 +147,7 @@ BOOST_AUTO_TEST_CASE(stack_is_read_with_its_angles_file) {
   BOOST_TEST(scan.geometry.rows == 1);
   BOOST_TEST(scan.geometry.columns == 3);
   BOOST_TEST(scan.geometry.pitch_v == 2);
-  BOOST_TEST(scan.data == (std::vector<float>{'a', 'b', 'c', 'd', 'e', 'f'}));
+  BOOST_TEST((scan.data == std::vector<float>{'a', 'b', 'c', 'd', 'e', 'f'}));
   BOOST_TEST(scan.report.sha256 == sha256_of_file(stack));
   BOOST_TEST(has(refusal(data / "aps-tooth", options), "angles file"));
   options.angles_file = folder.file("angles.txt", "0\n90\n180\n");

@@ -162,6 +162,24 @@ BOOST_DATA_TEST_CASE(written_volume_is_read_back_to_the_bit,
   }
 }
 
+BOOST_DATA_TEST_CASE(volume_in_parts_is_the_same_file_and_is_whole_or_not_there,
+                     boost::unit_test::data::make({"v.mha", "v.nrrd"}), name) {
+  const TemporaryFolder folder;
+  const Volume volume = ramp();
+  write_volume(folder / name, volume);
+  const std::string parts = std::string("parts-") + name;
+  {
+    VolumeWriter file(folder / parts, volume.grid);
+    const std::span<const float> all = volume.samples;
+    file.append(all.first(7));
+    BOOST_CHECK_THROW(file.commit(), InputError);
+    file.append(all.subspan(7));
+    BOOST_TEST(!std::filesystem::exists(folder / parts));
+    file.commit();
+  }
+  BOOST_TEST(support::bytes_of(folder / parts) == support::bytes_of(folder / name));
+}
+
 BOOST_AUTO_TEST_CASE(big_endian_shorts_in_a_detached_file_are_read) {
   const TemporaryFolder folder;
   std::string raw;

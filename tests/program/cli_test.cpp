@@ -57,6 +57,24 @@ BOOST_AUTO_TEST_CASE(every_command_explains_itself) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(scan_of_more_than_an_eighth_of_the_limit_goes_to_scratch_and_leaves_nothing) {
+  const std::string scan = at("scratch.h5"), folder = at("scratch"), volume = folder + "/o.mha";
+  BOOST_REQUIRE(run({"simulate", "--phantom", "sphere", "--detector", "64x64", "--angles", "200", "--point",
+                     "-o", scan})
+                    .code == 0);
+  fs::create_directory(folder);
+  // Where scratch cannot be made, it is not made: so it was asked for.
+  const Ended refused =
+      run({"reconstruct", scan, "--max-memory", "24M", "--scratch", at("nowhere"), "-o", volume});
+  BOOST_TEST(refused.code == 3);
+  BOOST_TEST(refused.err.find("--scratch") != std::string::npos, refused.err);
+  const Ended made = run({"reconstruct", scan, "--max-memory", "24M", "--scratch", ".", "-o", volume});
+  BOOST_TEST(made.code == 0, made.err);
+  std::vector<std::string> left;
+  for (const auto& entry : fs::directory_iterator(folder)) left.push_back(entry.path().filename().string());
+  BOOST_TEST(left == std::vector<std::string>{"o.mha"}, boost::test_tools::per_element());
+}
+
 BOOST_AUTO_TEST_CASE(unknown_words_are_refused_in_one_line) {
   BOOST_TEST(run({"frobnicate"}).code == 2);
   for (const auto& command : kCommands) {

@@ -17,6 +17,11 @@
 namespace vdvr::cli {
 namespace {
 
+// Files on the disk while planning, which build will need again.
+std::uint64_t scratch_bytes(const ProjectionSet& scan) {
+  return scan.data.scratch() ? scan.data.scratch()->peak_bytes() : 0;
+}
+
 Json plan_json(const Planned& p) {
   const Plan& plan = p.plan;
   return {{"epsilon", plan.epsilon},
@@ -32,6 +37,7 @@ Json plan_json(const Planned& p) {
           {"foreseen",
            {{"gold_samples", plan.gold_samples},
             {"memory_bytes", plan.memory_bytes},
+            {"scratch_bytes", scratch_bytes(p.scan)},
             {"seconds", plan.seconds},
             {"samples_ratio", plan.samples_ratio}}},
           {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
@@ -60,6 +66,9 @@ void print_plan(const Planned& p) {
       "foreseen       {:.3f} samples stored per base sample, {} of memory, {:.1f} s, {} gold samples per "
       "pass\n",
       plan.samples_ratio, bytes_text(plan.memory_bytes), plan.seconds, plan.gold_samples);
+  if (const std::uint64_t bytes = scratch_bytes(p.scan); bytes > 0)
+    fmt::print("  scratch      {} of files while it runs, since the scan takes an eighth of --max-memory\n",
+               bytes_text(bytes));
   print_notes(plan.notes);
 }
 

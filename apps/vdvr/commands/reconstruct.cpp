@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <span>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
@@ -40,12 +42,19 @@ int reconstruct_command(Arguments& args) {
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, options.field, progress.callback());
   const Grid grid = make_grid(scan.geometry, grid_wanted);
-  const Volume volume = reconstruct(device, scan, grid, options, progress.callback());
-  throw_if_stopped();
-  write_volume(output, volume);
+  VolumeWriter file(output, grid);
+  float lo = std::numeric_limits<float>::infinity(), hi = -lo;
+  const auto take = [&](std::int64_t, std::span<const float> planes) {
+    throw_if_stopped();
+    const auto [low, high] = std::minmax_element(planes.begin(), planes.end());
+    lo = std::min(lo, *low);
+    hi = std::max(hi, *high);
+    file.append(planes);
+  };
+  reconstruct_planes(device, scan, grid, options, take, progress.callback());
+  file.commit();
   progress.clear();
 
-  const auto [lo, hi] = std::minmax_element(volume.samples.begin(), volume.samples.end());
   const Json json = {{"output", output.string()},
                      {"geometry", geometry_json(scan.geometry)},
                      {"report", report_json(scan.report)},
@@ -53,14 +62,14 @@ int reconstruct_command(Arguments& args) {
                      {"upsampling", options.upsampling},
                      {"u_filter", text_of(options.interpolation)},
                      {"filter", text_of(options.field.filter)},
-                     {"range", {*lo, *hi}},
+                     {"range", {lo, hi}},
                      {"device", device.info().name},
                      {"seconds", seconds_json(progress.seconds())}};
   print_result(common, json, [&] {
     print_scan(scan);
     print_grid(grid);
     fmt::print("reconstructed  u {}x {}, filter {}: {:.6g} to {:.6g}\n", options.upsampling,
-               text_of(options.interpolation), text_of(options.field.filter), *lo, *hi);
+               text_of(options.interpolation), text_of(options.field.filter), lo, hi);
     print_seconds(progress.seconds());
     fmt::print("written        {}\n", output.string());
   });

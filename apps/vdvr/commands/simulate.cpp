@@ -108,7 +108,9 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
     if (!(scan.gaussian_u >= 0 && scan.gaussian_v >= 0))
       throw InputError(fmt::format("--gaussian: {} has a part below 0", args.text("gaussian")));
   }
-  scan.max_memory_bytes = common_options(args).max_memory;
+  const CommonOptions common = common_options(args);
+  scan.max_memory_bytes = common.max_memory;
+  scan.scratch = common.scratch;
   scan.seed = static_cast<std::uint64_t>(args.integer_or("seed", 1, 0, std::int64_t{1} << 62));
 }
 
