@@ -323,7 +323,9 @@ BOOST_AUTO_TEST_CASE(finer_gold_bounds_the_same_bricks_by_less) {
     errors.push_back(error);
     BOOST_TEST(error <= total);
   }
-  BOOST_TEST(totals.back() - errors.back() < 0.1 * (totals.front() - errors.front()));
+  // What is left is what F errs at nodes, in differences and between: docs/error-bounds.md, step 4.
+  BOOST_TEST(totals.back() - errors.back() <
+             0.02 * (totals.front() - errors.front()) + 5.25 * field.arithmetic());
 }
 
 BOOST_AUTO_TEST_CASE(little_memory_gives_the_same_verdict) {
