@@ -133,7 +133,8 @@ BOOST_AUTO_TEST_CASE(F_is_within_its_bound_at_every_node) {
                                 {"below the pitch", noise_scan(11, 7, 18, 4), {0.7, 0.6, 0.5}},
                                 {"above the pitch", noise_scan(9, 19, 23, 5), {1.9, 2, 1.7}},
                                 {"one row", noise_scan(12, 1, 19, 6), {1, 1, 1}},
-                                {"two rows", noise_scan(40, 2, 20, 7), {0.9, 0.9, 0.4}}};
+                                {"two rows", noise_scan(40, 2, 20, 7), {0.9, 0.9, 0.4}},
+                                {"beyond the detector", noise_scan(9, 4, 5, 8), {2, 2, 1}}};
   for (const Case& c : cases) {
     const Grid grid = grid_of({3, 2, c.scan.geometry.rows == 1 ? 1 : 2}, c.spacing);
     const int across = nodes_across(grid, c.scan.geometry);
