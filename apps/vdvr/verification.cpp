@@ -66,6 +66,8 @@ Json verification_json(const VerifyResult& m, const Certificate& c) {
           {"seams", m.seams},
           {"points_evaluated", m.points_evaluated},
           {"worst_share", m.worst_share},
+          {"field_points", m.field_points},
+          {"field_share", m.field_share},
           {"differences", m.differences},
           {"failure", m.failure}};
 }
@@ -89,6 +91,9 @@ void print_verification(const VerifyResult& m, const Certificate& c) {
   if (m.points_evaluated > 0)
     fmt::print("    {:<18} {} between nodes: at most {:.1f} % of what the certificate bounds there\n",
                "points", m.points_evaluated, 100 * m.worst_share);
+  if (m.field_points > 0)
+    fmt::print("    {:<18} {} by chance: verify's own F errs by at most {:.2g} % of what it charges\n",
+               "nodes", m.field_points, 100 * m.field_share);
   for (const std::string& what : m.differences) fmt::print("    DIFFERS            {}\n", what);
 }
 

@@ -9,12 +9,14 @@
 #include <map>
 #include <numeric>
 #include <random>
+#include <utility>
 
 #include "host/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
+#include "host/verify/verify_points.hpp"
 #include "host/verify/verify_scope.hpp"
 #include "host/verify/verify_seams.hpp"
 #include "host/verify/verify_terms.hpp"
@@ -159,91 +161,144 @@ int finest_rate(const MixedVolume& v) {
   return rate;
 }
 
+// Up to where |V - F| is to be bounded: what samplers leave of epsilon, and what the certificate says.
+struct Limits {
+  double promised = 0, stated = 0;
+};
+
 // What is known of bricks from all rates of gold at which they were tested: every rate bounds |V - F|, and a
 // finer one by less (docs/error-bounds.md, "What verify does").
 class TestedBricks {
  public:
   struct Brick {
-    double total = -1;  // the smallest bound of all rates; negative: not tested
-    double error = 0;   // the largest |V - F| at a node of any rate
-    double least = 0;   // what |V - F| is at least: that, less what F was computed with
-    double finer = 0;   // the same at rates beyond the volume's own
-    Index3 cell{};      // where the bound is attained
-    int rate = 0;       // and at which rate
-    int tried = 0;      // the finest rate at which it was tested
+    double total = -1;   // the smallest bound of all rates; negative: not tested
+    double error = 0;    // the largest |V - F| at a node of any rate
+    double least = 0;    // what |V - F| is at least: that, less what F was computed with
+    double finer = 0;    // the same at rates beyond the volume's own
+    Index3 cell{};       // where the bound is attained
+    int rate = 0;        // and at which rate
+    int tried = 0;       // the finest rate at which it was tested
+    bool again = false;  // whether one rate did not decide
   };
-  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, const Progress& progress)
-      : field_(field), volume_(volume), attack_(attack), progress_(progress), bricks_(volume.level.size()) {}
+  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, const Limits& limits,
+               bool windowed, const Progress& progress)
+      : field_(field),
+        volume_(volume),
+        attack_(attack),
+        limits_(limits),
+        windowed_(windowed),
+        progress_(progress),
+        bricks_(volume.level.size()),
+        now_(volume.level.size()) {}
 
-  void test(const std::vector<std::uint8_t>& selected, int rate, VerifyResult& result) {
-    std::vector<Brick> now(bricks_.size());
-    field_.run(
-        selected, rate,
-        [&](const VerifyField::Piece& p) {
-          if (p.total < 0) return;
-          Brick& b = now[at(p.brick)];
-          b.error = std::max(b.error, p.error);
-          if (rate == volume_.rate) {
-            attack_.consider(p);
-            result.cells_tested += p.cells;
-            result.nodes_tested += p.nodes;
-          }
-          if (p.total <= b.total) return;
-          b.total = p.total;
-          b.cell = p.worst_cell;
-        },
-        progress_);
-    for (std::size_t i = 0; i < now.size(); ++i) {
-      if (!selected[i]) continue;
-      // Cells that only the coarser gold tested hold no point of which the certificate speaks.
-      if (rate > volume_.rate) now[i].total = std::max(0.0, now[i].total);
-      if (now[i].total >= 0) take(bricks_[i], now[i], rate);
-    }
+  /// Tests bricks at the first rate at which they can be, and those that it leaves undecided, or that are
+  /// `looked_at`, on finer gold made of the same nodes.
+  void sweep(const std::vector<std::uint8_t>& selected, const std::vector<std::uint8_t>& looked_at,
+             VerifyResult& result) {
+    const int first = std::min(volume_.rate, field_.across());
+    std::vector<int> rates{first};
+    // Gold coarser than the nodes that determine F is its own.
+    if (first == field_.across())
+      while (rates.back() < std::min(finest_rate(volume_), std::max(2 * volume_.rate, 4 * first)))
+        rates.push_back(2 * rates.back());
+    const auto wants = [&](std::size_t i, int rate) {
+      take(i);
+      const Brick& b = bricks_[i];
+      if (b.tried == 0) return rate >= field_.least_rate(i) || rate == rates.back();
+      return undecided(b) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
+                              rate <= 2 * std::max(first, field_.least_rate(i)));
+    };
+    run(selected, rates, wants, result);
   }
 
-  /// Tests bricks again on finer gold, the worst first, until none may err by more than `limit`. Ends early
-  /// where one does so at a node, or still may at the finest rate.
-  void settle(double limit, VerifyResult& result) {
+  /// Tests bricks again on finer gold, the worst first, until none may err by more than the limits. Ends
+  /// early where one does so at a node, or still may at the finest rate.
+  void settle(VerifyResult& result) {
     const int finest = finest_rate(volume_);
-    for (std::size_t most = 8;; most *= 2) {
-      std::vector<std::size_t> over;
-      for (std::size_t i = 0; i < bricks_.size(); ++i)
-        if (bricks_[i].total > limit) over.push_back(i);
-      const bool hopeless = std::any_of(over.begin(), over.end(), [&](std::size_t i) {
-        return !(bricks_[i].least <= limit) || bricks_[i].tried >= finest;
-      });
-      if (over.empty() || hopeless) return;
-      most = std::min(most, over.size());
-      std::partial_sort(over.begin(), over.begin() + static_cast<std::ptrdiff_t>(most), over.end(),
-                        [&](std::size_t a, std::size_t b) { return bricks_[a].total > bricks_[b].total; });
-      over.resize(most);
-      int rate = finest;
-      for (const std::size_t i : over) rate = std::min(rate, 2 * bricks_[i].tried);
-      std::vector<std::uint8_t> selected(bricks_.size(), 0);
-      for (const std::size_t i : over) selected[i] = bricks_[i].tried < rate;
-      test(selected, rate, result);
-    }
+    for (const double limit : {limits_.promised, limits_.stated})
+      for (std::size_t most = 8;; most *= 2) {
+        std::vector<std::size_t> over;
+        for (std::size_t i = 0; i < bricks_.size(); ++i)
+          if (bricks_[i].total > limit) over.push_back(i);
+        const bool hopeless = std::any_of(over.begin(), over.end(), [&](std::size_t i) {
+          return !(bricks_[i].least <= limit) || bricks_[i].tried >= finest;
+        });
+        if (over.empty() || hopeless) break;
+        most = std::min(most, over.size());
+        std::partial_sort(over.begin(), over.begin() + static_cast<std::ptrdiff_t>(most), over.end(),
+                          [&](std::size_t a, std::size_t b) { return bricks_[a].total > bricks_[b].total; });
+        over.resize(most);
+        int rate = finest;
+        for (const std::size_t i : over) rate = std::min(rate, 2 * bricks_[i].tried);
+        std::vector<std::uint8_t> selected(bricks_.size(), 0);
+        for (const std::size_t i : over) selected[i] = bricks_[i].tried < rate;
+        run(
+            selected, {rate}, [](std::size_t, int) { return true; }, result);
+      }
   }
 
   [[nodiscard]] const std::vector<Brick>& bricks() const { return bricks_; }
 
  private:
-  void take(Brick& known, const Brick& now, int rate) {
+  // A brick that errs by more at a node is wrong at every rate, and all is then.
+  [[nodiscard]] bool undecided(const Brick& b) const {
+    if (hopeless_ || b.total <= std::min(limits_.promised, limits_.stated)) return false;
+    return b.total > limits_.promised || b.least <= limits_.stated;
+  }
+
+  void run(const std::vector<std::uint8_t>& selected, const std::vector<int>& rates,
+           const std::function<bool(std::size_t, int)>& wants, VerifyResult& result) {
+    field_.run(
+        selected, rates, wants,
+        [&](const VerifyField::Piece& p) {
+          Brick& b = now_[at(p.brick)];
+          b.tried = p.rate;
+          if (p.total < 0) return;
+          if (bricks_[at(p.brick)].tried == 0) {
+            result.cells_tested += p.cells;
+            result.nodes_tested += p.nodes;
+          }
+          attack_.consider(p);
+          b.error = std::max(b.error, p.error);
+          // Cells of coarser gold may meet a window where the certificate's own do not.
+          if (windowed_ && p.rate < volume_.rate) b.error = 0;
+          b.least = std::max(b.least, b.error - p.arithmetic);
+          if (p.total <= b.total) return;
+          b.total = p.total;
+          b.cell = p.worst_cell;
+        },
+        progress_);
+    for (std::size_t i = 0; i < now_.size(); ++i) take(i);
+    result.arithmetic = std::max(result.arithmetic, field_.arithmetic());
+  }
+
+  // What all pieces of a brick gave at one rate.
+  void take(std::size_t i) {
+    Brick& known = bricks_[i];
+    Brick now = std::exchange(now_[i], {});
+    if (now.tried == 0) return;
+    // Cells that only the coarser gold tested hold no point of which the certificate speaks.
+    if (known.total >= 0) now.total = std::max(0.0, now.total);
+    known.again = known.again || (known.tried > 0 && undecided(known));
+    known.tried = now.tried;
     known.error = std::max(known.error, now.error);
-    known.tried = rate;
-    double& least = rate > volume_.rate ? known.finer : known.least;
-    least = std::max(least, now.error - field_.arithmetic());
-    if (known.total >= 0 && known.total <= now.total) return;
+    double& least = now.tried > volume_.rate ? known.finer : known.least;
+    least = std::max(least, now.least);
+    hopeless_ = hopeless_ || !(now.least <= limits_.promised);
+    if (now.total < 0 || (known.total >= 0 && known.total <= now.total)) return;
     known.total = now.total;
     known.cell = now.cell;
-    known.rate = rate;
+    known.rate = now.tried;
   }
 
   VerifyField& field_;
   const MixedVolume& volume_;
   TotalAttack& attack_;
+  Limits limits_;
+  bool windowed_;
   const Progress& progress_;
-  std::vector<Brick> bricks_;
+  std::vector<Brick> bricks_, now_;
+  bool hopeless_ = false;
 };
 
 // What the promised samplers that this device has leave of epsilon for |V - F| itself.
@@ -307,11 +362,14 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
-  TestedBricks tested(field, volume, attack, progress);
-  tested.test(selected, volume.rate, result);
-  result.arithmetic = field.arithmetic();
-  tested.settle(left_by_samplers(stored, sampler), result);
-  tested.settle(stored.measured_total + stored.budget.arithmetic.value, result);
+  const FieldPoints points_of_field(exact, volume, selected, options.seed);
+  field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
+  TestedBricks tested(
+      field, volume, attack,
+      {left_by_samplers(stored, sampler), stored.measured_total + stored.budget.arithmetic.value},
+      stored.window.has_value(), progress);
+  tested.sweep(selected, points_of_field.flags(), result);
+  tested.settle(result);
 
   std::int64_t worst = -1, broken = -1;
   const std::vector<TestedBricks::Brick>& bricks = tested.bricks();
@@ -320,7 +378,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     if (b.total < 0) continue;
     ++result.bricks_tested;
     result.measured_max = std::max(result.measured_max, b.error);
-    if (b.tried > volume.rate) ++result.bricks_finer;
+    if (b.again) ++result.bricks_finer;
     result.finest_rate = std::max(result.finest_rate, b.tried);
     // With a window a brick of which build tested nothing may have cells here, whose range is widened by
     // more.
@@ -367,6 +425,13 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   if (result.holds && !points.failure.empty()) {
     result.holds = false;
     result.failure = points.failure;
+  }
+  const FieldPoints::Outcome seen = FieldPoints::compare(exact, field.seen(), progress);
+  result.field_points = seen.points;
+  result.field_share = seen.worst_share;
+  if (!seen.failure.empty()) {
+    result.holds = false;
+    result.failure = seen.failure;
   }
   // Rates that name no gold have been found already.
   if (result.differences.empty())

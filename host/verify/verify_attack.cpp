@@ -49,10 +49,12 @@ void TotalAttack::consider(const VerifyField::Piece& b) {
   for (std::int64_t j = 0; j < side * side; ++j) {
     const VerifyField::Column& c = b.columns[at(j)];
     if (!(c.total >= 0)) continue;
-    const double share = (b.unit * static_cast<double>(c.total) + b.constant) / bound;
+    const double own_share = b.unit * static_cast<double>(c.total) / bound;
     const Index3& first = b.first_cell;
-    if (share > 1)
-      own.push_back({share, b.brick, {first[0] + j % side, first[1] + j / side, first[2] + c.worst_z}});
+    // What is the same in all cells of the brick tells nothing of one.
+    if (own_share + b.constant / bound > 1)
+      own.push_back(
+          {own_share, b.brick, b.rate, {first[0] + j % side, first[1] + j / side, first[2] + c.worst_z}});
   }
   const auto worse = [](const Cell& a, const Cell& c) { return a.excess > c.excess; };
   const std::size_t kept = std::min(own.size(), most_cells_of_brick);
@@ -79,7 +81,7 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
       for (std::size_t a = 0; a < 3; ++a) {
         const double cell =
             static_cast<double>(brick[a] * volume_.granularity) +
-            (static_cast<double>(cells[i].cell[a]) + 0.5 * static_cast<double>(half[a])) / volume_.rate;
+            (static_cast<double>(cells[i].cell[a]) + 0.5 * static_cast<double>(half[a])) / cells[i].rate;
         p[a] = volume_.grid.origin[a] + cell * volume_.grid.spacing[a];
       }
       if (!exact.covered(p)) return;

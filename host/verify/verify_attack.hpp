@@ -34,8 +34,9 @@ class TotalAttack {
 
  private:
   struct Cell {
-    double excess = 0;  ///< verify's bound, as a share of the certificate's
+    double excess = 0;  ///< verify's bound less what it charges all cells, as a share of the certificate's
     std::int64_t brick = 0;
+    int rate = 1;
     Index3 cell{0, 0, 0};
   };
   [[nodiscard]] double certified(std::int64_t brick) const;

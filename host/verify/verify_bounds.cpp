@@ -8,6 +8,7 @@
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_cosines.hpp"
+#include "host/verify/verify_lagrange.hpp"
 
 namespace vdvr {
 namespace {
@@ -67,8 +68,80 @@ ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry&
   return sups;
 }
 
+namespace {
+
+/// Errors of one kind: of nodes from which gold is made, or of gold. Axes x, y, z.
+struct ErrorKind {
+  double size = 0;
+  std::array<AxisNorms, 3> norms;  // what is formed along each axis is at most so many times as large
+};
+
+/// The sums over views of |q|, |q_uu| and the sixth derivative in u.
+struct Sums {
+  double value = 0, second_u = 0, sixth_u = 0;
+};
+
+// docs/error-bounds.md, "What verify does", step 1: each row of its table is one kind.
+std::vector<ErrorKind> error_kinds(const Sums& S, double host_rounding, const ParallelGeometry& g,
+                                   const Vec3& h, const NodePath& path) {
+  const double d = g.pitch_u / static_cast<double>(fine_columns),
+               slope = std::min(pi / g.pitch_u * S.value, std::sqrt(2 * S.value * S.second_u));
+  const double columns = static_cast<double>(fine_columns * (g.columns + 2)),
+               runs = static_cast<double>((g.views() + views_per_run - 1) / views_per_run),
+               row_runs = static_cast<double>((path.terms + rows_per_run - 1) / rows_per_run);
+  const double column = (u * (4 * path.reach + 6) + 0x1p-48 * columns) * d * slope +
+                        3.515625 / 720 * std::pow(d, 6) * S.sixth_u;
+  const double row =
+      u * (28 + 1.01 * (static_cast<double>(views_per_run + 1 + path.calls) + 1.01 * runs * runs * u)) *
+          S.value +
+      1.4 * host_rounding;
+  const double product = 1.01 * u * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * u);
+
+  const LagrangeFilter filter = lagrange_filter(path.across), along = lagrange_filter(path.along);
+  const AxisNorms across = filter.norms, each, band = band_norms(pi * h[2] / g.pitch_v);
+  std::vector<ErrorKind> kinds;
+  if (path.rows) {
+    // What the rows hold is a function of the band, whatever they err.
+    kinds.push_back({column, {across, across, band}});
+    kinds.push_back({path.gain * row, {across, across, band}});
+    kinds.push_back({path.gain * product * S.value, {across, across, each}});
+  } else {
+    kinds.push_back({column + row, {across, across, along.norms}});
+    if (path.along > 1) kinds.push_back({along.norms.value * product * S.value, {across, across, each}});
+  }
+  double interpolation = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool made = a < 2 ? path.across > 1 : !path.rows && path.along > 1;
+    if (made) interpolation *= 1 + lagrange_error(path.band[a]);
+  }
+  const double L = filter.norms.value,
+               passes = path.across > 1 ? 1.01 * u * (lagrange_points + 1) * (L * L + L) * S.value : 0;
+  kinds.push_back({(interpolation - 1) * S.value + passes, {each, each, each}});
+  return kinds;
+}
+
+void add_errors(FieldBounds& b, const ErrorKind& kind) {
+  const auto product = [&](const std::array<double, 3>& f) { return kind.size * f[0] * f[1] * f[2]; };
+  std::array<double, 3> value{};
+  for (std::size_t a = 0; a < 3; ++a) value[a] = kind.norms[a].value;
+  b.arithmetic += product(value);
+  for (std::size_t j = 0; j < 3; ++j) {
+    std::array<double, 3> f = value;
+    f[j] = kind.norms[j].curvature;
+    b.curved += product(f) / 8;
+    for (std::size_t i = 0; i < 3; ++i) {
+      f = value;
+      f[j] = kind.norms[j].second;
+      f[i] = i == j ? kind.norms[j].fourth : kind.norms[i].second;
+      b.fourth[j][i] += product(f);
+    }
+  }
+}
+
+}  // namespace
+
 FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
-                         double reach, std::int64_t run) {
+                         const NodePath& path) {
   const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
   const std::size_t K = sups.value.size();
   // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.
@@ -87,20 +160,14 @@ FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const Paral
     return sum * std::pow(h[0], n[0]) * std::pow(h[1], n[1]) * std::pow(h[2], n[2]);
   };
   FieldBounds b;
-  double S = 0, S_uu = 0, S_6 = 0;
+  Sums S;
   for (std::size_t k = 0; k < K; ++k) {
-    S += sups.value[k];
-    S_uu += sups.second_u[k];
-    S_6 += derivative(k, 6, 0);
+    S.value += sups.value[k];
+    S.second_u += sups.second_u[k];
+    S.sixth_u += derivative(k, 6, 0);
   }
-  const double d = g.pitch_u / static_cast<double>(fine_columns),
-               slope = std::min(pi / g.pitch_u * S, std::sqrt(2 * S * S_uu));
-  const double columns = static_cast<double>(fine_columns * (g.columns + 2));
-  // A term is rounded within its run, and once per run from there on.
-  const auto roundings = static_cast<double>(run + (g.views() + run - 1) / run);
-  b.arithmetic = u * (28 + 1.01 * roundings) * S + (u * (4 * reach + 6) + 0x1p-48 * columns) * d * slope +
-                 3.515625 / 720 * std::pow(d, 6) * S_6 + host_rounding;
-  b.differences = 40 * u * S;
+  for (const ErrorKind& kind : error_kinds(S, host_rounding, g, h, path)) add_errors(b, kind);
+  b.differences = 40 * u * S.value;
   double plain = 0;
   for (std::size_t j = 0; j < 3; ++j) {
     std::array<int, 3> six{};
@@ -135,9 +202,9 @@ double brick_constant(const FieldBounds& b, const std::array<double, 6>& fourth)
   double rises = 0;
   for (std::size_t j = 0; j < 3; ++j)
     for (std::size_t i = 0; i < 3; ++i)
-      rises += std::min(fourth[place[j][i]] + 16 * b.arithmetic + b.differences + b.rise[j][i],
-                        b.everywhere[j][i]);
-  return (b.second + rises / 8) / 8 + 2 * b.arithmetic + b.differences;
+      rises +=
+          std::min(fourth[place[j][i]] + b.fourth[j][i] + b.differences + b.rise[j][i], b.everywhere[j][i]);
+  return (b.second + rises / 8) / 8 + b.curved + b.differences;
 }
 
 }  // namespace vdvr

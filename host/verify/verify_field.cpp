@@ -1,5 +1,4 @@
-// F on gold nodes for `verify`, and bounds cell by cell. Double precision on the host up to the table of fine
-// columns, fp32 on the device from there on.
+// Bounds cell by cell on gold that verify_nodes makes.
 #include "host/verify/verify_field.hpp"
 
 #include <fmt/format.h>
@@ -7,22 +6,19 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
 
 #include "host/certify/result_units.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "host/verify/verify_cosines.hpp"
 #include "shared/verify_pieces.h"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrPieces) == 56 && sizeof(VdvrViewRun) == 40);
+static_assert(sizeof(VdvrPieces) == 64);
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr std::int64_t halo = 2;   // of gold nodes: RADIUS of the kernel
 constexpr std::int64_t room = 64;  // floats after a buffer's end that 16-lane reads may touch
 
@@ -58,8 +54,7 @@ struct VerifyField::Shape {
   std::int64_t per_brick = 1;          // pieces of a brick's side
   Index3 pieces{};                     // of the grid
   std::int64_t nx = 0, nz = 0, z_padded = 0, error_padded = 0, words = 0;
-  std::int64_t slab_z = 0;          // first layer of pieces
-  std::int64_t views = 1, run = 1;  // whose fine columns are held at once; that are summed by themselves
+  std::int64_t slab_z = 0;  // first layer of pieces
   FieldBounds bounds;
 
   /// Where a piece begins along an axis.
@@ -92,6 +87,62 @@ DeviceField upload(opencl::State& state, const MixedVolume& volume, int exponent
 
 }  // namespace
 
+/// Bricks whose nodes are held at once.
+struct VerifyField::Part {
+  VerifyNodes::Part nodes;
+  std::vector<std::uint8_t> selected;
+};
+
+/// Blocks that are computed one after another, from the same heights.
+struct VerifyField::Slab {
+  std::int64_t z = 0;
+  std::vector<std::array<std::int64_t, 2>> blocks;
+};
+
+namespace {
+
+// How far beyond the covered region, across z, a node may lie that is used: corners of tested cells within a
+// diagonal of gold, differences two steps on, a polynomial's nodes beyond these.
+double furthest_node(const MixedVolume& v, int across) {
+  const double diagonal = std::hypot(v.grid.spacing[0], v.grid.spacing[1]);
+  return 3.1 * diagonal / std::min(v.rate, across) +
+         static_cast<double>(VerifyNodes::reach) * diagonal / across;
+}
+
+/// The bricks that are selected lie in [first, end) along each axis.
+struct Box {
+  Index3 first{INT64_MAX, INT64_MAX, INT64_MAX}, end{0, 0, 0};
+  std::int64_t bricks = 0;
+
+  Box(const Index3& n, const std::vector<std::uint8_t>& selected) {
+    for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+      if (!selected[at(i)]) continue;
+      ++bricks;
+      const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+      for (std::size_t a = 0; a < 3; ++a) {
+        first[a] = std::min(first[a], p[a]);
+        end[a] = std::max(end[a], p[a] + 1);
+      }
+    }
+  }
+  [[nodiscard]] std::int64_t size() const {
+    return (end[0] - first[0]) * (end[1] - first[1]) * (end[2] - first[2]);
+  }
+};
+
+/// Only the selected bricks in layers [first, end) along an axis.
+std::vector<std::uint8_t> layers_of(const std::vector<std::uint8_t>& selected, const Index3& n,
+                                    std::size_t axis, std::int64_t first, std::int64_t end) {
+  std::vector<std::uint8_t> some(selected.size(), 0);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+    some[at(i)] = p[axis] >= first && p[axis] < end ? selected[at(i)] : std::uint8_t{0};
+  }
+  return some;
+}
+
+}  // namespace
+
 VerifyField::VerifyField(opencl::State& state, const ExactField& field, const MixedVolume& volume,
                          const std::optional<std::pair<double, double>>& window, const Progress& progress,
                          int density)
@@ -101,20 +152,28 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
       unit_(std::ldexp(1.0, density)),
       coverage_(field.geometry()),
       sups_(view_sups(field.coefficients(), field.geometry(), progress)),
-      stored_(upload(state, volume, -density)) {
+      stored_(upload(state, volume, -density)),
+      across_(nodes_across(volume.grid, field.geometry())),
+      nodes_(state, field, volume.grid, unit_, furthest_node(volume, across_)) {
   if (window) window_ = {window->first / unit_, window->second / unit_};
-  // Corners of tested cells lie within a gold diagonal of the covered region, differences reach two steps on;
-  // at no rate further than at the volume's own.
-  const ParallelGeometry& g = field.geometry();
-  const double diagonal =
-      std::hypot(volume.grid.spacing[0], volume.grid.spacing[1]) / static_cast<double>(volume.rate);
-  pad_ =
-      static_cast<std::int64_t>(std::ceil(3.1 * diagonal / g.pitch_u * static_cast<double>(fine_columns))) +
-      4;
-  columns_ = fine_columns * g.columns + 1 + 2 * pad_;
 }
 
-VerifyField::Shape VerifyField::shape_at(int rate, bool many) const {
+int VerifyField::least_rate(std::size_t brick) const {
+  int rate = 1;
+  for (std::size_t a = 0; a < 3; ++a)
+    while (std::int64_t{rate} << volume_.coarsening[a] < std::int64_t{1} << volume_.level[brick][a])
+      rate *= 2;
+  return rate;
+}
+
+void VerifyField::look_at(const std::vector<std::size_t>& bricks, std::int64_t nodes_each, unsigned seed) {
+  looked_at_.assign(volume_.level.size(), 0);
+  for (const std::size_t brick : bricks) looked_at_[brick] = 1;
+  nodes_each_ = nodes_each;
+  random_.seed(seed);
+}
+
+VerifyField::Shape VerifyField::shape_at(int rate, bool many, const VerifyNodes::Part& part) const {
   Shape s;
   s.rate = rate;
   s.h = volume_.grid.spacing;
@@ -128,113 +187,153 @@ VerifyField::Shape VerifyField::shape_at(int rate, bool many) const {
   s.nx = s.width * s.cells + 1 + 2 * halo;
   s.error_padded = up(s.cells + 1, 16) + 16;
   s.words = (s.cells + 15) / 16;
-  const std::int64_t all = field_.geometry().views(),
-                     per_view = 4 * columns_ * up(s.height * s.cells + 1 + 2 * halo, 16);
-  s.views = std::clamp<std::int64_t>(
-      static_cast<std::int64_t>(std::min(state_.memory.left() / 4, state_.info.max_allocation)) / per_view, 1,
-      all);
-  s.run = std::min(views_per_run, s.views);
-  s.views -= s.views % s.run;
-  const double scale = static_cast<double>(fine_columns) / field_.geometry().pitch_u;
-  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), s.h,
-                          scale * std::hypot(s.h[0], s.h[1]) * static_cast<double>(s.nx + 7), s.run);
+  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), s.h, nodes_.path(part, rate));
   return s;
 }
 
-void VerifyField::run(const std::vector<std::uint8_t>& selected, int rate,
-                      const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
-  if (rate < volume_.rate || rate % volume_.rate != 0)
-    throw InputError(fmt::format("V of rate {} cannot be tested at {}", volume_.rate, rate));
-  const auto wanted = std::count(selected.begin(), selected.end(), 1);
-  Shape s = shape_at(rate, 2 * wanted > static_cast<std::int64_t>(selected.size()));
-  arithmetic_ = s.bounds.arithmetic;
+// A brick whose middle lies further outside than half its diagonal and a cell's has no tested cell.
+std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> selected) const {
   const Index3 n = volume_.bricks();
+  const Grid& grid = volume_.grid;
+  const double g = volume_.granularity, diagonal = std::hypot(grid.spacing[0], grid.spacing[1]);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    const double x = grid.origin[0] + (static_cast<double>(i % n[0]) + 0.5) * g * grid.spacing[0],
+                 y = grid.origin[1] + (static_cast<double>(i / n[0] % n[1]) + 0.5) * g * grid.spacing[1];
+    if (coverage_.margin(x, y) < -(0.5 * g + 1) * diagonal) selected[at(i)] = 0;
+  }
+  return selected;
+}
 
-  struct Slab {
-    std::int64_t z;
-    std::vector<std::array<std::int64_t, 2>> blocks;
-  };
+VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+                                        bool rows) const {
+  const Index3 n = volume_.bricks();
+  const Box box(n, selected);
+  VerifyNodes::Part p;
+  p.across = std::min(rates.front(), across_);
+  const std::int64_t side = std::int64_t{volume_.granularity} * p.across,
+                     around = rates.back() > p.across ? VerifyNodes::reach : halo;
+  p.first_x = box.first[0] * side - around;
+  p.first_y = box.first[1] * side - around;
+  p.nx = (box.end[0] - box.first[0]) * side + 1 + 2 * around;
+  p.ny = (box.end[1] - box.first[1]) * side + 1 + 2 * around;
+  p.rows = rows;
+  if (!rows) {
+    p.along = 1;
+    while (p.along < rates.back() && !(volume_.grid.spacing[2] / p.along <= 0.25 * field_.geometry().pitch_v))
+      p.along *= 2;
+    const std::int64_t tall = std::int64_t{volume_.granularity} * p.along;
+    // Steps of the coarsest rate, and a polynomial's nodes.
+    const std::int64_t beyond = halo * std::max<std::int64_t>(1, p.along / rates.front()) +
+                                (rates.back() > p.along ? VerifyNodes::reach : 0);
+    p.first_z = box.first[2] * tall - beyond;
+    p.nz = (box.end[2] - box.first[2]) * tall + 1 + 2 * beyond;
+  }
+  const std::int64_t across = VerifyNodes::tiles_across(p.nx);
+  p.tiles.assign(at(across * VerifyNodes::tiles_across(p.ny)), 0);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    if (!selected[at(i)]) continue;
+    const std::int64_t x = (i % n[0] - box.first[0]) * side, y = (i / n[0] % n[1] - box.first[1]) * side;
+    for (std::int64_t ty = y / VDVR_VERIFY_TILE; ty <= (y + side + 2 * around) / VDVR_VERIFY_TILE; ++ty)
+      for (std::int64_t tx = x / VDVR_VERIFY_TILE; tx <= (x + side + 2 * around) / VDVR_VERIFY_TILE; ++tx)
+        p.tiles[at(ty * across + tx)] = 1;
+  }
+  return p;
+}
+
+// The detector's rows serve all heights; where fewer heights are asked for, they are made themselves, layer
+// by layer of bricks. Both in bands of bricks whose nodes fit the memory.
+std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint8_t>& selected,
+                                                     std::span<const int> rates) const {
+  const Index3 n = volume_.bricks();
+  std::vector<std::vector<std::uint8_t>> runs;
+  std::int64_t heights = 0;
+  for (std::int64_t z = 0; z < n[2]; ++z) {
+    std::vector<std::uint8_t> layer = layers_of(selected, n, 2, z, z + 1);
+    if (std::find(layer.begin(), layer.end(), 1) == layer.end()) continue;
+    heights += nodes_of(layer, rates, false).nz;
+    runs.push_back(std::move(layer));
+  }
+  const bool rows = field_.geometry().rows <= heights;
+  if (rows) runs.assign(1, selected);
+  const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
+  std::vector<Part> parts;
+  for (const std::vector<std::uint8_t>& run : runs) {
+    const Box box(n, run);
+    for (std::int64_t y = box.first[1]; y < box.end[1];) {
+      std::int64_t end = box.end[1];
+      Part part;
+      for (;; end = y + (end - y + 1) / 2) {
+        part.selected = layers_of(run, n, 1, y, end);
+        if (Box(n, part.selected).bricks == 0) break;
+        part.nodes = nodes_of(part.selected, rates, rows);
+        if (end == y + 1 || nodes_.bytes_of(part.nodes) <= budget) break;
+      }
+      y = end;
+      if (Box(n, part.selected).bricks > 0) parts.push_back(std::move(part));
+    }
+  }
+  return parts;
+}
+
+std::vector<VerifyField::Slab> VerifyField::slabs_of(const Shape& s,
+                                                     const std::vector<std::uint8_t>& selected) const {
+  const Index3 n = volume_.bricks();
+  const Box box(n, selected);
+  const auto end = [&](std::size_t a) { return std::min(s.pieces[a], box.end[a] * s.per_brick); };
   std::vector<Slab> slabs;
-  double total = 0, done = 0;
-  for (std::int64_t z = 0; z < s.pieces[2]; z += s.height) {
+  for (std::int64_t z = box.first[2] * s.per_brick; z < end(2); z += s.height) {
     Slab slab{z, {}};
-    for (std::int64_t y = 0; y < s.pieces[1]; y += s.width)
-      for (std::int64_t x = 0; x < s.pieces[0]; x += s.width) {
+    for (std::int64_t y = box.first[1] * s.per_brick; y < end(1); y += s.width)
+      for (std::int64_t x = box.first[0] * s.per_brick; x < end(0); x += s.width) {
         bool any = false;
-        for (std::int64_t bz = z; bz < std::min(s.pieces[2], z + s.height); ++bz)
-          for (std::int64_t by = y; by < std::min(s.pieces[1], y + s.width); ++by)
-            for (std::int64_t bx = x; bx < std::min(s.pieces[0], x + s.width); ++bx)
+        for (std::int64_t bz = z; bz < std::min(end(2), z + s.height); ++bz)
+          for (std::int64_t by = y; by < std::min(end(1), y + s.width); ++by)
+            for (std::int64_t bx = x; bx < std::min(end(0), x + s.width); ++bx)
               any = any || selected[s.brick(n, bx, by, bz)] != 0;
         if (any) slab.blocks.push_back({x, y});
       }
-    total += static_cast<double>(slab.blocks.size());
     if (!slab.blocks.empty()) slabs.push_back(std::move(slab));
   }
-  for (const Slab& slab : slabs) {
-    s.slab_z = slab.z;
-    const std::int64_t layers = std::min(s.height, s.pieces[2] - slab.z);
-    s.nz = std::min(layers * s.cells, volume_.grid.cells[2] * s.rate - slab.z * s.cells) + 1 + 2 * halo;
-    s.z_padded = up(s.nz, 16);
-    run_slab(s, slab.blocks, selected, on_piece, [&](std::size_t blocks) {
-      done += static_cast<double>(blocks);
-      report(progress, "verify", done / total);
-    });
-  }
+  return slabs;
 }
 
-/// Fine columns of some views, on the host and on the device.
-struct VerifyField::Table {
-  Table(opencl::State& state, std::int64_t columns, std::int64_t z_padded, std::int64_t at_once)
-      : per_view(columns * z_padded),
-        views(at_once),
-        share(state, count(4 * views * per_view), "fine columns of the filtered projections"),
-        host(at(views * per_view)),
-        device(state, count(views * per_view + room), "fine columns of the filtered projections") {}
-
-  std::int64_t per_view, views;  // floats; views at a time
-  std::int64_t first_view = -1;  // what it holds
-  HostShare share;
-  std::vector<float> host;
-  opencl::DeviceArray<float> device;
-};
-
-void VerifyField::fill(Table& table, const Shape& shape, std::int64_t first_view) {
-  if (table.first_view == first_view) return;
-  const ParallelGeometry& g = field_.geometry();
-  const std::int64_t U = g.columns, V = g.rows, rows = up(shape.nz, verify_cosines::lanes);
-  const std::int64_t views = std::min(table.views, g.views() - first_view), last = fine_columns * U;
-  const double first_z = shape.begin(volume_.grid, 2, shape.slab_z);
-  std::vector<double> basis(at(V * rows));
-  for (std::int64_t r = 0; r < rows; ++r) {
-    const double z = first_z + static_cast<double>(r - halo) * shape.h[2];
-    const double y = pi * (z / g.pitch_v + 0.5 * static_cast<double>(V)) / static_cast<double>(V);
-    for (std::int64_t l = 0; l < V; ++l) basis[at(l * rows + r)] = std::cos(static_cast<double>(l) * y);
-  }
-  const auto cosine = verify_cosines::cosine_period(last);
-  parallel_for(views, {}, "", [&](std::int64_t k) {
-    std::vector<double> line(at(U * rows));
-    verify_cosines::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, rows,
-                             line);
-    float* out = table.host.data() + k * table.per_view;
-    verify_cosines::sum_columns(
-        line, U, rows, fine_columns, cosine,
-        [&](std::int64_t n, std::int64_t r, const std::array<double, verify_cosines::lanes>& values) {
-          for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
-            if (r + i < shape.z_padded)
-              out[((r + i) / 16 * columns_ + n + pad_) * 16 + (r + i) % 16] =
-                  static_cast<float>(values[at(i)] / unit_);
-        });
-    // Beyond the detector's edges the series is its own mirror image.
-    for (std::int64_t n = 0; n < columns_; ++n) {
-      std::int64_t m = std::abs(n - pad_) % (2 * last);
-      if (m > last) m = 2 * last - m;
-      if (m == n - pad_) continue;
-      for (std::int64_t z = 0; z < shape.z_padded / 16; ++z)
-        std::copy_n(out + (z * columns_ + m + pad_) * 16, 16, out + (z * columns_ + n) * 16);
+void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+                      const std::function<bool(std::size_t brick, int rate)>& wants,
+                      const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
+  for (const int rate : rates)
+    if (rate < 1 || (rates.size() > 1 && rate % across_ != 0))
+      throw InputError(fmt::format("gold of rate {} is not made of {} nodes a cell", rate, across_));
+  arithmetic_ = 0;
+  const std::vector<Part> parts = parts_of(near_coverage(selected), rates);
+  double done = 0;
+  const double steps = static_cast<double>(parts.size() * (1 + rates.size()));
+  const auto tick = [&](double share) { report(progress, "verify", (done + share) / steps); };
+  for (const Part& part : parts) {
+    tick(0);
+    nodes_.make(part.nodes);
+    tick(1);
+    ++done;
+    for (const int rate : rates) {
+      std::vector<std::uint8_t> wanted = part.selected;
+      for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && wants(i, rate);
+      const Box box(volume_.bricks(), wanted);
+      if (box.bricks > 0) {
+        Shape s = shape_at(rate, 2 * box.bricks > box.size(), part.nodes);
+        arithmetic_ = std::max(arithmetic_, s.bounds.arithmetic);
+        const std::vector<Slab> slabs = slabs_of(s, wanted);
+        for (std::size_t i = 0; i < slabs.size(); ++i) {
+          s.slab_z = slabs[i].z;
+          const std::int64_t layers = std::min(s.height, s.pieces[2] - s.slab_z);
+          s.nz =
+              std::min(layers * s.cells, volume_.grid.cells[2] * s.rate - s.slab_z * s.cells) + 1 + 2 * halo;
+          s.z_padded = up(s.nz, 16);
+          run_slab(s, slabs[i].blocks, wanted, on_piece);
+          tick(static_cast<double>(i + 1) / static_cast<double>(slabs.size()));
+        }
+      }
+      ++done;
     }
-  });
-  table.device.write(std::span<const float>(table.host).first(at(views * table.per_view)));
-  table.first_view = first_view;
+  }
 }
 
 VerifyField::Batch VerifyField::make_batch(const Shape& s,
@@ -246,13 +345,19 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
   Batch batch;
   batch.tested.assign(blocks.size() * at(side * side), 0);
   // A cell that holds a covered point has its centre within half its diagonal of the region.
-  const double limit = -0.5 * std::hypot(s.h[0], s.h[1]) * (1 + 1e-9);
+  const double half = 0.5 * std::hypot(s.h[0], s.h[1]) * (1 + 1e-9);
   parallel_for(static_cast<std::int64_t>(blocks.size()) * side, {}, "", [&](std::int64_t row) {
     const auto& b = blocks[at(row / side)];
     const double y = s.begin(grid, 1, b[1]) + (static_cast<double>(row % side) + 0.5) * s.h[1];
     for (std::int64_t i = 0; i < side; ++i) {
       const double x = s.begin(grid, 0, b[0]) + (static_cast<double>(i) + 0.5) * s.h[0];
-      batch.tested[at(row * side + i)] = coverage_.margin(x, y) >= limit ? 1 : 0;
+      // Margins change by no more than the distance, so most corners need not be asked for.
+      const double margin = coverage_.margin(x, y), dx = 0.5 * s.h[0], dy = 0.5 * s.h[1];
+      const bool covered =
+          margin >= half || (margin >= -half && coverage_.margin(x - dx, y - dy) >= 0 &&
+                             coverage_.margin(x + dx, y - dy) >= 0 && coverage_.margin(x - dx, y + dy) >= 0 &&
+                             coverage_.margin(x + dx, y + dy) >= 0);
+      batch.tested[at(row * side + i)] = covered ? 2 : margin >= -half ? 1 : 0;
     }
   });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -267,7 +372,8 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
                                      at((y - b[1]) * s.cells * side + (x - b[0]) * s.cells);
           bool any = false;
           for (std::int64_t j = 0; j < s.cells && !any; ++j)
-            any = std::find(mask + j * side, mask + j * side + s.cells, 1) != mask + j * side + s.cells;
+            any =
+                std::any_of(mask + j * side, mask + j * side + s.cells, [](std::uint8_t f) { return f > 0; });
           if (!any) continue;
           batch.items.push_back({{to_int(x), to_int(y), to_int(z), to_int(static_cast<std::int64_t>(i))}});
           batch.bricks.push_back(static_cast<std::int64_t>(brick));
@@ -278,76 +384,56 @@ VerifyField::Batch VerifyField::make_batch(const Shape& s,
 
 void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int64_t, 2>>& blocks,
                            const std::vector<std::uint8_t>& selected,
-                           const std::function<void(const Piece&)>& on_piece,
-                           const std::function<void(std::size_t)>& tick) {
-  Table table(state_, columns_, s.z_padded, s.views);
+                           const std::function<void(const Piece&)>& on_piece) {
   const std::int64_t per_block = s.nx * s.nx * s.z_padded,
                      per_item =
                          (s.cells + 1) * (s.cells + 1) * s.error_padded + s.cells * s.cells * (4 + s.words);
-  const std::int64_t bytes = 4 * (per_block + s.width * s.width * s.height * per_item);
+  const std::int64_t bytes = 4 * (per_block + nodes_.floats_per_block(s.rate, s.nx, s.z_padded) +
+                                  s.width * s.width * s.height * per_item);
   const std::uint64_t budget = std::min<std::uint64_t>(state_.memory.left() / 2, 96 << 20);
   const std::size_t together = at(std::clamp<std::int64_t>(static_cast<std::int64_t>(budget) / bytes, 1,
                                                            static_cast<std::int64_t>(blocks.size())));
-  opencl::DeviceArray<float> values(state_, count(static_cast<std::int64_t>(together) * per_block + room),
-                                    "field to verify against");
-  values.fill(0.0f);
+  const opencl::DeviceArray<float> values(
+      state_, count(static_cast<std::int64_t>(together) * per_block + room), "field to verify against");
   for (std::size_t first = 0; first < blocks.size(); first += together) {
     const auto part = std::span(blocks).subspan(first, std::min(together, blocks.size() - first));
     const Batch batch = make_batch(s, part, selected);
-    if (!batch.items.empty()) {
-      field_of(batch, s, table, values);
-      measure(batch, s, values, on_piece);
-    }
-    tick(part.size());
+    if (batch.items.empty()) continue;
+    std::vector<std::array<std::int64_t, 2>> nodes;
+    for (const auto& b : part) nodes.push_back({b[0] * s.cells - halo, b[1] * s.cells - halo});
+    nodes_.gold({to_int(s.rate), nodes, s.nx, s.slab_z * s.cells - halo, s.z_padded}, values);
+    measure(batch, s, values, on_piece);
+    if (nodes_each_ > 0) look(batch, s, values);
   }
 }
 
-void VerifyField::field_of(const Batch& batch, const Shape& s, Table& table,
-                           opencl::DeviceArray<float>& values) {
-  const ParallelGeometry& g = field_.geometry();
-  const std::size_t K = g.theta_rad.size(), blocks = batch.first.size();
-  const double scale = static_cast<double>(fine_columns) / g.pitch_u;
-  std::vector<cl_float4> steps(blocks * K);
-  for (std::size_t b = 0; b < blocks; ++b)
-    for (std::size_t k = 0; k < K; ++k) {
-      const double c = std::cos(g.theta_rad[k]), s_k = std::sin(g.theta_rad[k]);
-      const auto node = [&](std::size_t axis, cl_int piece) {
-        return s.begin(volume_.grid, axis, piece) - static_cast<double>(halo) * s.h[axis];
-      };
-      const double t = node(0, batch.first[b].s[0]) * c + node(1, batch.first[b].s[1]) * s_k;
-      // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
-      // padding.
-      const double column =
-          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(fine_columns) + static_cast<double>(pad_);
-      const double along_x = c * s.h[0] * scale, along_y = s_k * s.h[1] * scale,
-                   nodes = static_cast<double>(s.nx + 7);
-      const double whole =
-          std::floor(column + std::min(0.0, along_x * nodes) + std::min(0.0, along_y * nodes)) - 1;
-      steps[b * K + k] = {{static_cast<float>(along_x), static_cast<float>(along_y),
-                           static_cast<float>(column - whole), static_cast<float>(whole)}};
-    }
-  const opencl::DeviceArray<cl_float4> device_steps(state_, std::span<const cl_float4>(steps),
-                                                    "view positions");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrViewRun> kernel(state_, "verify/verify_field",
-                                                                         "verify_field", stored_.defines);
-  for (std::int64_t first = 0; first < g.views(); first += table.views) {
-    fill(table, s, first);
-    const std::int64_t end = std::min(first + table.views, g.views());
-    // In runs, whose sums round seldom.
-    for (std::int64_t run = first; run < end; run += s.run) {
-      const VdvrViewRun shape{.accumulate = run > 0 ? 1 : 0,
-                              .first_view = to_int(run),
-                              .in_table = to_int(run - first),
-                              .views = to_int(std::min(s.run, end - run)),
-                              .all_views = to_int(g.views()),
-                              .columns = to_int(columns_),
-                              .z_padded = to_int(s.z_padded),
-                              .nx = to_int(s.nx),
-                              .ny = to_int(s.nx),
-                              .blocks = to_int(static_cast<std::int64_t>(blocks))};
-      kernel({{count((s.nx + 7) / 8), count(s.nx), count(s.z_padded / 16) * blocks},
-              {count((s.nx + 7) / 8), 1, 1}},
-             values.buffer(), table.device.buffer(), device_steps.buffer(), shape);
+// Reads a few nodes at one height, so that F in double precision is cheap there.
+void VerifyField::look(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values) {
+  const auto draw = [&](std::int64_t last) {
+    return std::uniform_int_distribution<std::int64_t>(0, last)(random_);
+  };
+  for (std::size_t i = 0; i < batch.items.size(); ++i) {
+    if (!looked_at_[at(batch.bricks[i])]) continue;
+    const cl_int4 item = batch.items[i], first = batch.first[at(std::int64_t{item.s[3]})];
+    Index3 last{};
+    for (std::size_t a = 0; a < 3; ++a)
+      last[a] = std::min(s.cells, volume_.grid.cells[a] * s.rate - item.s[a] * s.cells);
+    const std::int64_t z = draw(last[2]);
+    for (std::int64_t n = 0; n < nodes_each_; ++n) {
+      const Index3 in{draw(last[0]), draw(last[1]), z};
+      Node node;
+      Index3 place{};
+      for (std::size_t a = 0; a < 3; ++a) {
+        node.at[a] = s.begin(volume_.grid, a, item.s[a]) + static_cast<double>(in[a]) * s.h[a];
+        place[a] = (item.s[a] - first.s[a]) * s.cells + in[a] + halo;
+      }
+      if (!field_.covered(node.at)) continue;
+      float value = 0;
+      values.read(std::span(&value, 1),
+                  count(((item.s[3] * s.nx + place[1]) * s.nx + place[0]) * s.z_padded + place[2]));
+      node.value = unit_ * static_cast<double>(value);
+      node.arithmetic = s.bounds.arithmetic;
+      seen_.push_back(node);
     }
   }
 }
@@ -375,16 +461,20 @@ std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::in
 
 }  // namespace
 
-// The first and the last layer of cells along z that meet the covered heights.
-std::pair<std::int64_t, std::int64_t> VerifyField::covered_cells(const Shape& s) const {
+// The first and the last layer of cells along z that meet the covered heights, and those that lie in them.
+VerifyField::Layers VerifyField::covered_cells(const Shape& s) const {
   const double first_z = s.begin(volume_.grid, 2, s.slab_z);
-  std::pair<std::int64_t, std::int64_t> range{s.nz, -1};
-  for (std::int64_t k = 0; k < s.nz - 1 - 2 * halo; ++k)
-    if (coverage_.margin_z(first_z + (static_cast<double>(k) + 0.5) * s.h[2]) >= -0.5 * s.h[2] * (1 + 1e-9)) {
-      range.first = std::min(range.first, k);
-      range.second = k;
-    }
-  return range;
+  Layers l{to_int(s.nz), -1, to_int(s.nz), -1};
+  for (int k = 0; k < s.nz - 1 - 2 * halo; ++k) {
+    const auto margin = [&](double cells) { return coverage_.margin_z(first_z + (k + cells) * s.h[2]); };
+    if (margin(0.5) < -0.5 * s.h[2] * (1 + 1e-9)) continue;
+    l.first = std::min(l.first, k);
+    l.last = k;
+    if (margin(0) < 0 || margin(1) < 0) continue;
+    l.in_first = std::min(l.in_first, k);
+    l.in_last = k;
+  }
+  return l;
 }
 
 void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
@@ -399,7 +489,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   opencl::DeviceArray<cl_float8> fourth(state_, count(n * side), "fourth differences");
   opencl::DeviceArray<cl_int4> columns(state_, count(n * s.cells * s.cells), "columns of gold cells");
   opencl::DeviceArray<cl_uint> bits(state_, count(n * s.cells * s.cells * s.words), "tested gold cells");
-  const auto [z_first, z_last] = covered_cells(s);
+  const Layers layers = covered_cells(s);
   const VdvrPieces pieces{to_int(n),
                           to_int(s.rate),
                           to_int(s.cells),
@@ -408,8 +498,10 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
                           to_int(s.z_padded),
                           to_int(s.error_padded),
                           to_int(s.words),
-                          to_int(z_first),
-                          to_int(z_last),
+                          layers.first,
+                          layers.last,
+                          layers.in_first,
+                          layers.in_last,
                           window_ ? 1 : 0,
                           window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
                           window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f,
@@ -457,6 +549,8 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   for (std::int64_t i = 0; i < n; ++i) {
     Piece b;
     b.brick = batch.bricks[at(i)];
+    b.rate = to_int(s.rate);
+    b.arithmetic = s.bounds.arithmetic;
     const cl_int4 place = batch.items[at(i)];
     for (int a = 0; a < 3; ++a) b.first_cell[at(a)] = place.s[a] % s.per_brick * s.cells;
     b.constant = constants[at(i)];

@@ -1,13 +1,13 @@
-// F and the bound on |V - F| as `verify` computes them: from the cosine coefficients of the filtered
-// projections in double precision, by six-point interpolation on fine columns, gold cell by gold cell, at the
-// volume's gold rate or a finer one (docs/error-bounds.md, "What verify does"). Shares with build only the
-// sampler header. Called by verify.cpp. Launches kernels/verify/verify_field.cl.
+// The bound on |V - F| as `verify` computes it, gold cell by gold cell, at every rate that is asked for
+// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Called by
+// verify.cpp. Launches kernels/verify/verify_field.cl; F is verify_nodes'.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <random>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,7 +15,7 @@
 #include "host/fbp/coverage.hpp"
 #include "host/opencl/array.hpp"
 #include "host/sampler/device_field.hpp"
-#include "host/verify/verify_bounds.hpp"
+#include "host/verify/verify_nodes.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/mixed_volume.hpp"
 
@@ -33,14 +33,22 @@ class VerifyField {
   /// A brick, or a cube of 64 gold cells a side of one.
   struct Piece {
     std::int64_t brick = 0;
+    int rate = 1;                       ///< of the gold
     Index3 first_cell{0, 0, 0};         ///< where it begins: gold cells inside the brick
     std::int64_t cells = 0, nodes = 0;  ///< tested: gold cells, and gold nodes that are their corners
-    double error = 0;                   ///< largest |V - F| at those nodes
+    double error = 0;                   ///< largest |V - F| at nodes of cells whose corners are covered
     double total = -1;                  ///< bound of |V - F| on the tested cells; negative: none
     Index3 worst_cell{0, 0, 0};         ///< gold cell inside the brick
     double constant = 0;                ///< what `total` holds beside a column's own total
     std::span<const Column> columns;    ///< [y][x] of the piece's side; total < 0: untested
     double unit = 1;                    ///< of what columns hold
+    double arithmetic = 0;              ///< what F may err at a node
+  };
+
+  /// Computed F at a node, in world units.
+  struct Node {
+    Vec3 at{0, 0, 0};
+    double value = 0, arithmetic = 0;
   };
 
   /// `field` outlives this object. All it is given and gives is in world units, but for columns: the device
@@ -49,29 +57,55 @@ class VerifyField {
               const std::optional<std::pair<double, double>>& window, const Progress& progress,
               int density = 0);
 
-  /// Measures the selected bricks on gold of `rate`, a multiple of the volume's by a power of two; calls back
-  /// once for each of their pieces, in no particular order.
-  void run(const std::vector<std::uint8_t>& selected, int rate,
-           const std::function<void(const Piece&)>& on_piece, const Progress& progress);
+  /// Nodes to a cell of the grid that determine F across z: with fewer, gold is back-projected itself.
+  [[nodiscard]] int across() const { return across_; }
+  /// The least rate of gold on whose cells the brick is trilinear.
+  [[nodiscard]] int least_rate(std::size_t brick) const;
 
-  /// What the last run's computation of F may err at any node.
+  /// Measures bricks on gold of the rates, ascending; more than one only where each is a multiple of
+  /// `across()`. `wants` is asked of each selected brick at each rate, and at a rate only when all pieces of
+  /// the one before are known. Calls back once for each piece, in no particular order.
+  void run(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+           const std::function<bool(std::size_t brick, int rate)>& wants,
+           const std::function<void(const Piece&)>& on_piece, const Progress& progress);
+  void run(const std::vector<std::uint8_t>& selected, int rate,
+           const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
+    run(
+        selected, std::span(&rate, 1), [](std::size_t, int) { return true; }, on_piece, progress);
+  }
+
+  /// From now on, so many nodes of each of these bricks are kept at each rate, at one height each time, drawn
+  /// by chance among those of covered points.
+  void look_at(const std::vector<std::size_t>& bricks, std::int64_t nodes_each, unsigned seed);
+  [[nodiscard]] const std::vector<Node>& seen() const { return seen_; }
+
+  /// The most that the last run's computation of F may err at any node.
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
 
  private:
   struct Shape;
-  struct Table;
   struct Batch;
-  [[nodiscard]] Shape shape_at(int rate, bool many) const;
+  struct Slab;
+  [[nodiscard]] std::vector<std::uint8_t> near_coverage(std::vector<std::uint8_t> selected) const;
+  struct Part;
+  [[nodiscard]] std::vector<Part> parts_of(const std::vector<std::uint8_t>& selected,
+                                           std::span<const int> rates) const;
+  [[nodiscard]] VerifyNodes::Part nodes_of(const std::vector<std::uint8_t>& selected,
+                                           std::span<const int> rates, bool rows) const;
+  [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;
+  [[nodiscard]] std::vector<Slab> slabs_of(const Shape& shape,
+                                           const std::vector<std::uint8_t>& selected) const;
   void run_slab(const Shape& shape, const std::vector<std::array<std::int64_t, 2>>& blocks,
-                const std::vector<std::uint8_t>& selected, const std::function<void(const Piece&)>& on_piece,
-                const std::function<void(std::size_t)>& tick);
+                const std::vector<std::uint8_t>& selected, const std::function<void(const Piece&)>& on_piece);
   Batch make_batch(const Shape& shape, std::span<const std::array<std::int64_t, 2>> blocks,
                    const std::vector<std::uint8_t>& selected) const;
-  void fill(Table& table, const Shape& shape, std::int64_t first_view);
-  void field_of(const Batch& batch, const Shape& shape, Table& table, opencl::DeviceArray<float>& values);
-  [[nodiscard]] std::pair<std::int64_t, std::int64_t> covered_cells(const Shape& shape) const;
+  struct Layers {
+    int first, last, in_first, in_last;
+  };
+  [[nodiscard]] Layers covered_cells(const Shape& shape) const;
   void measure(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values,
                const std::function<void(const Piece&)>& on_piece);
+  void look(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values);
 
   opencl::State& state_;
   const ExactField& field_;
@@ -81,8 +115,13 @@ class VerifyField {
   Coverage coverage_;
   ViewSups sups_;
   DeviceField stored_;
-  std::int64_t pad_ = 0, columns_ = 0;  // fine columns
+  int across_;
+  VerifyNodes nodes_;
   double arithmetic_ = 0;
+  std::vector<std::uint8_t> looked_at_;  // bricks
+  std::int64_t nodes_each_ = 0;
+  std::mt19937 random_;
+  std::vector<Node> seen_;
 };
 
 }  // namespace vdvr

@@ -48,14 +48,18 @@ struct VerifyResult {
   SamplePlace worst;  ///< the stored sample nearest to the worst corner of the worst gold cell
   std::int64_t bricks_tested = 0, bricks = 0;
   std::int64_t nodes_tested = 0;  ///< distinct gold nodes, counted once per brick that they belong to
-  std::int64_t cells_tested = 0;  ///< gold cells
-  std::int64_t bricks_finer = 0;  ///< bricks tested again on finer gold, where the file's own decided nothing
+  std::int64_t cells_tested = 0;  ///< gold cells, of the first gold that each brick was tested on
+  std::int64_t bricks_finer = 0;  ///< bricks tested again on finer gold, where that decided nothing
   int finest_rate = 0;            ///< of the gold used
   std::int64_t seams = 0;         ///< samples that two bricks store with different bits (exhaustive only)
   /// Points inside cells where |V - F| was evaluated, since verify's bound there is above the certificate's,
   /// and the largest |V - F| found, as a share of what the certificate bounds it by.
   std::int64_t points_evaluated = 0;
   double worst_share = 0;
+  /// Nodes drawn by chance at which F was evaluated in double precision beside verify's own, and the largest
+  /// difference, as a share of what verify bounds it by.
+  std::int64_t field_points = 0;
+  double field_share = 0;
   /// What the certificate says and what was computed instead, a line each: range, coverage, geometry, terms,
   /// totals.
   std::vector<std::string> differences;
@@ -63,13 +67,14 @@ struct VerifyResult {
 };
 
 /// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
-/// cell, V through the sampler header; again on finer gold, up to 64x, in bricks whose bound at the file's
-/// own rate exceeds epsilon or the certificate's total. Requires the samplers that `stored` says hold and
-/// that this device has; then computes again what else `stored` says (docs/error-bounds.md, "What verify
-/// compares"). Does not check hashes: the caller does, from the file. Cost: views * rows * columns^2 once on
-/// the host, then 7 * views multiply-adds per gold node on the device, and what `build` takes to filter, to
+/// cell, V through the sampler header, on gold a quarter of a pixel apart; again on finer gold, up to 64x, in
+/// bricks whose bound there exceeds epsilon or the certificate's total. Requires the samplers that `stored`
+/// says hold and that this device has; then computes again what else `stored` says (docs/error-bounds.md,
+/// "What verify compares"). Does not check hashes: the caller does, from the file. Cost: views * rows *
+/// columns^2 a few times on the host, 7 * views multiply-adds for each node a quarter of a pixel apart across
+/// z on each detector row, as many as there are rows for each gold node, and what `build` takes to filter, to
 /// reconstruct the base and to measure the tested bricks. Throws ResourceError when --max-memory is too small
-/// for one brick and one view.
+/// for one row of bricks and one view.
 VDVR_API VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                              const Certificate& stored, const VerifyOptions& options = {},
                              const Progress& progress = {});

@@ -1,74 +1,17 @@
-// What `verify` computes on the device, apart from everything build uses but the sampler header: F at gold
-// nodes by six-point interpolation in u, |V - F| at the nodes of every tested brick, fourth differences of F,
-// and per gold cell the bound on |V - F| (docs/error-bounds.md, "What verify does").
+// What `verify` finds on gold, apart from everything build uses but the sampler header: |V - F| at the nodes
+// of every tested brick, fourth differences of F, and per gold cell the bound on |V - F|
+// (docs/error-bounds.md, "What verify does"). F is made by verify_nodes.cl.
 // A piece is a cube of `cells` gold cells: a brick, or a part of one. Places of pieces count pieces from the
 // grid's first; `rate` gold cells to a cell of the grid.
-// Layouts: float table[view][z / 16][fine column][16]; float field[block][y + 2][x + 2][z_padded] with node z
-// at z + 2, two nodes of halo on every side; float error[item][y][x][error_padded], one item per tested
-// piece; int4 items[item] = piece x, y, z and its block; int4 first[block] = the block's first piece; uchar
-// tested[block][cell y][cell x]: columns of gold cells that can hold a covered point.
-// Called by host/verify/verify_field.cpp.
+// Layouts: float field[block][y + 2][x + 2][z_padded] with node z at z + 2, two nodes of halo on every side;
+// float error[item][y][x][error_padded], one item per tested piece; int4 items[item] = piece x, y, z and its
+// block; int4 first[block] = the block's first piece; uchar tested[block][cell y][cell x]: columns of gold
+// cells that can hold a covered point. Called by host/verify/verify_field.cpp.
 #include "device/largest.h"
 #include "shared/mixed_sampler.h"
 #include "shared/verify_pieces.h"
 
 #define RADIUS 2
-
-// --- F at nodes ---
-
-// Lane i of a float8 belongs to the node x + i.
-#define FOR_TILE(M) M(0, s0) M(1, s1) M(2, s2) M(3, s3) M(4, s4) M(5, s5) M(6, s6) M(7, s7)
-#define CLEAR(i, lane) float16 sum##i = (float16)(0.0f);
-#define ADD(i, lane)                                    \
-  {                                                     \
-    __global const float* q = plane + at.lane * 16;     \
-    float16 v = w0.lane * vload16(0, q);                \
-    v = fma((float16)(w1.lane), vload16(0, q + 16), v); \
-    v = fma((float16)(w2.lane), vload16(0, q + 32), v); \
-    v = fma((float16)(w3.lane), vload16(0, q + 48), v); \
-    v = fma((float16)(w4.lane), vload16(0, q + 64), v); \
-    v = fma((float16)(w5.lane), vload16(0, q + 80), v); \
-    sum##i += v;                                        \
-  }
-#define PUT(i, lane)                                                \
-  if (x + i < nx) {                                                 \
-    __global float* to = target + (size_t)i * z_padded;             \
-    vstore16(accumulate ? vload16(0, to) + sum##i : sum##i, 0, to); \
-  }
-
-// Adds a run of views. steps: per block and view {columns per node along x, along y, the block's first node
-// less a whole number of columns, that whole number}.
-__kernel void verify_field(__global float* field, __global const float* table, __global const float4* steps,
-                           VdvrViewRun run) {
-  // Copies, which no store can be taken to change.
-  const int accumulate = run.accumulate, views = run.views, columns = run.columns, z_padded = run.z_padded,
-            nx = run.nx, ny = run.ny;
-  // All columns of a block at 16 heights, then the next 16: what they read of the table stays in the cache.
-  const int x = (int)get_global_id(0) * 8, y = (int)get_global_id(1), chunks = z_padded / 16;
-  const int block = (int)get_global_id(2) / chunks, z = ((int)get_global_id(2) - block * chunks) * 16;
-  if (x >= nx || y >= ny || block >= run.blocks) return;
-  __global float* target = field + (((size_t)block * ny + y) * nx + x) * z_padded + z;
-  FOR_TILE(CLEAR)
-  const float8 tile_x = (float)x + (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-  __global const float* plane = table + ((size_t)run.in_table * z_padded + z) * columns;
-  __global const float4* view = steps + (size_t)block * run.all_views + run.first_view;
-  for (int k = 0; k < views; ++k, plane += (size_t)columns * z_padded) {
-    const float4 step = view[k];
-    // s > 0 in the block by the host's choice of the whole number: truncation is floor.
-    const float8 s = fma((float8)(step.x), tile_x, (float8)(fma(step.y, (float)y, step.z)));
-    const int8 below = convert_int8(s);
-    const float8 f = s - convert_float8(below);
-    // Lagrange weights on the nodes -2 .. 3.
-    const float8 a = f + 2.0f, b = f + 1.0f, c = f - 1.0f, d = f - 2.0f, e = f - 3.0f;
-    const float8 bf = b * f, de = d * e, abf = a * bf, cde = c * de;
-    const float8 w0 = bf * cde * (-1.0f / 120.0f), w1 = a * f * cde * (1.0f / 24.0f),
-                 w2 = a * b * cde * (-1.0f / 12.0f), w3 = abf * de * (1.0f / 12.0f),
-                 w4 = abf * c * e * (-1.0f / 24.0f), w5 = abf * c * d * (1.0f / 120.0f);
-    const int8 at = clamp((int)step.w + below, (int8)2, (int8)(columns - 4)) - 2;
-    FOR_TILE(ADD)
-  }
-  FOR_TILE(PUT)
-}
 
 // --- |V - F| at nodes ---
 
@@ -211,9 +154,10 @@ inline float16 curvature(__global const float* p, int stride, float correction) 
   }
 
 // Per column of gold cells of a tested piece: int4 {largest bound of |V - F| less the piece's constant, the
-// largest |V - F| at a corner, both as float bits; the cell that has the former, or -1; 0} and which cells
-// were tested, 16 bits to a word: int4 out[item][y][x], uint cells_tested[item][y][x][words]. `widening`:
-// per item what the range of a cell is widened by beside its own T (for the window only).
+// largest |V - F| at a corner of a cell whose corners are covered, both as float bits; the cell that has the
+// former, or -1; 0} and which cells were tested, 16 bits to a word: int4 out[item][y][x], uint
+// cells_tested[item][y][x][words]. `widening`: per item what the range of a cell is widened by beside its own
+// T (for the window only).
 __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __global const float* error,
                            __global const float* field, __global const uchar* tested, VdvrGrid grid,
                            __global const int4* items, __global const int4* first,
@@ -225,10 +169,10 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
   const int4 begin = first[item.w];
   const size_t column = ((size_t)i * s.cells + y) * s.cells + x;
   const int mask_x = s.nx - 1 - 2 * RADIUS, mask_y = s.ny - 1 - 2 * RADIUS;
+  const uchar flag = tested[((size_t)item.w * mask_y + (item.y - begin.y) * s.cells + y) * mask_x +
+                            (item.x - begin.x) * s.cells + x];
   const bool inside = x < last_node(item.x, s.cells, grid.cells_x * s.rate) &&
-                      y < last_node(item.y, s.cells, grid.cells_y * s.rate) &&
-                      tested[((size_t)item.w * mask_y + (item.y - begin.y) * s.cells + y) * mask_x +
-                             (item.x - begin.x) * s.cells + x];
+                      y < last_node(item.y, s.cells, grid.cells_y * s.rate) && flag > 0;
   // Cells of the block's z range [s.z_first, s.z_last] meet the covered heights.
   const int z_begin = (item.z - begin.z) * s.cells,
             end = min(last_node(item.z, s.cells, grid.cells_z * s.rate), s.z_last + 1 - z_begin);
@@ -260,7 +204,10 @@ __kernel void verify_cells(__global int4* out, __global uint* cells_tested, __gl
       float16 total = fmax(highest + over, under - lowest), e = fmax(highest, -lowest);
       total = select((float16)(INFINITY), total, total <= FLT_MAX);
       total = select((float16)(-1.0f), total, counts);
-      e = select((float16)(0.0f), e, counts);
+      // A node that is not covered is promised nothing.
+      const int16 covered =
+          counts & (int16)(flag == 2 ? -1 : 0) & (k + z_begin >= s.in_first) & (k + z_begin <= s.in_last);
+      e = select((float16)(0.0f), e, covered);
       worst_error = fmax(worst_error, largest_of_16(e));
       const float largest = largest_of_16(total);
       float values[16];

@@ -1,0 +1,39 @@
+// Layouts of what `verify` makes F of: the table of fine columns, the nodes that are back-projected, blocks
+// of gold made of these (verify_nodes.cl). Passed by value from host/verify/verify_nodes.cpp.
+#ifndef VDVR_VERIFY_NODES_H
+#define VDVR_VERIFY_NODES_H
+
+// Nodes of a tile's side, which is back-projected with positions that count from its first node.
+#define VDVR_VERIFY_TILE 8
+// Views, and rows of the product along z, that are summed before they are added to the others.
+#define VDVR_VERIFY_VIEWS 8
+#define VDVR_VERIFY_ROWS 16
+
+typedef struct {
+  int accumulate;   // whether the views are added to what the nodes hold, or written
+  int first_view;   // of the table, of all views
+  int views;        // in the table
+  int all_views;    // of the scan
+  int columns;      // of the table
+  int tiles;        // to be back-projected
+  int nx;           // of the array of nodes: a multiple of VDVR_VERIFY_TILE
+  int rows_padded;  // heights of a node, to a multiple of 16
+  int first_row;    // of the 16 that the table holds
+} VdvrVerifyRows;
+
+typedef struct {
+  int blocks;
+  int nx, ny;        // nodes of a block across
+  int groups;        // of 16 heights
+  int all_x, all_y;  // of the array of nodes
+  int rows_padded;   // of it
+} VdvrVerifyHeights;
+
+typedef struct {
+  int outer, inner;   // what lies outside and inside of the axis; inner in vectors of 16
+  int before, after;  // nodes along the axis
+  int factor;         // places to a node
+  int node, phase;    // the first place lies behind that node by phase / factor
+} VdvrVerifyBetween;
+
+#endif
