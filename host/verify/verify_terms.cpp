@@ -33,7 +33,7 @@ struct Filtered {
         units(of_scan),
         scan(filter_projections(device, projections, field, progress, FilterMethod::automatic,
                                 Precision::fp64, units)),
-        upsampler(device, scan) {
+        upsampler(device, scan, ColumnMethod::accurate) {
     sups = interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan)
                                                     : field_sups(device, upsampler, scan);
   }
