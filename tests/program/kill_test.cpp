@@ -62,7 +62,7 @@ struct Work {
   int run(const std::vector<std::string>& words) const { return finish(start(words, messages)); }
   [[nodiscard]] std::string said() const { return vdvr::support::bytes_of(messages); }
   [[nodiscard]] std::vector<std::string> build(const std::string& more = "") const {
-    // Little memory makes small blocks, hence many records.
+    // Little memory lets few blocks share a batch, hence many records.
     std::vector<std::string> words{"build", scan.string(),   "--epsilon", "15%", "--max-memory",
                                    "40M",   "--granularity", "2",         "-o",  volume().string()};
     if (!more.empty()) words.push_back(more);
