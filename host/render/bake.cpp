@@ -88,6 +88,15 @@ int BakedTransfer::first_entry(float value) const {
   return std::min(static_cast<int>(x), size - 2);
 }
 
+std::pair<int, int> BakedTransfer::shown_entries() const {
+  const auto shows = [](std::uint8_t s) { return s == 0; };
+  const auto first = std::find_if(stretch.begin(), stretch.end(), shows);
+  if (first == stretch.end()) return {size, -1};
+  const auto last = std::find_if(stretch.rbegin(), stretch.rend(), shows);
+  // A value between two entries is made of both.
+  return {static_cast<int>(first - stretch.begin()) - 1, static_cast<int>(stretch.rend() - last) - 1};
+}
+
 std::uint8_t BakedTransfer::stretch_of(float low, float high) const {
   const auto first = static_cast<std::size_t>(first_entry(low)),
              last = static_cast<std::size_t>(first_entry(high)) + 1;

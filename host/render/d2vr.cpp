@@ -289,7 +289,7 @@ D2vrScene::D2vrScene(Device& device, const D2vrField& field, const Grid& grid, c
   }
   impl_->ranges = occupied_ranges(impl_->samples, kGranularity);
   const auto [lo, hi] = std::minmax_element(impl_->samples.samples.begin(), impl_->samples.samples.end());
-  impl_->drawn = {&device.state(), grid, bricks_of(grid), impl_->ranges, {*lo, *hi}, 0};
+  impl_->drawn = {&device.state(), grid, bricks_of(grid), impl_->ranges, {*lo, *hi}, 0, {}};
   const std::vector<cl_float4> views = field.impl().views(grid);
   impl_->views = DeviceArray<cl_float4>(device.state(), std::span<const cl_float4>(views), "views");
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "host/sampler/resident_volume.hpp"
+#include "shared/raycast_params.h"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -37,14 +38,29 @@ std::vector<std::uint8_t> sides_of_surfaces(const DrawnField& v, const std::vect
   return classes;
 }
 
+/// The guide of VDVR_BASE_FIRST. `empty`: by brick 0 where it may show something; nothing else counts.
+std::vector<std::uint8_t> guide_of(const DrawnField& v, const std::vector<std::uint8_t>& empty, bool skip) {
+  constexpr std::uint8_t kTile = 0, kEmpty = 1, kBase = 2;
+  std::vector<std::uint8_t> classes(empty.size());
+  for (std::size_t i = 0; i < classes.size(); ++i)
+    classes[i] = skip && empty[i] != 0 ? kEmpty : v.has_tile[i] != 0 ? kTile : kBase;
+  const Index3 n{v.bricks.bricks_x, v.bricks.bricks_y, v.bricks.bricks_z};
+  std::vector<std::uint8_t> guide = distance_to_other(classes, n);
+  for (std::size_t i = 0; i < guide.size(); ++i) {
+    guide[i] = std::min<std::uint8_t>(guide[i], VDVR_GUIDE_EMPTY - 1);
+    if (classes[i] == kEmpty) guide[i] = static_cast<std::uint8_t>(guide[i] + VDVR_GUIDE_EMPTY);
+  }
+  return guide;
+}
+
 }  // namespace
 
-const BakedTransfer& Frame::prepare(const RenderOptions& o, float slack) {
+const BakedTransfer& Frame::prepare(const RenderOptions& o, float slack, bool base_first) {
   fit_picture(o);
   static const BakedTransfer none;
   if (o.mode == RenderMode::slice) return none;
   bake_table(o);
-  if (o.mode != RenderMode::mip) update_distance(o, slack);
+  if (o.mode != RenderMode::mip) update_distance(o, slack, base_first);
   return baked_;
 }
 
@@ -85,9 +101,9 @@ void Frame::bake_table(const RenderOptions& o) {
   table_key_ = std::move(key);
 }
 
-void Frame::update_distance(const RenderOptions& o, float slack) {
+void Frame::update_distance(const RenderOptions& o, float slack, bool base_first) {
   const bool dvr = o.mode == RenderMode::dvr;
-  std::vector<float> key{slack}, surfaces;
+  std::vector<float> key{slack, base_first ? 1.0f : 0.0f, o.skip_empty ? 1.0f : 0.0f}, surfaces;
   for (const IsoSurface& s : o.surfaces) surfaces.push_back(static_cast<float>(s.value));
   if (dvr) {
     key.insert(key.end(), {0, baked_.lo, baked_.scale});
@@ -99,7 +115,7 @@ void Frame::update_distance(const RenderOptions& o, float slack) {
   if (key == distance_key_) return;
   const auto classes = dvr ? empty_bricks(field_, baked_, slack) : sides_of_surfaces(field_, surfaces, slack);
   const Index3 n{field_.bricks.bricks_x, field_.bricks.bricks_y, field_.bricks.bricks_z};
-  const auto distance = distance_to_other(classes, n);
+  const auto distance = base_first ? guide_of(field_, classes, o.skip_empty) : distance_to_other(classes, n);
   distance_key_.clear();
   if (distance_.size() != distance.size())
     distance_ = DeviceArray<cl_uchar>(*field_.state, distance.size(), "distances to occupied bricks");

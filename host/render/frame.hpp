@@ -23,6 +23,7 @@ struct DrawnField {
   std::span<const cl_float2> ranges;          ///< [bz][by][bx] least and greatest value
   std::pair<float, float> value_range{0, 0};  ///< of all samples
   int highest_level = 0;                      ///< of any brick and axis: log2 of samples per cell
+  std::span<const std::uint8_t> has_tile;     ///< [bz][by][bx] 1: a level of its own; empty: not known
 };
 
 /// Of one field, whose ranges must outlive it.
@@ -31,8 +32,9 @@ class Frame {
   explicit Frame(const DrawnField& field) : field_(field) {}
 
   /// Brings all up to date for a picture; `slack` is how far a sample may leave the range of its brick.
-  /// Returns the transfer function's tables, empty for a slice. Throws ResourceError.
-  const BakedTransfer& prepare(const RenderOptions& options, float slack);
+  /// `base_first` makes the guide that VDVR_BASE_FIRST reads. Returns the transfer function's tables, empty
+  /// for a slice. Throws ResourceError.
+  const BakedTransfer& prepare(const RenderOptions& options, float slack, bool base_first = false);
   /// Throws InputError for another count than there are bricks.
   void set_bounds(std::span<const float> bounds);
 
@@ -41,7 +43,8 @@ class Frame {
   [[nodiscard]] const opencl::DeviceArray<cl_float4>& picture() const { return picture_; }
   [[nodiscard]] const cl::Buffer& table() const { return table_.buffer(); }
   [[nodiscard]] const cl::Buffer& row_samples() const { return row_samples_.buffer(); }
-  /// [bz][by][bx] bricks to the nearest one of another class (distance_to_other); of modes dvr and iso.
+  /// [bz][by][bx] bricks to the nearest one of another class (distance_to_other), or a guide
+  /// (kernels/shared/raycast_params.h); of modes dvr and iso.
   [[nodiscard]] const cl::Buffer& distance() const { return distance_.buffer(); }
   [[nodiscard]] const cl::Buffer& bounds() const { return bounds_.buffer(); }
   [[nodiscard]] bool has_bounds() const { return bounds_.size() > 0; }
@@ -51,7 +54,7 @@ class Frame {
  private:
   void fit_picture(const RenderOptions& options);
   void bake_table(const RenderOptions& options);
-  void update_distance(const RenderOptions& options, float slack);
+  void update_distance(const RenderOptions& options, float slack, bool base_first);
 
   DrawnField field_;
   opencl::DeviceArray<cl_float4> picture_, table_;

@@ -20,7 +20,7 @@ using Impl = ResidentVolume::Impl;
 
 DrawnField drawn_field(const ResidentVolume& volume) {
   const Impl& v = volume.impl();
-  return {v.state, v.grid, v.field.grid, v.host_ranges, v.value_range, v.highest_level};
+  return {v.state, v.grid, v.field.grid, v.host_ranges, v.value_range, v.highest_level, v.has_tile};
 }
 
 // --- the sampler ---
@@ -60,7 +60,9 @@ float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
 // Packets address samples and records by 32-bit numbers.
 int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
-  if (sampler == SamplerKind::image3d || v.field.samples.size() > most || v.field.bricks.size() > most)
+  const bool lit = gradient == GradientKind::stored;  // then LitLayout::is_addressable() holds
+  if (sampler == SamplerKind::image3d || (!lit && v.field.highest_place > most) ||
+      v.field.bricks.size() > most)
     return 1;
   // Lit samples come in wide loads, of which twice as many keep the shuffles busy.
   return tuning.lanes.value_or(!v.state->info.is_cpu ? 1 : gradient == GradientKind::stored ? 16 : 8);
@@ -101,6 +103,10 @@ KernelName kernel_of(const RenderOptions& o) {
 
 }  // namespace
 
+bool base_first(const RenderOptions& o, GradientKind gradient, int lanes) {
+  return std::string(kernel_of(o).name) == "raycast_dvr" && gradient == GradientKind::stored && lanes > 1;
+}
+
 opencl::Defines raycast_defines(const Impl& v, const RenderOptions& o, SamplerKind sampler,
                                 GradientKind gradient, const RaycastTuning& tuning, int lanes) {
   const bool lit = gradient == GradientKind::stored;
@@ -122,6 +128,7 @@ opencl::Defines raycast_defines(const Impl& v, const RenderOptions& o, SamplerKi
       {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
       {"VDVR_LANES", std::to_string(lanes)},
       {"VDVR_UNIFORM", uniform && lanes > 1 ? "1" : "0"},
+      {"VDVR_BASE_FIRST", base_first(o, gradient, lanes) ? "1" : "0"},
   });
   if (lit) add({{"VDVR_SAMPLE_TYPES", "1"}});
   else add(sampler == SamplerKind::image3d ? v.atlas_defines() : v.field.defines);
@@ -176,10 +183,10 @@ Enqueued enqueue_frame(Frame& frame, Device& device, const ResidentVolume& volum
   Enqueued result;
   std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
   const float slack = range_slack(device, v, result.sampler);
-  const BakedTransfer& table = frame.prepare(o, slack);
-
   result.gradient = choose_gradient(v, o, result.sampler);
   const int lanes = lanes_for(v, result.sampler, result.gradient, tuning);
+  const BakedTransfer& table = frame.prepare(o, slack, base_first(o, result.gradient, lanes));
+
   const auto defines = raycast_defines(v, o, result.sampler, result.gradient, tuning, lanes);
   const Atlas* atlas = result.sampler == SamplerKind::image3d ? &v.atlas() : nullptr;
   const LitSamples* lit = result.gradient == GradientKind::stored ? &v.lit() : nullptr;

@@ -21,7 +21,8 @@ namespace vdvr {
 struct RaycastTuning {
   int group_x = 8, group_y = 8;  ///< pixels of one work-group
   /// Rays that a work-item follows side by side: 1, 4, 8 or 16; default: on CPUs 8, or 16 with stored
-  /// gradients, else 1. The image3d sampler and volumes of 2^31 samples take 1.
+  /// gradients, else 1. The image3d sampler and volumes of 2^31 samples take 1; of mixed types those of 2^31
+  /// smallest samples.
   std::optional<int> lanes;
 };
 
@@ -49,6 +50,9 @@ opencl::Range packet_range(const RenderOptions& options, const RaycastTuning& tu
 /// How many rays a work-item takes.
 int lanes_for(const ResidentVolume::Impl& volume, SamplerKind sampler, GradientKind gradient,
               const RaycastTuning& tuning);
+/// Whether packets ask first which of their bricks read the base (VDVR_BASE_FIRST). It needs the guide that
+/// Frame::prepare makes.
+bool base_first(const RenderOptions& options, GradientKind gradient, int lanes);
 /// What the program of kernels/render/raycast.cl is built with.
 opencl::Defines raycast_defines(const ResidentVolume::Impl& volume, const RenderOptions& options,
                                 SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning,

@@ -8,13 +8,14 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <tuple>
 
 #include "host/render/glm_vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 408 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 416 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
@@ -72,6 +73,7 @@ VdvrRaycast make_params(const DrawnField& v, const RenderOptions& o, const Baked
   p.table_lo = table.lo;
   p.table_scale = table.scale;
   p.table_size = table.size;
+  std::tie(p.first_shown, p.last_shown) = table.shown_entries();
   p.termination = static_cast<float>(o.termination);
   // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
   p.gradient_full = (v.value_range.second - v.value_range.first) / 32;

@@ -8,6 +8,12 @@ opencl::Defines field_defines(const MixedVolume& v, RecordKind records) {
           {"VDVR_RECORDS", std::to_string(static_cast<int>(records))}};
 }
 
+std::uint64_t highest_place(const MixedVolume& v) {
+  const int types = sample_types(v);
+  const std::uint64_t smallest = (types & 1 << VDVR_U8) != 0 ? 1 : (types & 1 << VDVR_U16) != 0 ? 2 : 4;
+  return sample_buffer_bytes(v) / smallest;
+}
+
 DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
     : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v))) {}
 
@@ -15,7 +21,8 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
     : samples(state, sample_buffer_bytes(v), "certified samples"),
       bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
       grid(sampler_grid(v)),
-      defines(field_defines(v, records.kind())) {
+      defines(field_defines(v, records.kind())),
+      highest_place(vdvr::highest_place(v)) {
   const auto put = [&](const SampleBlock& block, std::uint64_t first) {
     samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
   };

@@ -12,6 +12,9 @@ namespace vdvr {
 /// for.
 opencl::Defines field_defines(const MixedVolume& volume, RecordKind records);
 
+/// What no place of a stored sample is above, places counting samples of a tile's own type.
+std::uint64_t highest_place(const MixedVolume& volume);
+
 struct DeviceField {
   DeviceField(opencl::State& state, const MixedVolume& volume);
   DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records);
@@ -19,6 +22,7 @@ struct DeviceField {
   opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
   VdvrGrid grid;
   opencl::Defines defines;  ///< field_defines()
+  std::uint64_t highest_place = 0;
 };
 
 /// VDVR_COARSE_X, _Y, _Z, for kernels that read bricks through packet_sampler.h.

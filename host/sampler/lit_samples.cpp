@@ -83,23 +83,32 @@ LitLayout::LitLayout(const MixedVolume& v) {
 }
 
 std::uint64_t LitLayout::bytes() const {
-  return samples_ * sizeof(cl_uint2) + records_.size() * sizeof(std::uint32_t);
+  return 2 * samples_ * sizeof(cl_uint) + records_.size() * sizeof(std::uint32_t);
+}
+
+bool LitLayout::is_addressable() const {
+  constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
+  return samples_ <= most && records_.size() <= most;
 }
 
 LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const LitLayout& layout,
                        const Grid& world, float range)
-    : samples_(state, layout.samples(), "lit samples"),
+    : samples_(state, 2 * layout.samples(), "lit samples"),
       bricks_(state, std::span<const std::uint32_t>(layout.records_), "brick records of lit samples"),
       grid_(field.grid) {
-  if (layout.samples() > std::numeric_limits<std::int32_t>::max())
-    throw ResourceError(fmt::format("{} lit samples: their places have 31 bits", layout.samples()));
+  if (!layout.is_addressable())
+    throw ResourceError(fmt::format(
+        "`gradient` stored: {} samples in {} bricks, where 31 bits number the samples and two words "
+        "of each brick; use `gradient` central",
+        layout.samples(), layout.records_.size() / 2));
   const double unit = *std::min_element(world.spacing.begin(), world.spacing.end());
   const float largest = range > 0 ? range / 2 : 1;
   // Kernels read a component times 2^22 (shared/lit_gradient.h).
   grid_.step = largest / LIT_LARGEST * 0x1p-22f;
+  grid_.lit_samples = static_cast<cl_int>(layout.samples());
 
   const int lanes =
-      state.info.is_cpu && field.samples.size() <= std::numeric_limits<std::int32_t>::max() ? 8 : 1;
+      state.info.is_cpu && field.highest_place <= std::numeric_limits<std::int32_t>::max() ? 8 : 1;
   const bool uniform = layout.is_uniform() && layout.blocks_.front().params.base_type == VDVR_F32;
   opencl::Defines defines = coarse_defines(field.grid);
   defines.emplace_back("VDVR_GRANULARITY", std::to_string(field.grid.granularity));
@@ -116,6 +125,7 @@ LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const Lit
     b.cells_per_length_y = static_cast<float>(unit / world.spacing[1]);
     b.cells_per_length_z = static_cast<float>(unit / world.spacing[2]);
     b.per_gradient = LIT_LARGEST / largest;
+    b.samples = static_cast<cl_uint>(layout.samples());
     const std::vector<std::uint32_t> none{0};
     const opencl::DeviceArray<std::uint32_t> which(
         state, std::span<const std::uint32_t>(block.bricks.empty() ? none : block.bricks), "bricks of tiles");
@@ -132,7 +142,7 @@ LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const Lit
 }
 
 std::uint64_t LitSamples::bytes() const {
-  return samples_.size() * sizeof(cl_uint2) + bricks_.size() * sizeof(std::uint32_t);
+  return samples_.size() * sizeof(cl_uint) + bricks_.size() * sizeof(std::uint32_t);
 }
 
 }  // namespace vdvr

@@ -1,5 +1,5 @@
-// Lit samples: the stored field on the device as float32 with its gradient beside each sample, 8 bytes
-// together, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it
+// Lit samples: the stored field on the device as float32, and behind all samples their gradients, 4 bytes
+// each, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it
 // is stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
 #pragma once
 
@@ -16,6 +16,8 @@ class LitLayout {
   explicit LitLayout(const MixedVolume& volume);
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const;  ///< samples and records on the device
+  /// Whether 31 bits number its samples and the words of its records, as kernels do.
+  [[nodiscard]] bool is_addressable() const;
   /// No brick has a tile, and the base is as fine as the grid.
   [[nodiscard]] bool is_uniform() const { return is_uniform_; }
 
@@ -45,7 +47,7 @@ class LitSamples {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  opencl::DeviceArray<cl_uint2> samples_;
+  opencl::DeviceArray<cl_uint> samples_;  ///< values, then gradients
   opencl::DeviceArray<std::uint32_t> bricks_;
   VdvrGrid grid_;
 };

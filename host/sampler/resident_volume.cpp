@@ -280,6 +280,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
   for (const auto& [triple, block] : v.tiles)
     for (std::size_t a = 0; a < 3; ++a)
       highest_level = std::max(highest_level, triple.level[a] - v.coarsening[a]);
+  for (const LevelTriple& level : v.level) has_tile.push_back(level == LevelTriple{0, 0, 0} ? 0 : 1);
   find_ranges(v);
   // Last, because a constructor that throws runs no destructor to give it back.
   state->memory.take(host_ranges.size() * sizeof(cl_float2), "ranges of bricks");
@@ -387,8 +388,8 @@ const Atlas& ResidentVolume::Impl::atlas() const {
 
 bool ResidentVolume::Impl::lit_fits() const {
   const std::lock_guard guard(lock_);
-  return lit_ || (lit_layout.samples() <= std::numeric_limits<std::int32_t>::max() &&
-                  lit_layout.samples() * sizeof(cl_uint2) <= state->info.max_allocation &&
+  return lit_ || (lit_layout.is_addressable() &&
+                  2 * lit_layout.samples() * sizeof(cl_uint) <= state->info.max_allocation &&
                   lit_layout.bytes() <= state->memory.left());
 }
 

@@ -93,6 +93,7 @@ struct ResidentVolume::Impl {
   opencl::State* state;
   Grid grid;
   std::vector<cl_float2> host_ranges;  ///< what ranges() holds
+  std::vector<std::uint8_t> has_tile;  ///< [bz][by][bx] 1: a level of its own, 0: reads the base
   std::pair<float, float> value_range{0, 0};
   float largest = 0;        ///< that a texel can decode to, in magnitude
   int highest_level = 0;    ///< of any brick and axis: log2 of samples per cell

@@ -26,11 +26,7 @@ typedef struct {
 #include "device/packet_bricks.h"
 
 RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
-  OpenBrick b;
-  b.at = at;
-  b.low = v3(TO_V(at.x * VDVR_GRANULARITY), TO_V(at.y * VDVR_GRANULARITY), TO_V(at.z * VDVR_GRANULARITY));
-  b.high = v3(high_of(at.x, b.low.x, grid.bricks_x), high_of(at.y, b.low.y, grid.bricks_y),
-              high_of(at.z, b.low.z, grid.bricks_z));
+  OpenBrick b = boxed_brick(grid, at);
   b.views = bricks;
   return b;
 }

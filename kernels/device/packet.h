@@ -177,4 +177,47 @@ RAY_INLINE V4 as_columns(Turned8 a, Turned8 b) {
 #endif
 #endif
 
+// Two numbers of every lane, from one float2 a lane: PAIRS(ROW).
+typedef struct {
+  V first, second;
+} V2;
+#if VDVR_LANES == 1
+RAY_INLINE V2 paired(float2 a) {
+  const V2 t = {a.x, a.y};
+  return t;
+}
+#define PAIRS(ROW) paired(ROW(0))
+#elif VDVR_LANES == 4
+RAY_INLINE V2 paired(float2 a, float2 b, float2 c, float2 d) {
+  const V2 t = {(V)(a.x, b.x, c.x, d.x), (V)(a.y, b.y, c.y, d.y)};
+  return t;
+}
+#define PAIRS(ROW) paired(ROW(0), ROW(1), ROW(2), ROW(3))
+#else
+typedef struct {
+  float8 first, second;
+} Paired8;
+RAY_INLINE Paired8 paired8(float2 a, float2 b, float2 c, float2 d, float2 e, float2 f, float2 g, float2 h) {
+  const float8 abef = (float8)(a, b, e, f), cdgh = (float8)(c, d, g, h);
+  const Paired8 t = {(float8)(abef.s0, abef.s2, cdgh.s0, cdgh.s2, abef.s4, abef.s6, cdgh.s4, cdgh.s6),
+                     (float8)(abef.s1, abef.s3, cdgh.s1, cdgh.s3, abef.s5, abef.s7, cdgh.s5, cdgh.s7)};
+  return t;
+}
+#if VDVR_LANES == 8
+RAY_INLINE V2 as_pairs(Paired8 t) {
+  const V2 v = {t.first, t.second};
+  return v;
+}
+#define PAIRS(ROW) as_pairs(paired8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)))
+#else
+RAY_INLINE V2 as_pairs(Paired8 a, Paired8 b) {
+  const V2 v = {(V)(a.first, b.first), (V)(a.second, b.second)};
+  return v;
+}
+#define PAIRS(ROW)                                                                  \
+  as_pairs(paired8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)), \
+           paired8(ROW(8), ROW(9), ROW(a), ROW(b), ROW(c), ROW(d), ROW(e), ROW(f)))
+#endif
+#endif
+
 #endif

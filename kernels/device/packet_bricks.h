@@ -34,8 +34,23 @@ RAY_INLINE Offset brick_index(VdvrGrid grid, I3 b) {
 // The last brick of an axis is closed, and wider than the grid where the cells do not divide by the
 // granularity.
 RAY_INLINE V high_of(I b, V low, int bricks) {
-  return PICK(b == bricks - 1, (V)(INFINITY), low + (float)VDVR_GRANULARITY);
+  return PICK(b >= bricks - 1, (V)(INFINITY), low + (float)VDVR_GRANULARITY);
 }
+
+// Bricks by their place alone, or the cubes of bricks [b - radius, b + radius]; what else the includer's
+// open_brick() reads is left open.
+RAY_INLINE OpenBrick boxed_bricks(VdvrGrid grid, I3 at, I radius) {
+  OpenBrick b;
+  const I3 low = {at.x - radius, at.y - radius, at.z - radius};
+  const I3 high = {at.x + radius, at.y + radius, at.z + radius};
+  b.at = at;
+  b.low = v3(TO_V(low.x * VDVR_GRANULARITY), TO_V(low.y * VDVR_GRANULARITY), TO_V(low.z * VDVR_GRANULARITY));
+  b.high = v3(high_of(high.x, TO_V(high.x * VDVR_GRANULARITY), grid.bricks_x),
+              high_of(high.y, TO_V(high.y * VDVR_GRANULARITY), grid.bricks_y),
+              high_of(high.z, TO_V(high.z * VDVR_GRANULARITY), grid.bricks_z));
+  return b;
+}
+RAY_INLINE OpenBrick boxed_brick(VdvrGrid grid, I3 at) { return boxed_bricks(grid, at, (I)(0)); }
 
 RAY_INLINE OpenBrick no_brick(void) {
   OpenBrick b;

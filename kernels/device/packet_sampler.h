@@ -5,8 +5,8 @@
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
 //
-// VDVR_LIT: the buffer holds lit samples (host/sampler/lit_samples.hpp), each the float32 sample and behind
-// it the gradient there, so that light costs no further samples.
+// VDVR_LIT: the buffer holds lit samples (host/sampler/lit_samples.hpp), float32, and behind them all the
+// gradients there, so that light costs no further samples.
 #ifndef VDVR_PACKET_SAMPLER_H
 #define VDVR_PACKET_SAMPLER_H
 #ifndef VDVR_LIT
@@ -20,6 +20,14 @@
 #endif
 #if VDVR_LIT && (defined(VDVR_SAMPLER_IMAGE3D) || VDVR_SAMPLE_TYPES != 1)
 #error "lit samples are float32 in a buffer"
+#endif
+
+// 1: where all lanes' bricks read the base, none of their records is read.
+#ifndef VDVR_BASE_FIRST
+#define VDVR_BASE_FIRST 0
+#endif
+#if VDVR_BASE_FIRST && !VDVR_LIT
+#error "only lit samples have a base that can be read without its record"
 #endif
 
 #include "shared/lit_gradient.h"
@@ -75,15 +83,11 @@ RAY_INLINE void open_axis(OpenBrick* b, I level, I low, int cells, int coarse, V
 #endif
 
 RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
-  OpenBrick b;
-  b.at = at;
-  const I3 low = {at.x * VDVR_GRANULARITY, at.y * VDVR_GRANULARITY, at.z * VDVR_GRANULARITY};
-  b.low = v3(TO_V(low.x), TO_V(low.y), TO_V(low.z));
-  b.high = v3(high_of(at.x, b.low.x, grid.bricks_x), high_of(at.y, b.low.y, grid.bricks_y),
-              high_of(at.z, b.low.z, grid.bricks_z));
+  OpenBrick b = boxed_brick(grid, at);
 #ifdef VDVR_SAMPLER_IMAGE3D
   b.record = vdvr_brick(bricks, grid, brick_index(grid, at));
 #elif !VDVR_UNIFORM
+  const I3 low = {at.x * VDVR_GRANULARITY, at.y * VDVR_GRANULARITY, at.z * VDVR_GRANULARITY};
   // vdvr_record, lane by lane.
   const Offset word = brick_index(grid, at) * VDVR_BRICK_WORDS;
   __global const int* words = (__global const int*)bricks;
@@ -237,22 +241,21 @@ RAY_INLINE V load(FIELD, const Cell* c, Place p) {
 // A sample and its neighbour along x, which lies behind it: one load.
 typedef struct {
   V at, next;
-#if VDVR_LIT
-  U at_gradient, next_gradient;
-#endif
 } Pair;
+#if VDVR_SAMPLE_TYPES == 1
+#define FLOAT_PAIR(n) vload2(0, s + TO_ULONG(LANE(p.lane, n)))
+RAY_INLINE Pair float_pair(__global const float* s, Place p) {
+  s += p.all;
+  const V2 t = PAIRS(FLOAT_PAIR);
+  const Pair v = {t.first, t.second};
+  return v;
+}
+#endif
 RAY_INLINE Pair load_pair(FIELD, const Cell* c, Place p) {
-  Pair v;
-#if VDVR_LIT
-  __global const float* s = (__global const float*)field + 2 * (ulong)p.all;
-#define ROW(n) vload4(0, s + 2 * TO_ULONG(LANE(p.lane, n)))
-  const V4 t = TURN(ROW);
-#undef ROW
-  v.at = t.x;
-  v.at_gradient = AS_U(t.y);
-  v.next = t.z;
-  v.next_gradient = AS_U(t.w);
+#if VDVR_SAMPLE_TYPES == 1
+  return float_pair((__global const float*)field, p);
 #elif defined(VDVR_ONE_TYPE)
+  Pair v;
   __global const VDVR_ONE_TYPE* s = (__global const VDVR_ONE_TYPE*)field + p.all;
   VDVR_ONE_VECTOR at, next;
 #define TWO(n)                                             \
@@ -265,11 +268,11 @@ RAY_INLINE Pair load_pair(FIELD, const Cell* c, Place p) {
 #undef TWO
   v.at = decoded(c, TO_V(at));
   v.next = decoded(c, TO_V(next));
-#else
-  v.at = load(field, c, p);
-  v.next = load(field, c, after(p, c->x));
-#endif
   return v;
+#else
+  const Pair v = {load(field, c, p), load(field, c, after(p, c->x))};
+  return v;
+#endif
 }
 
 RAY_INLINE V lerp(V a, V b, V t) { return (1.0f - t) * a + t * b; }
@@ -305,15 +308,39 @@ RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
   return cell;
 }
 
-// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>, gradients
-// g<z><y><x>.
+#if VDVR_BASE_FIRST
+// As cell_at, of points whose bricks all read the base: its cells in global coordinates have the bits of the
+// brick's own, because c - low and powers of two are exact in fp32. No record is read.
+RAY_INLINE Cell base_cell_at(VdvrGrid grid, V3 c) {
+  const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
+            nz = grid.cells_z >> VDVR_COARSE_Z;
+  const V zero = (V)(0.0f);
+  Cell cell;
+  cell.index.x = local_of(c.x, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_X)), (I)(nx - 1), &cell.fraction.x);
+  cell.index.y = local_of(c.y, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Y)), (I)(ny - 1), &cell.fraction.y);
+  cell.index.z = local_of(c.z, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Z)), (I)(nz - 1), &cell.fraction.z);
+  cell.x = place((Offset)(0), 1);
+  cell.y = place((Offset)(0), nx + 1);
+  cell.z = place((Offset)(0), (nx + 1) * (ny + 1));
+  cell.lowest = place((cell.index.z * (ny + 1) + cell.index.y) * (nx + 1) + cell.index.x, 0);
+  cell.type = (I)(VDVR_F32);
+  cell.value_scale = cell.bias = zero;
+  return cell;
+}
+#endif
+
+// Strides that all lanes share cost nothing in an address. 1: whether they do is known by packet only.
+#define VDVR_MAY_SHARE (VDVR_LIT && !VDVR_UNIFORM && VDVR_LANES > 1)
+
+// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>.
 typedef struct {
   Cell cell;
   V s000, s001, s010, s011, s100, s101, s110, s111;
-#if VDVR_LIT
-  U g000, g001, g010, g011, g100, g101, g110, g111;
-#endif
   V value;
+#if VDVR_MAY_SHARE
+  int alike;     // all lanes have the strides that follow
+  Place ay, az;  // else the cell's own hold
+#endif
 } Sampled;
 
 RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
@@ -329,36 +356,56 @@ RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
   k->s101 = p10.next;
   k->s110 = p11.at;
   k->s111 = p11.next;
-#if VDVR_LIT
-  k->g000 = p00.at_gradient;
-  k->g001 = p00.next_gradient;
-  k->g010 = p01.at_gradient;
-  k->g011 = p01.next_gradient;
-  k->g100 = p10.at_gradient;
-  k->g101 = p10.next_gradient;
-  k->g110 = p11.at_gradient;
-  k->g111 = p11.next_gradient;
-#endif
 }
 
 // As vdvr_sample_in_brick: x first, then y, then z.
+RAY_INLINE void interpolate(Sampled* k) {
+  const V3 f = k->cell.fraction;
+  k->value = lerp(lerp(lerp(k->s000, k->s001, f.x), lerp(k->s010, k->s011, f.x), f.y),
+                  lerp(lerp(k->s100, k->s101, f.x), lerp(k->s110, k->s111, f.x), f.y), f.z);
+}
+
 RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   Sampled k;
   k.cell = cell_at(grid, b, c);
-#if VDVR_UNIFORM || VDVR_LANES == 1 || !VDVR_LIT
-  load_corners(field, k.cell.y, k.cell.z, &k);
-#else
-  // Strides that all lanes share cost nothing in an address.
-  if (b->alike)
-    load_corners(field, place((Offset)(0), LANE(b->stride_y, 0)), place((Offset)(0), LANE(b->stride_z, 0)),
-                 &k);
+#if VDVR_MAY_SHARE
+  k.alike = b->alike;
+  k.ay = place((Offset)(0), LANE(b->stride_y, 0));
+  k.az = place((Offset)(0), LANE(b->stride_z, 0));
+  if (k.alike) load_corners(field, k.ay, k.az, &k);
   else load_corners(field, k.cell.y, k.cell.z, &k);
+#else
+  load_corners(field, k.cell.y, k.cell.z, &k);
 #endif
-  const V3 f = k.cell.fraction;
-  k.value = lerp(lerp(lerp(k.s000, k.s001, f.x), lerp(k.s010, k.s011, f.x), f.y),
-                 lerp(lerp(k.s100, k.s101, f.x), lerp(k.s110, k.s111, f.x), f.y), f.z);
+  interpolate(&k);
   return k;
 }
+
+#if VDVR_BASE_FIRST
+// The same where all lanes' bricks read the base, if `all_base`; `b` is then not looked at.
+RAY_INLINE Sampled sample_base_first(FIELD, const OpenBrick* b, int all_base, VdvrGrid grid, V3 c) {
+#if VDVR_UNIFORM
+  return sample_open(field, b, grid, c);
+#else
+  Sampled k;
+  if (all_base) {
+    k.cell = base_cell_at(grid, c);
+    k.alike = 1;
+    k.ay = k.cell.y;
+    k.az = k.cell.z;
+  } else {
+    k.cell = cell_at(grid, b, c);
+    k.alike = b->alike;
+    k.ay = place((Offset)(0), LANE(b->stride_y, 0));
+    k.az = place((Offset)(0), LANE(b->stride_z, 0));
+  }
+  if (k.alike) load_corners(field, k.ay, k.az, &k);
+  else load_corners(field, k.cell.y, k.cell.z, &k);
+  interpolate(&k);
+  return k;
+#endif
+}
+#endif
 
 // The field in a face of cells with lowest sample i, by fractions along the two axes that it runs along.
 RAY_INLINE V in_face(FIELD, const Cell* c, Place i, Place u, V fu, Place v, V fv) {

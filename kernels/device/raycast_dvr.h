@@ -216,7 +216,7 @@ RAY_INLINE void absorb(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const
   const float3 cells_per_length =
       (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
 #if VDVR_BOUNDS
-  raise_bound(grid, brick->at, weight > shaded_weight, seen THE_BOUNDS);
+  raise_bound(grid, brick_at(grid, c), weight > shaded_weight, seen THE_BOUNDS);
 #elif VDVR_GEOMETRY
   const I half_way = (seen->alpha < 0.5f) & (seen->alpha + weight >= 0.5f);
   if (ANY(half_way)) {
@@ -262,14 +262,30 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
   const int end = most_lane(ends);
   OpenBrick brick = no_brick();
+#if VDVR_BASE_FIRST
+  I empty;
+  int all_base = 0;
+#endif
   int k = 0;
   while (k < end) {
-    const I active = (k < ends) & (seen.alpha < p.termination);
+    I active = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(active)) break;
     const float t = ((float)k + 0.5f) * p.step;
     const V3 c = position_at(&ray, grid, (V)(t));
     if (ANY(active & NOT(is_inside(&brick, c)))) {
       const I3 at = brick_at(grid, c);
+#if VDVR_BASE_FIRST
+      const I guide = TO_I(GATHER(U8, distance, brick_index(grid, at)));
+      const I radius = (guide & (VDVR_GUIDE_EMPTY - 1)) - 1;
+      empty = (guide & VDVR_GUIDE_EMPTY) != 0;
+      if (!ANY(active & NOT(empty))) {
+        k = leap_to(leave_bricks(&ray, at, radius), active, p.inverse_step, 0.5f, k, end);
+        continue;
+      }
+      all_base = !ANY(active & (guide == 0));
+      if (all_base) brick = boxed_bricks(grid, at, radius);
+      else brick = open_brick(bricks, grid, at);
+#else
       if (p.skip) {
         const I away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
         if (!ANY(active & (away == 0))) {
@@ -278,14 +294,24 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
         }
       }
       brick = open_brick(bricks, grid, at);
+#endif
     }
+#if VDVR_BASE_FIRST
+    // What stands in the base in the place of an empty brick's tile is not the field.
+    active &= NOT(empty);
+    const Sampled sampled = sample_base_first(THE_FIELD, &brick, all_base, grid, c);
+#else
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
+#endif
     const Row row = row_of(&p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
-    const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
-    if (ANY(weight > 0.0f))
-      absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
-             (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
+    // Most samples that show nothing lie where the transfer function's first or last entries are 0.
+    if (ANY(active & (row.entry >= p.first_shown) & (row.entry <= p.last_shown))) {
+      const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
+      if (ANY(weight > 0.0f))
+        absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
+               (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
+    }
     ++k;
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);

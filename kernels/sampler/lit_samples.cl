@@ -1,10 +1,11 @@
-// Lit samples: every stored sample as float32, with the field's gradient there in a word beside it
-// (shared/lit_gradient.h). The gradient of a point is that of the brick that the point belongs to, whatever
-// tile stores it: central differences over one base cell, as gradient_at has it.
+// Lit samples: every stored sample as float32, and behind all of them the field's gradients there, a word
+// each (shared/lit_gradient.h). Apart, because most samples that a ray takes are not lit: what it reads then
+// is half as much. The gradient of a point is that of the brick that the point belongs to, whatever tile
+// stores it: central differences over one base cell, as gradient_at has it.
 //
 // Between bricks of different levels the finer one has samples on the shared face that the coarser one lacks.
 // close_gradients interpolates the gradients there from those that both have, edges before faces, so that
-// light has no seam. Layouts: lit[base, then tiles by triple][z][y][x] (value, gradient). Called by:
+// light has no seam. Layouts: lit[value, gradient][base, then tiles by triple][z][y][x]. Called by:
 // LitSamples in host/sampler/lit_samples.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
@@ -36,7 +37,7 @@ RAY_INLINE U stored_gradient(V3 g, float per_gradient) {
 // Samples VDVR_LANES at a time along x: global id (x / lanes, z * size_y + y, tile).
 __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
                                         __global const uint* restrict tile_bricks, VdvrLitBlock block,
-                                        __global uint2* restrict lit) {
+                                        __global uint* restrict lit) {
   const int first = (int)get_global_id(0) * VDVR_LANES, row = (int)get_global_id(1);
   const int tile = (int)get_global_id(2), z = row / block.size_y, y = row - z * block.size_y;
   if (first >= block.size_x || z >= block.size_z || tile >= max(block.tiles, 1)) return;
@@ -75,9 +76,11 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
   const ulong place =
       block.first +
       (((ulong)tile * (ulong)block.size_z + (ulong)z) * (ulong)block.size_y + (ulong)y) * (ulong)block.size_x;
-#define PUT(n)                      \
-  if (first + 0x##n < block.size_x) \
-    lit[place + (ulong)(first + 0x##n)] = (uint2)(as_uint(LANE(value, n)), LANE(words, n));
+#define PUT(n)                                                                   \
+  if (first + 0x##n < block.size_x) {                                            \
+    lit[place + (ulong)(first + 0x##n)] = as_uint(LANE(value, n));               \
+    lit[(ulong)block.samples + place + (ulong)(first + 0x##n)] = LANE(words, n); \
+  }
   EACH(PUT)
 #undef PUT
 }
@@ -85,17 +88,17 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
 // --- closing: one tile a work-item ---
 
 typedef struct {
-  __global uint2* samples;
+  __global uint* gradients;
   int level[3], last[3], stride[3];  // x, y, z; index of the last sample
   int brick[3];
 } LitTile;
 
 RAY_INLINE float3 gradient_in(const LitTile* t, int at) {
-  const int w = (int)t->samples[at].y;
+  const int w = (int)t->gradients[at];
   return (float3)((float)LIT_X(w), (float)LIT_Y(w), (float)LIT_Z(w)) * 0x1p-22f;
 }
 RAY_INLINE void put_gradient(const LitTile* t, int at, float3 g) {
-  t->samples[at].y = word_of((int)rint(g.x), (int)rint(g.y), (int)rint(g.z));
+  t->gradients[at] = word_of((int)rint(g.x), (int)rint(g.y), (int)rint(g.z));
 }
 RAY_INLINE float3 between3(float3 a, float3 b, float t) { return (1.0f - t) * a + t * b; }
 
@@ -160,11 +163,11 @@ RAY_INLINE void close_faces(BRICKS, VdvrGrid grid, const LitTile* t, int axis) {
 }
 
 __kernel void close_gradients(BRICKS, VdvrGrid grid, __global const uint* restrict tile_bricks,
-                              VdvrLitBlock block, __global uint2* restrict lit) {
+                              VdvrLitBlock block, __global uint* restrict lit) {
   const int tile = (int)get_global_id(0);
   if (tile >= block.tiles) return;
   const int brick = (int)tile_bricks[tile], layer = brick / grid.bricks_x, size = block.size_x * block.size_y;
-  const LitTile t = {lit + block.first + (ulong)tile * (ulong)(size * block.size_z),
+  const LitTile t = {lit + (ulong)block.samples + block.first + (ulong)tile * (ulong)(size * block.size_z),
                      {block.level_x, block.level_y, block.level_z},
                      {block.size_x - 1, block.size_y - 1, block.size_z - 1},
                      {1, block.size_x, size},

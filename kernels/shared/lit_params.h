@@ -11,8 +11,8 @@ typedef struct {
   int base_type;                  // of the base as stored, with its scale and bias
   float base_scale, base_bias;
   float cells_per_length_x, cells_per_length_y, cells_per_length_z;
-  float per_gradient;       // units of a stored gradient per density and length
-  unsigned int first, pad;  // sample that its first tile starts at; below 2^32
+  float per_gradient;           // units of a stored gradient per density and length
+  unsigned int first, samples;  // sample that its first tile starts at, and of all blocks; below 2^31
 } VdvrLitBlock;
 
 #endif

@@ -84,8 +84,8 @@ typedef struct {
   vdvr_i32 bricks_x, bricks_y, bricks_z;
   float step;  // of the lattice that integer samples lie on: a power of two
   vdvr_i32 coarse_x, coarse_y,
-      coarse_z;  // log2 of cells per cell of the base, which divides cells and bricks
-  vdvr_i32 pad;
+      coarse_z;          // log2 of cells per cell of the base, which divides cells and bricks
+  vdvr_i32 lit_samples;  // of lit samples, behind which their gradients stand (packet_sampler.h); else 0
 } VdvrGrid;
 
 // Scale and bias are a power of two and a multiple of step below 2^24 steps: exact, as is every sample.

@@ -16,6 +16,11 @@
 
 #define VDVR_SURFACES 8
 
+// With VDVR_BASE_FIRST a byte of the guide says of a brick: 0 a tile of its own, below this the distance to
+// the nearest brick that is not like it (reads the base, and may show something), from this on it shows
+// nothing, and how far it is to one that does is added.
+#define VDVR_GUIDE_EMPTY 128
+
 // Of a slice's pixels outside the grid.
 #define VDVR_GREY_OUTSIDE 0.02f
 
@@ -26,7 +31,7 @@ typedef struct {
 
 #define VDVR_LIGHTS 8
 
-// Scalars only: no alignment that two compilers could read differently. 408 bytes.
+// Scalars only: no alignment that two compilers could read differently. 416 bytes.
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
@@ -38,6 +43,7 @@ typedef struct {
   float length_unit;         // world units per length
   float table_lo, table_scale;
   int table_size;
+  int first_shown, last_shown;  // entries from which a value may show something; none: first above last
   float termination;
   float gradient_full;  // gradient, density per length, from which on a sample is fully shaded
   float slack;          // rounding allowance of the sampler on a brick's range

@@ -39,11 +39,11 @@ struct Lit {
     return records[2 * brick] +
            static_cast<std::size_t>(sample[0] + side(0) * (sample[1] + side(1) * sample[2]));
   }
-  [[nodiscard]] float value(std::size_t at) const { return std::bit_cast<float>(words[2 * at]); }
+  [[nodiscard]] float value(std::size_t at) const { return std::bit_cast<float>(words[at]); }
   [[nodiscard]] Vec3 gradient(std::size_t at) const {
     Vec3 g{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const int bits = static_cast<int>(words[2 * at + 1] >> (10 * a) & 1023u);
+      const int bits = static_cast<int>(words[words.size() / 2 + at] >> (10 * a) & 1023u);
       g[a] = unit * (bits > 511 ? bits - 1024 : bits);
     }
     return g;

@@ -10,6 +10,7 @@
 #include "vdvr/raycast.hpp"
 
 using namespace vdvr;
+using fields::centred_grid;
 
 namespace {
 
@@ -191,4 +192,33 @@ BOOST_AUTO_TEST_CASE(memory_is_given_back) {
     }
   }
   BOOST_TEST(device.memory_left() == before);
+}
+
+BOOST_AUTO_TEST_CASE(places_count_samples_and_not_bytes) {
+  // Packets take numbers of 31 bits: a float32 volume of 2 GB still has them.
+  const MixedVolume v = many_tiles();
+  std::uint64_t samples = v.base.size();
+  for (const auto& [kind, block] : v.tiles) samples += block.size();
+  BOOST_TEST(highest_place(v) == samples);
+  BOOST_TEST(highest_place(support::in_types(v, {SampleType::u16})) >= samples);
+  BOOST_TEST(highest_place(support::in_types(v, {SampleType::u16})) <= samples + 2 * (v.tiles.size() + 1));
+  const MixedVolume mixed = support::in_types(v, {SampleType::f32, SampleType::u8});
+  BOOST_TEST(highest_place(mixed) == sample_buffer_bytes(mixed));
+}
+
+BOOST_AUTO_TEST_CASE(lit_samples_beyond_31_bits_are_refused_before_memory_is_taken) {
+  // Levels alone say where lit samples lie: 600,000 bricks of 17^3 samples are 2.9e9.
+  MixedVolume v;
+  v.grid = centred_grid({336, 336, 336});
+  v.granularity = 4;
+  v.rate = 4;
+  const auto level_of = [&](std::uint8_t level) {
+    v.level.assign(static_cast<std::size_t>(v.brick_count()), LevelTriple{level, level, level});
+    v.tile.resize(v.level.size());
+    return LitLayout(v);
+  };
+  const LitLayout coarse = level_of(1), fine = level_of(2);
+  BOOST_TEST(coarse.is_addressable());
+  BOOST_TEST(fine.samples() > 0x7fffffffu);
+  BOOST_TEST(!fine.is_addressable());
 }
