@@ -54,8 +54,8 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const Fie
     fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
   halo_ = fit_halo_;
   // About 16 x 16 x 16 base cells at once: large enough that halos are cheap, small enough for caches. Never
-  // by memory: fits of levels that are coarse along an axis look further than the halo, so that samples near a
-  // block's rim depend on where it lies. The same scan, grid and tolerance give the same volume.
+  // by memory: fits of levels that are coarse along an axis look further than the halo, so that samples near
+  // a block's rim depend on where it lies. The same scan, grid and tolerance give the same volume.
   block_bricks_ = slab_bricks_ = std::max<std::int64_t>(1, 128 / (g * settings.rate));
 }
 

@@ -205,7 +205,7 @@ BOOST_AUTO_TEST_CASE(kept_nodes_of_thousands_of_views_err_by_no_more_than_is_cha
         const double rounding = e.rounding / sups.value;
         if (views == 90) rounding_of_90[rate] = rounding;
         BOOST_TEST(rounding <= 1.1 * rounding_of_90[rate]);
-        const double F = static_cast<double>(views) * static_cast<double>(f.samples.front());
+        const double F = static_cast<double>(views) * static_cast<double>(f.samples[0]);
         for (const Index3& node : {Index3{2, 2, 0}, {3, 2, 1}, {3, 3, 1}, {1, 4, 0}}) {
           const double error = std::abs(node_of(kept, lattice, node) - F);
           closest = std::max(closest, error / (e.interpolation + e.rounding));

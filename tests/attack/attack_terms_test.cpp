@@ -25,7 +25,7 @@ struct Arithmetic {
 
 // The largest |computed - exact| over a block of columns at one detector row, both with the same
 // interpolation; `truth` are the samples that exact arithmetic starts from.
-Arithmetic measure(const FilteredScan& filtered, const std::vector<float>& truth, int upsampling,
+Arithmetic measure(const FilteredScan& filtered, std::span<const float> truth, int upsampling,
                    Interpolation interpolation, const ColumnBlocks& blocks, double row) {
   opencl::State& state = device().state();
   Upsampler upsampler(state, filtered);

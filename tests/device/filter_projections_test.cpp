@@ -179,16 +179,16 @@ BOOST_AUTO_TEST_CASE(a_device_that_ends_takes_the_plans_of_no_other_with_it) {
     return filter_projections(device.state(), scan, {}, {}, FilterMethod::fourier).samples;
   };
   Device stays, moved;
-  const std::vector<float> before = filtered(stays);
+  const SampleArray before = filtered(stays);
   for (int i = 0; i < 3; ++i) {
     Device ends;
-    BOOST_TEST(filtered(ends) == before);
-    BOOST_TEST(filtered(stays) == before);
+    BOOST_TEST((filtered(ends) == before));
+    BOOST_TEST((filtered(stays) == before));
     // A device that another is moved over ends too.
-    BOOST_TEST(filtered(moved) == before);
+    BOOST_TEST((filtered(moved) == before));
     moved = Device();
   }
-  BOOST_TEST(filtered(stays) == before);
+  BOOST_TEST((filtered(stays) == before));
 }
 
 BOOST_AUTO_TEST_CASE(good_length_is_the_smallest_of_its_kind) {

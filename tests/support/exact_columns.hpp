@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "host/bounds/six_taps.hpp"
@@ -35,7 +36,7 @@ struct ExactColumns {
   UpsampledColumns columns;
   std::vector<double> samples;
   std::vector<double> row_weights;  // of the one detector row in use
-  ExactColumns(const ParallelGeometry& geometry, const UpsampledColumns& c, const std::vector<float>& s,
+  ExactColumns(const ParallelGeometry& geometry, const UpsampledColumns& c, std::span<const float> s,
                double row)
       : g(geometry),
         columns(c),
