@@ -198,9 +198,14 @@ typedef struct {
   float8 first, second;
 } Paired8;
 RAY_INLINE Paired8 paired8(float2 a, float2 b, float2 c, float2 d, float2 e, float2 f, float2 g, float2 h) {
+#ifdef VDVR_PLAIN_VECTORS  // element by element, for simulators that cannot follow vectors that are joined
+  const Paired8 t = {(float8)(a.x, b.x, c.x, d.x, e.x, f.x, g.x, h.x),
+                     (float8)(a.y, b.y, c.y, d.y, e.y, f.y, g.y, h.y)};
+#else
   const float8 abef = (float8)(a, b, e, f), cdgh = (float8)(c, d, g, h);
   const Paired8 t = {(float8)(abef.s0, abef.s2, cdgh.s0, cdgh.s2, abef.s4, abef.s6, cdgh.s4, cdgh.s6),
                      (float8)(abef.s1, abef.s3, cdgh.s1, cdgh.s3, abef.s5, abef.s7, cdgh.s5, cdgh.s7)};
+#endif
   return t;
 }
 #if VDVR_LANES == 8

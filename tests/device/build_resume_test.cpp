@@ -18,11 +18,12 @@ using vdvr::testing::grid_of;
 using vdvr::testing::noise_scan;
 using vdvr::testing::simulated;
 
-// Blocks are small for want of memory, so that there are several; closing makes bricks rise.
+// Memory is little, and the grid more than a block wide, so that there are several batches; closing makes
+// bricks rise.
 BOOST_AUTO_TEST_CASE(build_interrupted_anywhere_and_resumed_is_the_uninterrupted_one) {
   const ProjectionSet scan = simulated(shepp_logan(8), 17, 13, 24);
   const Grid grid = grid_of(scan, {17, 17, 12}, 1.0);
-  Device device("", 20 << 20);
+  Device device("", 96 << 20);
   PlanSettings sampled;
   sampled.comparison.coefficients = Coefficients::sampled;
   sampled.granularity = 2;

@@ -393,7 +393,7 @@ BOOST_AUTO_TEST_CASE(finer_gold_bounds_the_same_bricks_by_less) {
 
 BOOST_AUTO_TEST_CASE(little_memory_gives_the_same_verdict) {
   const Made& m = small();
-  constexpr std::uint64_t limit = 12 << 20;
+  constexpr std::uint64_t limit = 24 << 20;
   Device device("", limit);
   const VerifyResult r = verify(device, m.scan, m.volume, m.certificate, {true, 0.1, 3});
   BOOST_TEST(r.holds, r.failure);
