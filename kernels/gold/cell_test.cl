@@ -147,13 +147,13 @@ inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global 
 
 #if VDVR_LANES == 8
 // V on a row of columns at nodes begin .. begin + 8, where planes of samples lie four nodes apart or more:
-// three planes serve them all. The sampler's text in vectors, operation by operation: planes in the lanes of a
-// float4, then heights; a weight of 0 adds nothing.
+// three planes serve them all. The sampler's text in vectors, operation by operation: planes in the lanes of
+// a float4, then heights; a weight of 0 adds nothing.
 typedef struct {
-  int per_x, per_y;    // nodes to an interval of samples
-  float of_x, of_y;    // 1 / those
-  size_t first;        // the brick's first sample of the lowest plane
-  size_t to_1, to_2;   // the next planes
+  int per_x, per_y;               // nodes to an interval of samples
+  float of_x, of_y;               // 1 / those
+  size_t first;                   // the brick's first sample of the lowest plane
+  size_t to_1, to_2;              // the next planes
   float8 low_0, low_1, low_2;     // weights of planes at nodes begin + 0 .. 7
   float8 high_0, high_1, high_2;  // and begin + 1 .. 8
 } Planes;
@@ -186,7 +186,8 @@ inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, i
 
 inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
   if (VDVR_HOLDS(*b, VDVR_F32)) return ((__global const float*)samples)[i];
-  const float code = VDVR_HOLDS(*b, VDVR_U16) ? (float)((__global const ushort*)samples)[i] : (float)samples[i];
+  const float code =
+      VDVR_HOLDS(*b, VDVR_U16) ? (float)((__global const ushort*)samples)[i] : (float)samples[i];
   return code * b->scale + b->bias;
 }
 inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples, const VdvrBrick* b,
@@ -236,9 +237,8 @@ inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
 inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after, int to_y) {
   const VEC low2 = 2.0f * here.low, high2 = 2.0f * here.high;
   const VEC x0 = before.low + after.low - low2, x1 = before.high + after.high - high2,
-            y0 = READ(c - to_y) + READ(c + to_y) - low2,
-            y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - high2, z0 = READ(c - 1) + here.high - low2,
-            z1 = here.low + READ(c + 2) - high2;
+            y0 = READ(c - to_y) + READ(c + to_y) - low2, y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - high2,
+            z0 = READ(c - 1) + here.high - low2, z1 = here.low + READ(c + 2) - high2;
   Corners out;
   out.xp = MORE(x0, x1);
   out.xm = -LESS(x0, x1);
@@ -303,8 +303,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
   const int to_x = s.gold_stride, to_y = p.row * s.gold_stride;
   const INT node = begin + p.z * VDVR_BRICK_NODES + INDEX, cell = begin + INDEX;
-  const INT low_tested = (node >= test.z_first) & (node <= test.z_last),
-            inside = cell < p.last_z,
+  const INT low_tested = (node >= test.z_first) & (node <= test.z_last), inside = cell < p.last_z,
             end_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last) & inside;
   VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
   int parts = 0;
