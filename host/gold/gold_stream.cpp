@@ -284,9 +284,9 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
                  work.z, selected);
     batch.margins_ = margins(batch.first_brick_, nx, ny);
     batch.margin_.write(batch.margins_);
-    for (std::size_t b = 0; b < n; ++b)
-      source_->kept.fill(lattice_, box(work, work.first[begin + b]), batch.gold_, b * block,
-                         batch.shape_.gold_stride);
+    std::vector<GoldBox> boxes;
+    for (std::size_t b = 0; b < n; ++b) boxes.push_back(box(work, work.first[begin + b]));
+    source_->kept.fill(lattice_, boxes, batch.gold_, 0, block, batch.shape_.gold_stride);
     if (!settings_.base_only)
       batch.take_addends(brick_addends(*source_->remainder, lattice_, errors_, settings_,
                                        batch.block_bricks(), batch.first_brick_),

@@ -11,7 +11,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrAlongZ) == 64 && sizeof(VdvrAcross) == 72);
+static_assert(sizeof(VdvrColumns) == 24 && sizeof(VdvrAlongZ) == 56 && sizeof(VdvrAcross) == 96);
 
 namespace {
 
@@ -77,15 +77,25 @@ AlongZ::AlongZ(opencl::State& state, const HeightWeights& weights)
       groups_(weights.groups()) {}
 
 void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                        const opencl::DeviceArray<float>& out, VdvrAlongZ shape) const {
+                        const opencl::DeviceArray<float>& out, std::span<const VdvrColumns> parts,
+                        VdvrAlongZ shape) const {
+  if (parts.empty()) return;
   shape.terms = to_int(terms_);
   shape.groups = to_int(groups_);
+  shape.parts = to_int(static_cast<std::int64_t>(parts.size()));
+  shape.columns_x = shape.columns_y = 0;
+  for (const VdvrColumns& p : parts) {
+    shape.columns_x = std::max(shape.columns_x, p.columns_x);
+    shape.columns_y = std::max(shape.columns_y, p.columns_y);
+  }
+  const opencl::DeviceArray<VdvrColumns> on_device(state, parts, "columns to interpolate");
   const int lanes = lanes_along_z(state);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
       state, "kept/interpolate", "along_z", defines(lanes, 1));
-  kernel({{count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8), count(shape.columns_y)},
+  kernel({{count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
+           count(std::int64_t{shape.columns_y} * shape.parts)},
           {1, 4, 1}},
-         out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), shape);
+         out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
 }
 
 Across::Across(opencl::State& state, int phases, std::span<const float> weights)
@@ -96,8 +106,9 @@ void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   const int lanes = column_tuning(state.info).lanes;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
                                                                         defines(lanes, phases_));
-  kernel({{count(shape.z / lanes), count(shape.others), count(shape.intervals)}, {1, 4, 4}}, out.buffer(),
-         in.buffer(), weights_.buffer(), shape);
+  kernel({{count(shape.z / lanes), count(shape.others), count(std::int64_t{shape.intervals} * shape.boxes)},
+          {1, 4, 4}},
+         out.buffer(), in.buffer(), weights_.buffer(), shape);
 }
 
 }  // namespace vdvr

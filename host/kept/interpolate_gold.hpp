@@ -30,10 +30,12 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
 class AlongZ {
  public:
   AlongZ(opencl::State& state, const HeightWeights& weights);
-  /// The part that `shape` names, whose terms and groups are set here. Enqueues. Cost: columns * groups * 16
-  /// * terms multiply-adds; error: that of a product in runs of `run` terms.
+  /// Of these rectangles of columns, by one launch; of `shape` only the distances between columns are read.
+  /// Enqueues. Cost: columns * groups * 16 * terms multiply-adds; error: that of a product in runs of `run`
+  /// terms.
   void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                  const opencl::DeviceArray<float>& out, VdvrAlongZ shape) const;
+                  const opencl::DeviceArray<float>& out, std::span<const VdvrColumns> parts,
+                  VdvrAlongZ shape) const;
 
   static constexpr int run = 8;
 

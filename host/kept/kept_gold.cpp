@@ -25,6 +25,10 @@ constexpr double pi = std::numbers::pi;
 constexpr std::int64_t side = 32;
 // Bytes of the tiles that are made together, which share one allocation.
 constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
+// Of the heights made of them: less is made that nobody asks for.
+constexpr std::uint64_t run_page_bytes = std::uint64_t{8} << 20;
+// Floats on the way from heights to gold: boxes that fit are made together, and stay in caches.
+constexpr std::uint64_t floats_together = std::uint64_t{1} << 20;
 // Kept heights around those asked for: boxes of other halos will read them.
 constexpr std::int64_t run_margin = 32;
 
@@ -282,6 +286,7 @@ void KeptGold::require_run(const Span& z) {
   const HeightWeights weights =
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
+  run.a_page = std::max<std::size_t>(1, run_page_bytes / (4 * count(side * side * run.stride)));
   run.from_rows.emplace(state_, weights);
   run_ = std::move(run);
 }
@@ -293,27 +298,24 @@ std::uint64_t KeptGold::bytes() const {
 std::uint64_t KeptGold::run_bytes() const {
   std::uint64_t bytes = 0;
   if (run_)
-    for (const auto& [at, tile] : run_->tiles) bytes += 4 * tile.size();
+    for (const auto& page : run_->pages) bytes += 4 * page.size();
   return bytes;
 }
 
-const opencl::DeviceArray<float>& KeptGold::heights_of(const TileAt& tile, const Place& place) {
+KeptGold::Place KeptGold::heights_of(const TileAt& tile, const Place& place) {
   if (const auto known = run_->tiles.find(tile); known != run_->tiles.end()) return known->second;
-  // Tiles that came later than the run were not foreseen by it: heights can be made again.
-  if (run_bytes() > state_.memory.left() / 2) run_->tiles.clear();
-  opencl::DeviceArray<float>& out =
-      run_->tiles
-          .emplace(tile, opencl::DeviceArray<float>(state_, count(side * side * run_->stride),
-                                                    "heights of kept gold"))
-          .first->second;
-  VdvrAlongZ part{};
-  part.in_first = place.first;
-  part.in_x = count(stride_);
-  part.in_y = count(side * stride_);
-  part.out_x = count(run_->stride);
-  part.out_y = count(side * run_->stride);
-  part.columns_x = part.columns_y = to_int(side);
-  (*run_->from_rows)(state_, pages_[place.page], out, part);
+  const std::uint64_t size = count(side * side * run_->stride);
+  const std::size_t i = run_->tiles.size();
+  if (i % run_->a_page == 0) run_->pages.emplace_back(state_, run_->a_page * size, "heights of kept gold");
+  const Place out{i / run_->a_page, i % run_->a_page * size};
+  run_->tiles.emplace(tile, out);
+  VdvrAlongZ shape{};
+  shape.in_x = count(stride_);
+  shape.in_y = count(side * stride_);
+  shape.out_x = count(run_->stride);
+  shape.out_y = count(side * run_->stride);
+  const VdvrColumns part{place.first, out.first, to_int(side), to_int(side)};
+  (*run_->from_rows)(state_, pages_[place.page], run_->pages[out.page], std::span(&part, 1), shape);
   return out;
 }
 
@@ -375,43 +377,77 @@ const Across& KeptGold::across_of(int phases, std::size_t axis) {
       .first->second;
 }
 
-// float out[y][x][padded]: gold's heights on kept columns.
-void KeptGold::take_heights(const GoldLattice& lattice, const GoldBox& box,
+// float out[box][y][x][padded]: gold's heights on kept columns.
+void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox> boxes,
                             const opencl::DeviceArray<float>& out) {
-  const Span x = span(lattice, 0, box), y = span(lattice, 1, box), z = heights_span(lattice, box);
-  const std::int64_t padded = heights_->padded;
-  for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
-    for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
-      const auto tile = tiles_.find({ty, tx});
-      if (tile == tiles_.end()) continue;  // beyond reach
-      const std::int64_t x0 = std::max(x.low, tx * side), x1 = std::min(x.low + x.count, (tx + 1) * side),
-                         y0 = std::max(y.low, ty * side), y1 = std::min(y.low + y.count, (ty + 1) * side);
-      const std::int64_t stride = few_rows() ? stride_ : run_->stride;
-      const opencl::DeviceArray<float>& in =
-          few_rows() ? pages_[tile->second.page] : heights_of(tile->first, tile->second);
-      VdvrAlongZ part{};
-      part.in_first = (few_rows() ? tile->second.first : count(z.low - run_->low)) +
-                      count(((y0 - ty * side) * side + x0 - tx * side) * stride);
-      part.in_x = count(stride);
-      part.in_y = count(side * stride);
-      part.out_first = count(((y0 - y.low) * x.count + x0 - x.low) * padded);
-      part.out_x = count(padded);
-      part.out_y = count(x.count * padded);
-      part.columns_x = to_int(x1 - x0);
-      part.columns_y = to_int(y1 - y0);
-      (*heights_->weights)(state_, in, out, part);
-    }
+  const Span z = heights_span(lattice, boxes.front());
+  const std::int64_t padded = heights_->padded, stride = few_rows() ? stride_ : run_->stride;
+  // Tiles that came later than the run were not foreseen by it: heights can be made again.
+  if (!few_rows() && run_bytes() > state_.memory.left() / 2) {
+    run_->tiles.clear();
+    run_->pages.clear();
+  }
+  std::map<std::size_t, std::vector<VdvrColumns>> by_page;
+  std::uint64_t first = 0;
+  VdvrAlongZ shape{};
+  for (const GoldBox& box : boxes) {
+    const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
+    for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
+      for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
+        const auto tile = tiles_.find({ty, tx});
+        if (tile == tiles_.end()) continue;  // beyond reach
+        const std::int64_t x0 = std::max(x.low, tx * side), x1 = std::min(x.low + x.count, (tx + 1) * side),
+                           y0 = std::max(y.low, ty * side), y1 = std::min(y.low + y.count, (ty + 1) * side);
+        const Place in = few_rows() ? tile->second : heights_of(tile->first, tile->second);
+        by_page[in.page].push_back({in.first + (few_rows() ? 0 : count(z.low - run_->low)) +
+                                        count(((y0 - ty * side) * side + x0 - tx * side) * stride),
+                                    first + count(((y0 - y.low) * x.count + x0 - x.low) * padded),
+                                    to_int(x1 - x0), to_int(y1 - y0)});
+      }
+    shape.in_x = count(stride);
+    shape.in_y = count(side * stride);
+    shape.out_x = count(padded);
+    shape.out_y = count(x.count * padded);
+    first += count(x.count * y.count * padded);
+  }
+  for (const auto& [page, parts] : by_page)
+    (*heights_->weights)(state_, few_rows() ? pages_[page] : run_->pages[page], out, parts, shape);
 }
 
-void KeptGold::fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out,
-                    std::uint64_t first, std::int64_t stride) {
+void KeptGold::fill(const GoldLattice& lattice, std::span<const GoldBox> boxes,
+                    const opencl::DeviceArray<float>& out, std::uint64_t first, std::uint64_t apart,
+                    std::int64_t stride) {
+  if (boxes.empty()) return;
+  const GoldBox& one = boxes.front();
+  const Span x = span(lattice, 0, one), y = span(lattice, 1, one);
+  for (const GoldBox& box : boxes)
+    if (box.nodes != one.nodes || box.first[2] != one.first[2] ||
+        span(lattice, 0, box).skipped != x.skipped || span(lattice, 1, box).skipped != y.skipped)
+      throw std::logic_error("KeptGold: boxes that differ");
+  resample_heights(lattice, one);
+  const std::uint64_t largest = count(x.count * std::max(y.count, one.nodes[1]) * heights_->padded);
+  const std::size_t together = std::max<std::size_t>(1, floats_together / largest);
+  for (std::size_t i = 0; i < boxes.size(); i += together)
+    fill_together(lattice, boxes.subspan(i, std::min(together, boxes.size() - i)), out, first + i * apart,
+                  apart, stride);
+}
+
+// Boxes whose heights were resampled.
+void KeptGold::fill_together(const GoldLattice& lattice, std::span<const GoldBox> boxes,
+                             const opencl::DeviceArray<float>& out, std::uint64_t first, std::uint64_t apart,
+                             std::int64_t stride) {
+  const GoldBox& box = boxes.front();
   const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
-  resample_heights(lattice, box);
   const std::int64_t padded = heights_->padded;
-  const opencl::DeviceArray<float>& heights = buffer(0, count(x.count * y.count * padded));
-  take_heights(lattice, box, heights);
-  const opencl::DeviceArray<float>& rows = buffer(1, count(x.count * box.nodes[1] * padded));
+  const std::uint64_t of_heights = count(x.count * y.count * padded),
+                      of_rows = count(x.count * box.nodes[1] * padded);
+  const opencl::DeviceArray<float>& heights = buffer(0, boxes.size() * of_heights);
+  take_heights(lattice, boxes, heights);
+  const opencl::DeviceArray<float>& rows = buffer(1, boxes.size() * of_rows);
   VdvrAcross along_y{};
+  along_y.in_box = of_heights;
+  along_y.out_box = of_rows;
+  along_y.boxes = to_int(static_cast<std::int64_t>(boxes.size()));
   along_y.in_along = along_y.out_along = count(x.count * padded);
   along_y.in_other = along_y.out_other = count(padded);
   along_y.others = to_int(x.count);
@@ -422,6 +458,9 @@ void KeptGold::fill(const GoldLattice& lattice, const GoldBox& box, const opencl
   along_y.outputs = to_int(box.nodes[1]);
   across_of(lattice.phases[1], 1)(state_, heights, rows, along_y);
   VdvrAcross along_x{};
+  along_x.in_box = of_rows;
+  along_x.out_box = apart;
+  along_x.boxes = along_y.boxes;
   along_x.in_along = count(padded);
   along_x.in_other = count(x.count * padded);
   along_x.out_first = first;

@@ -60,10 +60,16 @@ class KeptGold {
   /// suffice. Cost: views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
   void prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress);
 
-  /// float out[y][x][stride] from `first` on: gold at the nodes of a box that was prepared; its z is padded
-  /// to a multiple of 16. Nodes beyond `reach` hold anything finite. Enqueues.
+  /// float out[box][y][x][stride] from `first` on, `apart` floats from box to box: gold at the nodes of boxes
+  /// that were prepared; its z is padded to a multiple of 16. Nodes beyond `reach` hold anything finite. The
+  /// boxes are equal, begin at the same height, and at the same node of an interval of kept ones; throws
+  /// std::logic_error where they do not. Enqueues.
+  void fill(const GoldLattice& lattice, std::span<const GoldBox> boxes, const opencl::DeviceArray<float>& out,
+            std::uint64_t first, std::uint64_t apart, std::int64_t stride);
   void fill(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out,
-            std::uint64_t first, std::int64_t stride);
+            std::uint64_t first, std::int64_t stride) {
+    fill(lattice, std::span<const GoldBox>(&box, 1), out, first, 0, stride);
+  }
 
   /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
   [[nodiscard]] double seconds() const { return seconds_; }
@@ -100,8 +106,12 @@ class KeptGold {
   const GoldFilter& filter_of(int phases, std::size_t axis);
   void resample_heights(const GoldLattice& lattice, const GoldBox& box);
   void require_run(const Span& z);
-  const opencl::DeviceArray<float>& heights_of(const TileAt& tile, const Place& place);
-  void take_heights(const GoldLattice& lattice, const GoldBox& box, const opencl::DeviceArray<float>& out);
+  Place heights_of(const TileAt& tile, const Place& place);
+  void take_heights(const GoldLattice& lattice, std::span<const GoldBox> boxes,
+                    const opencl::DeviceArray<float>& out);
+  void fill_together(const GoldLattice& lattice, std::span<const GoldBox> boxes,
+                     const opencl::DeviceArray<float>& out, std::uint64_t first, std::uint64_t apart,
+                     std::int64_t stride);
   [[nodiscard]] std::vector<double> rows_of(double first, double step, std::int64_t heights) const;
   [[nodiscard]] std::uint64_t run_bytes() const;
   [[nodiscard]] bool few_rows() const { return scan_.geometry.rows <= most_few_rows; }
@@ -128,7 +138,9 @@ class KeptGold {
   struct Run {
     std::int64_t low = 0, count = 0, stride = 0;
     std::optional<AlongZ> from_rows;
-    std::map<TileAt, opencl::DeviceArray<float>> tiles;
+    std::vector<opencl::DeviceArray<float>> pages;  // of `a_page` tiles, the last one not yet full
+    std::size_t a_page = 1;
+    std::map<TileAt, Place> tiles;
   };
   std::optional<Run> run_;
   // How the last box's heights come of these, or of all rows where they are few: blocks of a slab share that.

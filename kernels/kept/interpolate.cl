@@ -19,8 +19,8 @@
 #define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
 // Columns beyond the last repeat it and are not stored.
 #define COLUMN(c)                                                                                     \
-  __global const float* column##c = in + s.in_first + (size_t)y * s.in_y +                            \
-                                    (size_t)min(x + c, s.columns_x - 1) * s.in_x + first_term[group]; \
+  __global const float* column##c = in + p.in_first + (size_t)y * s.in_y +                            \
+                                    (size_t)min(x + c, p.columns_x - 1) * s.in_x + first_term[group]; \
   VEC total##c = (VEC)(0.0f), rest##c = (VEC)(0.0f);
 #define CLEAR(c) VEC sum##c = (VEC)(0.0f);
 #define ADD(c) sum##c = fma((VEC)(column##c[j]), w, sum##c);
@@ -32,14 +32,17 @@
     total##c = t;                                         \
   }
 #define PUT(c) \
-  if (x + c < s.columns_x) STORE(total##c + rest##c, target + c * s.out_x);
+  if (x + c < p.columns_x) STORE(total##c + rest##c, target + c * s.out_x);
 
-// out[y][x][16 group + i] = sum_j weights[group][j][i] in[y][x][first_term[group] + j].
+// out[y][x][16 group + i] = sum_j weights[group][j][i] in[y][x][first_term[group] + j], part by part.
 __kernel void along_z(__global float* out, __global const float* in, __global const float* weights,
-                      __global const int* first_term, VdvrAlongZ s) {
+                      __global const int* first_term, __global const VdvrColumns* parts, VdvrAlongZ s) {
   const int z = (int)get_global_id(0) * VDVR_LANES, group = z / 16;
-  const int x = (int)get_global_id(1) * 8, y = (int)get_global_id(2);
-  if (group >= s.groups || x >= s.columns_x || y >= s.columns_y) return;
+  const int part = (int)get_global_id(2) / s.columns_y;
+  if (group >= s.groups || part >= s.parts) return;
+  const VdvrColumns p = parts[part];
+  const int x = (int)get_global_id(1) * 8, y = (int)get_global_id(2) - part * s.columns_y;
+  if (x >= p.columns_x || y >= p.columns_y) return;
   __global const float* of_group = weights + (size_t)group * s.terms * 16 + z % 16;
   FOR_COLUMNS(COLUMN)
   for (int first = 0; first < s.terms; first += VDVR_RUN) {
@@ -51,7 +54,7 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
     }
     FOR_COLUMNS(TOTAL)
   }
-  __global float* target = out + s.out_first + (size_t)y * s.out_y + (size_t)x * s.out_x + z;
+  __global float* target = out + p.out_first + (size_t)y * s.out_y + (size_t)x * s.out_x + z;
   FOR_COLUMNS(PUT)
 }
 
@@ -79,11 +82,12 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 __kernel void across(__global float* out, __global const float* in, __global const float* weights,
                      VdvrAcross s) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
-  const int other = (int)get_global_id(1), interval = (int)get_global_id(2);
-  if (z >= s.z || other >= s.others || interval >= s.intervals) return;
-  __global const float* from =
-      in + s.in_first + (size_t)interval * s.step * s.in_along + (size_t)other * s.in_other + z;
-  __global float* target = out + s.out_first + (size_t)other * s.out_other + z;
+  const int other = (int)get_global_id(1), box = (int)get_global_id(2) / s.intervals,
+            interval = (int)get_global_id(2) - box * s.intervals;
+  if (z >= s.z || other >= s.others || box >= s.boxes) return;
+  __global const float* from = in + s.in_first + (size_t)box * s.in_box +
+                               (size_t)interval * s.step * s.in_along + (size_t)other * s.in_other + z;
+  __global float* target = out + s.out_first + (size_t)box * s.out_box + (size_t)other * s.out_other + z;
   const int node = interval * VDVR_PHASES - s.skipped;
   if (node >= 0 && node < s.outputs)
     STORE(LOAD(from + (TAPS / 2 - 1) * s.in_along), target + (size_t)node * s.out_along);
