@@ -185,11 +185,15 @@ std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks
   const std::vector<BrickMeasure>& measures = test.measures();
   const bool anisotropic = in.gold.fine.gold().settings().anisotropic;
   std::vector<LevelTriple> to = bricks.level;
-  for (std::size_t i = 0; i < to.size(); ++i)
-    if (bricks.involved[i] && measures[i].violated != 0 &&
-        !raise_levels(bricks, static_cast<std::int64_t>(i), measures[i].violated,
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    const BrickMeasure& m = measures[i];
+    if (!bricks.involved[i] || m.violated == 0) continue;
+    // Of a brick that coarse gold proposed a level for.
+    if (!(static_cast<double>(m.slack) <= tolerance)) refuse_slack(in, test.bounds(), m.slack, tolerance);
+    if (!raise_levels(bricks, static_cast<std::int64_t>(i), m.violated,
                       anisotropic ? &test.along()[i] : nullptr, to))
-      refuse_stored(in, bricks.lattice, measures[i].total, tolerance);
+      refuse_stored(in, bricks.lattice, m.total, tolerance);
+  }
   std::vector<std::uint8_t> raised(bricks.level.size(), 0);
   for (std::size_t i = 0; i < raised.size(); ++i) raised[i] = to[i] != bricks.level[i];
   bricks.level = std::move(to);

@@ -10,7 +10,7 @@
 namespace vdvr {
 namespace {
 
-// Of the tolerance: a brick whose coarse slack takes more is not tried on coarse gold once it is refined.
+// Of the tolerance: a brick whose coarse slack takes more is not measured on coarse gold once it is refined.
 constexpr double easy_share = 0.48;
 // Of the bricks: how many at most the search for the largest error measures again at once.
 constexpr std::size_t sharpened_share = 32;
@@ -57,7 +57,7 @@ GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, const Field
   settings = with_coarse(settings);
   fine_.emplace(state, scan, sups, settings, std::move(source));
   if (settings.coarse_rate == 0) return;
-  settings.rate = std::exchange(settings.coarse_rate, 0);
+  settings.finer_rate = std::exchange(settings.rate, std::exchange(settings.coarse_rate, 0));
   coarse_.emplace(state, scan, sups, settings, fine_->source());
 }
 
@@ -102,19 +102,23 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
       const Verdict verdict = coarse_verdict(l.base, tolerance);
       if (verdict != Verdict::beyond) refined[id] = 0;
       if (verdict == Verdict::undecided) undecided[id] = 1;
-      if (verdict == Verdict::within) take(l);
+      if (verdict == Verdict::within) take(l, true);
     });
     test(fine_, base, tolerance, undecided, "screen", [&](const Levels& l) {
-      if (passes(l.base, tolerance)) take(l);
+      if (passes(l.base, tolerance)) take(l, true);
       else refined[at(l.base.brick)] = 1;
     });
-    std::vector<std::uint8_t> easy = refined;
-    for (std::size_t i = 0; i < easy.size(); ++i) easy[i] = easy[i] && is_easy(i, tolerance);
-    refine(*coarse_, base, tolerance, easy);
+    std::vector<std::uint8_t> easy = refined, hard = refined;
+    for (std::size_t i = 0; i < easy.size(); ++i) {
+      easy[i] = refined[i] && is_easy(i, tolerance);
+      hard[i] = refined[i] && !easy[i];
+    }
+    refine(*coarse_, base, tolerance, easy, GoldStream::For::samples);
+    refine(*coarse_, base, tolerance, hard, GoldStream::For::proposing);
     for (std::size_t i = 0; i < easy.size(); ++i)
       if (is_above_base(bricks_.level[i])) refined[i] = 0;
   }
-  refine(fine_, base, tolerance, refined);
+  refine(fine_, base, tolerance, refined, GoldStream::For::samples);
 }
 
 // Level 0 only.
@@ -135,9 +139,10 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
            progress_, stage);
 }
 
-// Levels above 0, with their tiles. On coarse gold only levels that it can test are taken.
+// Levels above 0, with their tiles. On coarse gold only levels that it can test are taken. What is proposed
+// is measured on fine gold later, as every refined brick that coarse gold does not pass.
 void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, double tolerance,
-                            const std::vector<std::uint8_t>& selected) {
+                            const std::vector<std::uint8_t>& selected, GoldStream::For purpose) {
   if (!any(selected)) return;
   const bool fine = &gold == &fine_;
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
@@ -164,14 +169,14 @@ void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, doubl
            if (!taken(l)) return;
            if (fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
              refuse_(l.base.slack, tolerance);
-           take(l);
+           take(l, purpose != GoldStream::For::proposing);
          });
          take_tiles(in);
        }},
-      progress_, "classify", GoldStream::For::samples);
+      progress_, "classify", purpose);
 }
 
-void ClassifyBricks::take(const Levels& l) {
+void ClassifyBricks::take(const Levels& l, bool is_bound) {
   const BrickMeasure& m = l.base;
   const std::size_t id = at(m.brick);
   bricks_.involved.at(id) = m.total >= 0;
@@ -179,6 +184,11 @@ void ClassifyBricks::take(const Levels& l) {
   measures_[id] = m;
   bricks_.level[id] = l.level;
   along_[id] = l.along;
+  if (is_bound) take_slack(m);
+}
+
+void ClassifyBricks::take_slack(const BrickMeasure& m) {
+  if (m.total < 0) return;
   const auto slack = static_cast<double>(m.slack);
   bounds_.total = std::max(bounds_.total, slack);
   bounds_.projection = fine_.gold().projection();
@@ -293,11 +303,14 @@ void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTr
     measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
       if (coarse_verdict(m, tolerance) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
+      take_slack(m);
       rest[at(m.brick)] = 0;
     });
   }
-  measure_at(fine_, field, tolerance, rest, stage,
-             [&](const BrickMeasure& m) { measures_.at(at(m.brick)) = m; });
+  measure_at(fine_, field, tolerance, rest, stage, [&](const BrickMeasure& m) {
+    measures_.at(at(m.brick)) = m;
+    take_slack(m);
+  });
 }
 
 void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {

@@ -91,6 +91,8 @@ class ClassifyBricks {
   [[nodiscard]] const std::vector<AxisErrors>& along() const { return along_; }
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] std::uint64_t tile_bytes() const { return tile_bytes_; }
+  /// Whether a brick is measured on coarse gold first.
+  [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
  private:
   using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
@@ -104,17 +106,17 @@ class ClassifyBricks {
             const std::vector<std::uint8_t>& selected, const std::string& stage,
             const std::function<void(const Levels&)>& visit);
   void refine(JournalledGold& gold, const DeviceField& base, double tolerance,
-              const std::vector<std::uint8_t>& selected);
+              const std::vector<std::uint8_t>& selected, GoldStream::For purpose);
   void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
   static Bytes record(const std::vector<Levels>& levels, const Tiles& tiles,
                       const std::vector<float>& samples);
   static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
-  void take(const Levels& levels);
+  void take(const Levels& levels, bool is_bound);
+  void take_slack(const BrickMeasure& measure);
   static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);
   std::vector<std::int64_t> take_tiles(ByteReader& in);  // of which bricks
-  [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
   opencl::State& state_;
   OpenBricks& bricks_;

@@ -59,8 +59,22 @@ int stratum_of(double error, double tolerance) {
       std::clamp(std::round(2 * std::log2(std::max(error / tolerance, 1e-9))), -8.0, 16.0));
 }
 
-// What becomes of a brick: level 0 by coarse gold or by fine, a tile from coarse gold or from fine.
-enum Fate { coarse_stays, fine_stays, coarse_refined, fine_refined, fates };
+// What becomes of a brick: level 0 by coarse gold or by fine, a tile from coarse gold (measured on it or on
+// fine gold) or from fine.
+enum Fate { coarse_stays, fine_stays, coarse_refined, proposed, fine_refined, fates };
+
+// A brick that was classified to see what becomes of it.
+struct Classified {
+  double samples = 0;  // of its tile
+  BrickMeasure measure;
+  bool easy = false;  // measured on coarse gold first
+
+  [[nodiscard]] Fate fate(int fine_rate) const {
+    const bool fine = measure.rate == fine_rate;
+    if (samples > 0) return fine ? fine_refined : easy ? coarse_refined : proposed;
+    return fine ? fine_stays : coarse_stays;
+  }
+};
 
 struct Stratum {
   std::vector<std::int64_t> bricks, candidates;  // all, and those in the layers looked at
@@ -104,7 +118,8 @@ class Paces {
   // What was done before does not count.
   void reset() {
     for (const bool fine : {false, true})
-      for (const auto purpose : {GoldStream::For::samples, GoldStream::For::measuring})
+      for (const auto purpose :
+           {GoldStream::For::samples, GoldStream::For::measuring, GoldStream::For::proposing})
         if (GoldStream* s = stream(fine)) before_[{fine, purpose}] = s->spent(purpose);
   }
   double seconds(bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
@@ -208,13 +223,13 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
     JournalledRates unrecorded(gold, nullptr);
     ClassifyBricks test(state, unrecorded, bricks, host, {}, [](float, double) {});
     test.classify(field, tolerance, selected);
-    std::vector<std::pair<double, BrickMeasure>> out;
+    std::vector<Classified> out;
     const MixedVolume shape = bricks.shape();
     for (std::size_t i = 0; i < near.size(); ++i)
-      out.emplace_back(bricks.level[i] == LevelTriple{0, 0, 0}
-                           ? 0.0
-                           : static_cast<double>(shape.tile_size(bricks.level[i])),
-                       test.measures()[i]);
+      out.push_back({bricks.level[i] == LevelTriple{0, 0, 0}
+                         ? 0.0
+                         : static_cast<double>(shape.tile_size(bricks.level[i])),
+                     test.measures()[i], test.is_easy(i, tolerance)});
     return out;
   };
 
@@ -242,12 +257,10 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   const auto classes = classify(sampled);
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
-      const auto& [samples, m] = classes[at(i)];
+      const Classified& c = classes[at(i)];
       s.seen += 1;
-      s.tile_samples += samples;
-      const bool fine = m.rate == settings.rate;
-      if (m.total >= 0)
-        s.share[samples > 0 ? (fine ? fine_refined : coarse_refined) : fine ? fine_stays : coarse_stays] += 1;
+      s.tile_samples += c.samples;
+      if (c.measure.total >= 0) s.share[c.fate(settings.rate)] += 1;
     }
 
   // A stratum without a brick in the layers takes after the one below it.
@@ -262,7 +275,7 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
     }
     tile_samples += mean * static_cast<double>(s.bricks.size());
     std::size_t next = 0;
-    for (const Fate fate : {fine_refined, coarse_refined, fine_stays})
+    for (const Fate fate : {fine_refined, proposed, coarse_refined, fine_stays})
       for (double i = 0; i < share[fate] * static_cast<double>(s.bricks.size()) && next < s.bricks.size();
            ++i)
         bricks[fate][at(s.bricks[next++])] = 1;
@@ -279,18 +292,21 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
       kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
   out.seconds = first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
                                  static_cast<double>(kept.tiles() + missing);
-  const auto add = [&](bool fine, GoldStream::For purpose, Fate fate) {
-    out.seconds += small.seconds(fine, purpose, bricks[fate]);
+  const auto add = [&](bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
+    out.seconds += small.seconds(fine, purpose, of);
   };
   using For = GoldStream::For;
+  std::vector<std::uint8_t> hard = bricks[proposed];
+  for (std::size_t i = 0; i < hard.size(); ++i) hard[i] = hard[i] || bricks[fine_refined][i];
   if (screens) {
-    add(true, For::measuring, fine_stays);
-    add(false, For::samples, coarse_refined);
-    add(true, For::samples, fine_refined);
+    add(true, For::measuring, bricks[fine_stays]);
+    add(false, For::samples, bricks[coarse_refined]);
+    add(false, For::proposing, hard);
+    add(true, For::samples, bricks[fine_refined]);
   }
   // Verification.
-  add(false, For::measuring, coarse_refined);
-  add(true, For::measuring, fine_refined);
+  add(false, For::measuring, bricks[coarse_refined]);
+  add(true, For::measuring, hard);
   return out;
 }
 

@@ -10,7 +10,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrCellTest) == 32);
+static_assert(sizeof(VdvrCellTest) == 36);
 
 namespace {
 

@@ -24,6 +24,8 @@ namespace {
 // Without room a brick at the tolerance is raised by repair, for twice its samples; with all of it too many
 // bricks begin finer.
 constexpr float rounding_share = 0.25f;
+// Of second differences: what linear interpolation errs by.
+constexpr float eighth = 0.125f;
 
 }  // namespace
 
@@ -89,7 +91,7 @@ const LevelSamples& GoldBatch::lattice(const LevelTriple& level, const std::vect
   const int steps = !settings_.midrange             ? 0
                     : level == LevelTriple{0, 0, 0} ? base_fit_steps
                                                     : level_fit_steps;
-  return fit_(gold_, margin_, boxes, spacing_of(level), steps, settings_.curvature);
+  return fit_(gold_, margin_, boxes, spacing_of(level), steps, of_curvature_ * settings_.curvature);
 }
 
 GoldBatch::TileRequest GoldBatch::request(std::int64_t brick, const Index3& spacing,
@@ -135,9 +137,11 @@ opencl::Defines GoldBatch::brick_nodes() const {
   return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
 }
 
-void GoldBatch::take_addends(const std::vector<float>& addends, const GoldErrors& errors) {
+void GoldBatch::take_addends(const std::vector<float>& addends, const GoldErrors& errors,
+                             float of_curvature) {
   addend_ = opencl::DeviceArray<float>(state_, std::span<const float>(addends), "what bricks add");
   errors_ = errors;
+  of_curvature_ = of_curvature;
   has_slack_ = false;
 }
 
@@ -150,8 +154,8 @@ void GoldBatch::require_slack() {
     above_ = opencl::DeviceArray<float>(state_, nodes, "node slack above");
     below_ = opencl::DeviceArray<float>(state_, nodes, "node slack below");
   }
-  node_slack(state_, settings_, {slab_, block_bricks(), errors_}, shape_, first_brick_, gold_, margin_,
-             addend_, above_, below_);
+  node_slack(state_, settings_, {slab_, block_bricks(), errors_, eighth * of_curvature_}, shape_,
+             first_brick_, gold_, margin_, addend_, above_, below_);
 }
 
 std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tolerance,
@@ -167,7 +171,8 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tol
                           .window_low = static_cast<float>(window.first),
                           .window_high = static_cast<float>(window.second),
                           .parts = parts ? 1 : 0,
-                          .tolerance = tolerance};
+                          .tolerance = tolerance,
+                          .curvature = eighth * of_curvature_};
   const CellTestResults found =
       cell_test(state_, field, {gold_, margin_, addend_, first, shape_on_device()}, test, selected,
                 std::int64_t{settings_.granularity} * settings_.rate);
@@ -316,7 +321,7 @@ std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, float toler
       c.along = errors[candidates.size()];
       candidates.push_back({&c, {c.along, c.base.slack}});
     }
-  try_levels(candidates, TripleSearch(settings_), tolerance);
+  try_levels(candidates, TripleSearch(settings_, proposing()), tolerance);
 
   // A tile needs a level above 0, even where the base is gold.
   LevelTriple finest = settings_.finest();

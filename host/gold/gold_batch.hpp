@@ -51,6 +51,8 @@ class GoldBatch {
   [[nodiscard]] const std::vector<std::array<std::int64_t, 3>>& first_brick() const { return first_brick_; }
   [[nodiscard]] Index3 block_bricks() const { return {bricks_x_, bricks_y_, bricks_z_}; }
   [[nodiscard]] const SlabShape& slab() const { return slab_; }
+  /// In a run for proposing, T is that which GoldSettings::finer_rate would find: no bound.
+  [[nodiscard]] bool proposing() const { return of_curvature_ < 1; }
 
   /// In a run for samples: the node test at levels 0 .. log2(rate), of all axes together or (anisotropic) of
   /// each, per brick of bricks(): |interpolant - F| may be at most the tolerance. Level 0 is measured on the
@@ -108,7 +110,7 @@ class GoldBatch {
                                 const LevelSamples* lattice);
   [[nodiscard]] opencl::Defines brick_nodes() const;
   [[nodiscard]] VdvrGoldShape shape_on_device() const;
-  void take_addends(const std::vector<float>& addends, const GoldErrors& errors);
+  void take_addends(const std::vector<float>& addends, const GoldErrors& errors, float of_curvature);
   // Slack node by node, made when first asked for.
   void require_slack();
   GoldBatch(opencl::State& state, const GoldSettings& settings)
@@ -136,6 +138,7 @@ class GoldBatch {
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;
   GoldErrors errors_;
+  float of_curvature_ = 1;  // of T and of the middle that samples are fitted to
   bool has_slack_ = false;
   opencl::DeviceArray<float> gold_, above_, below_, margin_, addend_;
 };

@@ -34,6 +34,7 @@ struct GoldSettings {
   /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
   float curvature = 0.0625f;
   int coarse_rate = 0;       ///< of a coarser gold that is tested first; 0: none
+  int finer_rate = 0;        ///< of the finer gold that will measure what this one proposes; 0: none
   bool grid_only = false;    ///< slack counts as 0: the paper's test, for comparison
   Lattice lattice{};         ///< on which tiles will be stored; classification leaves room for it
   LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x

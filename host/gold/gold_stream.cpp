@@ -7,6 +7,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "host/gold/gold_batch.hpp"
@@ -49,6 +50,13 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const Fie
   if (!source_) source_ = std::make_shared<GoldSource>(state, scan, sups, settings);
   lattice_ = source_->kept.lattice(settings.grid, settings.rate);
   errors_ = source_->kept.errors(lattice_);
+  if (settings.finer_rate > settings.rate) {
+    finer_.emplace();
+    finer_->lattice = source_->kept.lattice(settings.grid, settings.finer_rate);
+    finer_->errors = source_->kept.errors(finer_->lattice);
+    finer_->of_curvature =
+        std::pow(static_cast<float>(settings.rate) / static_cast<float>(settings.finer_rate), 2.0f);
+  }
   // Second differences look one node beyond a block, fits further.
   if (settings.midrange)
     fit_halo_ = settings.base_only ? base_fit_steps * settings.rate : level_fit_steps * settings.rate / 2;
@@ -118,7 +126,9 @@ double GoldStream::kept_share(const Work& w, const std::array<std::int64_t, 2>& 
 
 void GoldStream::begin(For purpose) {
   purpose_ = purpose;
-  halo_ = purpose == For::samples ? fit_halo_ : 1;
+  if (purpose == For::proposing && !finer_)
+    throw std::logic_error("GoldStream: no finer rate to propose for");
+  halo_ = purpose == For::measuring ? 1 : fit_halo_;
 }
 
 double GoldStream::samples(const std::vector<std::uint8_t>& selected, For purpose) {
@@ -269,6 +279,13 @@ SlabShape GoldStream::slab_of(const Work& work) const {
   return slab;
 }
 
+void GoldStream::take_addends(Batch& batch) {
+  const Finer own{lattice_, errors_, 1}, &of = purpose_ == For::proposing ? *finer_ : own;
+  batch.take_addends(brick_addends(*source_->remainder, of.lattice, of.errors, settings_,
+                                   batch.block_bricks(), batch.first_brick_),
+                     of.errors, of.of_curvature);
+}
+
 void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                             const OnBatch& on_batch, const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
@@ -287,10 +304,7 @@ void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vecto
     std::vector<GoldBox> boxes;
     for (std::size_t b = 0; b < n; ++b) boxes.push_back(box(work, work.first[begin + b]));
     source_->kept.fill(lattice_, boxes, batch.gold_, 0, block, batch.shape_.gold_stride);
-    if (!settings_.base_only)
-      batch.take_addends(brick_addends(*source_->remainder, lattice_, errors_, settings_,
-                                       batch.block_bricks(), batch.first_brick_),
-                         errors_);
+    if (!settings_.base_only) take_addends(batch);
     on_batch(batch);
     for (std::size_t b = 0; b < n; ++b)
       spent.samples +=

@@ -58,8 +58,9 @@ class GoldStream {
 
   /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a
   /// block without a selected brick is skipped, and one with few is cut to smaller ones around them. Fitted
-  /// samples look further around a block than measuring does.
-  enum class For { samples, measuring };
+  /// samples look further around a block than measuring does. Proposing fits samples too, and foresees what
+  /// gold at `finer_rate` would find: second differences fall with the square of the spacing.
+  enum class For { samples, measuring, proposing };
   void run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Progress& progress,
            const std::string& stage, For purpose = For::measuring);
 
@@ -105,6 +106,11 @@ class GoldStream {
   }
 
  private:
+  struct Finer {
+    GoldLattice lattice;
+    GoldErrors errors;
+    float of_curvature = 1;  // its second differences over these
+  };
   [[nodiscard]] std::vector<Work> partition(const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] std::vector<float> margins(const std::vector<std::array<std::int64_t, 3>>& first_brick,
                                            std::int64_t nx, std::int64_t ny) const;
@@ -116,6 +122,7 @@ class GoldStream {
   [[nodiscard]] std::vector<GoldBox> boxes(const std::vector<Work>& works) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
+  void take_addends(Batch& batch);
   void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
 
@@ -124,10 +131,11 @@ class GoldStream {
   Coverage coverage_;
   GoldLattice lattice_;
   GoldErrors errors_;
+  std::optional<Finer> finer_;  // that measures what this one proposes
   std::int64_t slab_bricks_ = 1, block_bricks_ = 1;
   std::int64_t fit_halo_ = 1, halo_ = 1;  // gold nodes around a block: for samples, and in this run
   For purpose_ = For::measuring;          // of this run
-  std::array<GoldSpent, 2> spent_;        // by purpose
+  std::array<GoldSpent, 3> spent_;        // by purpose
   std::shared_ptr<GoldSource> source_;
 };
 

@@ -68,13 +68,13 @@ void node_slack(opencl::State& state, const GoldSettings& settings, const SlackS
   const auto window = widened_window(shape.errors, settings);
   const std::array<std::uint64_t, 3> local = column_tuning(state.info).local;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
-                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float>
+                 cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float, cl_float>
       cell_slack(state, "gold/node_slack", "cell_slack");
   cell_slack({{count((b.nz + 15) / 16), count(b.nx - 1), count((b.ny - 1) * b.count)}, local},
              cells_above.buffer(), cells_below.buffer(), gold.buffer(), rows.buffer(), nx, ny, nz,
              to_int(b.halo), to_int(b.gold_stride), stride, side, bricks_x, bricks_y, blocks,
              settings.grid_only ? 0 : 1, settings.window ? 1 : 0, static_cast<cl_float>(window.first),
-             static_cast<cl_float>(window.second));
+             static_cast<cl_float>(window.second), shape.curvature);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_int>
       nodes(state, "gold/node_slack", "node_slack");

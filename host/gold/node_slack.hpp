@@ -35,6 +35,7 @@ struct SlackShape {
   SlabShape slab;
   Index3 bricks{};  ///< of a block
   GoldErrors errors;
+  float curvature = 0.125f;  ///< of the second differences
 };
 
 /// above, below float[block][y][x][slab.stride] of blocks whose first bricks are given, from gold, coverage

@@ -21,7 +21,7 @@ bool is_coarser(const LevelTriple& a, const LevelTriple& b) {
 
 }  // namespace
 
-TripleSearch::TripleSearch(const GoldSettings& settings)
+TripleSearch::TripleSearch(const GoldSettings& settings, bool proposing)
     : coarsening_(settings.coarsening),
       top_(settings.finest()),
       anisotropic_(settings.anisotropic),
@@ -31,7 +31,8 @@ TripleSearch::TripleSearch(const GoldSettings& settings)
   for (l[0] = 0; l[0] <= top_[0]; ++l[0])
     for (l[1] = 0; l[1] <= top_[1]; ++l[1])
       for (l[2] = 0; l[2] <= top_[2]; ++l[2])
-        if (l != LevelTriple{0, 0, 0} && l != top_ && (anisotropic_ || is_isotropic(l)))
+        if (l != LevelTriple{0, 0, 0} && l != top_ && (anisotropic_ || is_isotropic(l)) &&
+            !(proposing && (l[0] == top_[0] || l[1] == top_[1] || l[2] == top_[2])))
           candidates_.push_back(l);
   const MixedVolume shape{settings.grid, settings.granularity, settings.rate, coarsening_, {}, {}, {}, {}, 0};
   std::stable_sort(candidates_.begin(), candidates_.end(), [&](const LevelTriple& a, const LevelTriple& b) {

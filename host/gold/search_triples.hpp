@@ -19,8 +19,9 @@ struct AxisErrors {
 /// The candidates of a volume, from the cheapest to the last before gold itself.
 class TripleSearch {
  public:
-  /// Levels up to the gold rate's. Isotropic: the levels in turn.
-  explicit TripleSearch(const GoldSettings& settings);
+  /// Levels up to the gold rate's. Isotropic: the levels in turn. `proposing`: only levels whose samples lie
+  /// two nodes of gold apart or more along every axis; of others gold does not show what they err.
+  explicit TripleSearch(const GoldSettings& settings, bool proposing = false);
 
   /// One brick's search. Cost of next(): a look at each candidate.
   struct Brick {

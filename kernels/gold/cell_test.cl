@@ -376,8 +376,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
         const Corners face = larger(left, here);
         if (iy > 0) {
           const Corners all = larger(before[ix - 1], face);
-          VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * 0.125f + rest,
-              above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * 0.125f + rest;
+          VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * test.curvature + rest,
+              above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * test.curvature + rest;
           // Whatever is no number here is no bound.
           below = select(unlimited, below, below <= FLT_MAX);
           above = select(unlimited, above, above <= FLT_MAX);

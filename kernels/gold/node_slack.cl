@@ -45,14 +45,15 @@ __kernel void expand_addend(__global float* rows, __global const float* addend, 
 
 // Slack of each gold cell: how far F may lie above and below gold's interpolant there. Where F is convex it
 // lies below, so `below` is the sum of the largest positive second differences at the cell's corners, by
-// axis, / 8, `above` that of the negative ones, each plus what its brick adds (interpolation, rounding, the
-// remainder of T). Cells beyond the block, and with `windowed` those whose range misses the window, are
-// VDVR_UNTESTED. The host pads gold and the strides so that no 16-lane access leaves its column's room.
-// cell_test.cl has the same by cell, without arrays.
+// axis, times `curvature` (an eighth, or what finer gold would have of these), `above` that of the negative
+// ones, each plus what its brick adds (interpolation, rounding, the remainder of T). Cells beyond the block,
+// and with `windowed` those whose range misses the window, are VDVR_UNTESTED. The host pads gold and the
+// strides so that no 16-lane access leaves its column's room. cell_test.cl has the same by cell, without
+// arrays.
 __kernel void cell_slack(__global float* cells_above, __global float* cells_below, __global const float* gold,
                          __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
                          int stride, int side, int bricks_x, int bricks_y, int blocks, int counted,
-                         int windowed, float window_low, float window_high) {
+                         int windowed, float window_low, float window_high, float curvature) {
   const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
@@ -64,7 +65,7 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   CORNERS(DIFFERENCES)
   const float16 bound =
       vload16(0, addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
-  float16 below = (px + py + pz) * 0.125f + bound, above = -(mx + my + mz) * 0.125f + bound;
+  float16 below = (px + py + pz) * curvature + bound, above = -(mx + my + mz) * curvature + bound;
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   int16 out = k > nz - 2;
   if (windowed) {
