@@ -2,6 +2,7 @@
 #include "host/gold/fit_coefficients.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
@@ -9,7 +10,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrGoldBlocks) == 32 && sizeof(VdvrLattice) == 36);
+static_assert(sizeof(VdvrGoldBlocks) == 32 && sizeof(VdvrLattice) == 36 && sizeof(VdvrMarkedColumn) == 16);
 
 namespace {
 
@@ -26,7 +27,7 @@ void grow(opencl::State& state, opencl::DeviceArray<T>& array, std::uint64_t siz
   if (array.size() >= size) return;
   array = {};  // before the next one is allocated
   array = opencl::DeviceArray<T>(state, size, what);
-  array.fill(0);  // 16 lanes read beyond what is interpolated
+  if constexpr (std::is_arithmetic_v<T>) array.fill(0);  // 16 lanes read beyond what is interpolated
 }
 
 }  // namespace
@@ -98,8 +99,23 @@ void LatticeFit::mark(const std::vector<NodeBox>& wanted, int steps) {
   }
   grow(state_, wanted_, host_wanted_.size(), "nodes where samples are fitted");
   wanted_.write(host_wanted_);
-  grow(state_, needed_, host_needed_.size(), "columns of a lattice");
-  needed_.write(host_needed_);
+  list(nodes_, host_wanted_, deep, wide);
+  list(samples_, host_needed_, l.cy, l.cx);
+}
+
+// Those of columns [block][deep][wide] that have a run.
+void LatticeFit::list(Columns& columns, const std::vector<cl_uint>& runs, std::int64_t deep,
+                      std::int64_t wide) {
+  std::vector<VdvrMarkedColumn> marked;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i] == 0) continue;
+    const auto row = static_cast<std::int64_t>(i) / wide;
+    marked.push_back(
+        {to_int(row / deep), to_int(row % deep), to_int(static_cast<std::int64_t>(i) % wide), runs[i]});
+  }
+  columns.count = static_cast<std::int64_t>(marked.size());
+  grow(state_, columns.on_device, std::max<std::size_t>(1, marked.size()), "columns that are fitted");
+  columns.on_device.write(marked);
 }
 
 void LatticeFit::reserve(std::uint64_t gold, int steps) {
@@ -119,22 +135,23 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
   const GoldBlocks& b = blocks_;
   const VdvrLattice& l = level_.shape;
   const VdvrGoldBlocks blocks = blocks_on_device();
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice,
-                 cl_float>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks,
+                 VdvrLattice, cl_float>
       err(state_, "gold/fit_coefficients", "lattice_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks,
-                 VdvrLattice>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int,
+                 VdvrGoldBlocks, VdvrLattice>
       pool(state_, "gold/fit_coefficients", "pool_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_float> shift(
-      state_, "gold/fit_coefficients", "shift_lattice");
-  const std::uint64_t chunks = count(b.gold_stride / 16);
-  const std::int64_t wide = (l.cx - 1) * l.spacing_x + 1, deep = (l.cy - 1) * l.spacing_y + 1;
-  err({{chunks, count(wide), count(deep * b.count)}, {1, 4, 4}}, errors_.buffer(), level_.along.buffer(),
-      gold.buffer(), margin.buffer(), wanted_.buffer(), blocks, l, curvature);
-  pool({{chunks, count(l.cx), count(l.cy * b.count)}, {1, 4, 4}}, low_.buffer(), high_.buffer(),
-       errors_.buffer(), margin.buffer(), wanted_.buffer(), needed_.buffer(), blocks, l);
-  shift({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
-        low_.buffer(), high_.buffer(), needed_.buffer(), blocks, l, share);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks, VdvrLattice,
+                 cl_float>
+      shift(state_, "gold/fit_coefficients", "shift_lattice");
+  const std::uint64_t chunks = count(b.gold_stride / 16), nodes = count(nodes_.count),
+                      samples = count(samples_.count);
+  err({{chunks, nodes, 1}, {1, 16, 1}}, errors_.buffer(), level_.along.buffer(), gold.buffer(),
+      margin.buffer(), nodes_.on_device.buffer(), to_int(nodes_.count), blocks, l, curvature);
+  pool({{chunks, samples, 1}, {1, 16, 1}}, low_.buffer(), high_.buffer(), errors_.buffer(), margin.buffer(),
+       wanted_.buffer(), samples_.on_device.buffer(), to_int(samples_.count), blocks, l);
+  shift({{count(l.cz), samples, 1}, {16, 4, 1}}, level_.samples.buffer(), low_.buffer(), high_.buffer(),
+        samples_.on_device.buffer(), to_int(samples_.count), blocks, l, share);
 }
 
 // How many steps a column's samples take part in: all on the boxes, and one less a sample further.
@@ -166,8 +183,7 @@ void LatticeFit::mark_last_steps(const std::vector<NodeBox>& wanted, int steps) 
   last_.write(host_last_);
   host_needed_.assign(host_last_.begin(), host_last_.end());
   for (cl_uint& needed : host_needed_) needed = needed != static_cast<cl_uint>(none);
-  grow(state_, needed_, host_needed_.size(), "columns of a lattice");
-  needed_.write(host_needed_);
+  list(samples_, host_needed_, l.cy, l.cx);
 }
 
 // Every second node of all axes is a sample: a step is one pass.
@@ -216,22 +232,23 @@ const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gol
   if (at_twice) mark_last_steps(wanted, steps);
   else mark(wanted, steps);
   reserve(gold.size(), at_twice ? 0 : steps);
-  const GoldBlocks& b = blocks_;
   const VdvrLattice& l = level_.shape;
   const VdvrGoldBlocks blocks = blocks_on_device();
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice> take(
-      state_, "gold/fit_coefficients", "take_lattice");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice> interpolate(
-      state_, "gold/fit_coefficients", "interpolate_lattice");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks, VdvrLattice> take(
+      state_, "gold/fit_coefficients", "take_lattice"),
+      interpolate(state_, "gold/fit_coefficients", "interpolate_lattice");
+  const cl::Buffer& columns = samples_.on_device.buffer();
+  const std::uint64_t listed = count(samples_.count);
+  const cl_int n = to_int(samples_.count);
   if (at_twice) {
     fit_at_twice(gold, margin, steps, curvature);
     steps = 0;
   } else
-    take({{count(l.cz), count(l.cx), count(l.cy * b.count)}, {16, 4, 1}}, level_.samples.buffer(),
-         gold.buffer(), needed_.buffer(), blocks, l);
+    take({{count(l.cz), listed, 1}, {16, 4, 1}}, level_.samples.buffer(), gold.buffer(), columns, n, blocks,
+         l);
   for (int step = 0;; ++step) {
-    interpolate({{count(l.cx), count(l.cy), count(b.count)}, {8, 8, 1}}, level_.along.buffer(),
-                level_.samples.buffer(), needed_.buffer(), blocks, l);
+    interpolate({{listed, 1, 1}, {32, 1, 1}}, level_.along.buffer(), level_.samples.buffer(), columns, n,
+                blocks, l);
     if (step == steps) return level_;
     fit(gold, margin, curvature);
   }

@@ -76,7 +76,14 @@ class LatticeFit {
   std::vector<cl_int> host_last_;
   opencl::DeviceArray<float> errors_, low_, high_;
   opencl::DeviceArray<float> targets_, here_, there_;  // of fit_at_twice
-  opencl::DeviceArray<cl_uint> wanted_, needed_;
+  opencl::DeviceArray<cl_uint> wanted_;
+  // Marked columns: of gold whose nodes take part, and of the lattice.
+  struct Columns {
+    std::int64_t count = 0;
+    opencl::DeviceArray<VdvrMarkedColumn> on_device;
+  };
+  void list(Columns& columns, const std::vector<cl_uint>& runs, std::int64_t deep, std::int64_t wide);
+  Columns nodes_, samples_;
   opencl::DeviceArray<cl_int> last_;
 };
 

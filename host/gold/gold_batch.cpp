@@ -75,10 +75,13 @@ std::size_t GoldBatch::slot(std::int64_t brick) const {
   return at(((b * bricks_z_ + z) * bricks_y_ + y) * bricks_x_ + x);
 }
 
-std::vector<std::uint8_t> GoldBatch::flags(const std::vector<std::int64_t>& bricks) const {
-  std::vector<std::uint8_t> out(at(shape_.count * bricks_z_ * bricks_y_ * bricks_x_), 0);
-  for (const std::int64_t brick : bricks) out[slot(brick)] = 1;
-  return out;
+opencl::DeviceArray<cl_int4> GoldBatch::places(const std::vector<std::int64_t>& bricks) const {
+  std::vector<cl_int4> out;
+  for (const std::int64_t brick : bricks) {
+    const auto [b, x, y, z] = place(brick);
+    out.push_back({{to_int(b), to_int(x), to_int(y), to_int(z)}});
+  }
+  return {state_, std::span<const cl_int4>(out), "bricks to test"};
 }
 
 const LevelSamples& GoldBatch::lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
@@ -193,58 +196,52 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tol
   return out;
 }
 
+opencl::Range GoldBatch::columns_of_bricks(std::uint64_t bricks) const {
+  const std::uint64_t nodes = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
+  return {{nodes, nodes, bricks}, {nodes, 1, 1}};
+}
+
 std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& bricks) {
   constexpr int most = AxisErrors::most_levels;
   Index3 levels{};
   for (std::size_t a = 0; a < 3; ++a) levels[a] = std::min<int>(settings_.finest()[2 - a], most);
   if (!settings_.anisotropic || *std::max_element(levels.begin(), levels.end()) == 0 || bricks.empty())
     return std::vector<AxisErrors>(bricks.size());
-  const std::int64_t n = shape_.count;
-  const std::vector<std::uint8_t> wanted = flags(bricks);
-  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
-                                                    "bricks to look at");
-  opencl::DeviceArray<cl_int> errors(state_, wanted.size() * count(std::int64_t{6} * most),
+  const opencl::DeviceArray<cl_int4> on_device = places(bricks);
+  opencl::DeviceArray<cl_int> errors(state_, bricks.size() * count(std::int64_t{6} * most),
                                      "errors along axes");
   errors.fill(0);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_int, cl_int, cl_int,
-                 cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_int, cl_int,
+                 cl_int, cl_int>
       kernel(state_, "gold/classify", "axis_errors", brick_nodes());
-  kernel({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, errors.buffer(),
-         on_device.buffer(), gold_.buffer(), margin_.buffer(), shape_on_device(), to_int(levels[0]),
-         to_int(levels[1]), to_int(levels[2]), most);
+  kernel(columns_of_bricks(bricks.size()), errors.buffer(), on_device.buffer(),
+         to_int(static_cast<std::int64_t>(bricks.size())), gold_.buffer(), margin_.buffer(),
+         shape_on_device(), to_int(levels[0]), to_int(levels[1]), to_int(levels[2]), most);
   const auto bits = errors.to_host();
   std::vector<AxisErrors> out(bricks.size());
   for (std::size_t i = 0; i < bricks.size(); ++i)
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t l = 0; l < at(most); ++l)
         for (std::size_t sign = 0; sign < 2; ++sign)
-          out[i].of[a][l][sign] =
-              std::bit_cast<float>(bits[((slot(bricks[i]) * 3 + a) * at(most) + l) * 2 + sign]);
+          out[i].of[a][l][sign] = std::bit_cast<float>(bits[((i * 3 + a) * at(most) + l) * 2 + sign]);
   return out;
 }
 
 // The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
 std::vector<float> GoldBatch::errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
   require_slack();
-  const std::int64_t n = shape_.count;
-  const std::vector<std::uint8_t> wanted = flags(bricks);
-  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(wanted),
-                                                    "bricks to test");
+  const opencl::DeviceArray<cl_int4> on_device = places(bricks);
   const LevelSamples& samples = lattice(level, bricks);
-  opencl::DeviceArray<cl_int> error(state_, wanted.size(), "brick errors");
+  opencl::DeviceArray<cl_int> error(state_, bricks.size(), "brick errors");
   error.fill(-1);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
                  VdvrGoldShape, VdvrLattice>
       level_error(state_, "gold/classify", "level_error", brick_nodes());
-  level_error({{count(shape_.nx), count(shape_.ny), count(bricks_z_ * n)}, {16, 4, 1}}, error.buffer(),
-              on_device.buffer(), samples.along.buffer(), gold_.buffer(), above_.buffer(), below_.buffer(),
-              margin_.buffer(), shape_on_device(), samples.shape);
-  const auto bits = error.to_host();
+  level_error(columns_of_bricks(bricks.size()), error.buffer(), on_device.buffer(),
+              to_int(static_cast<std::int64_t>(bricks.size())), samples.along.buffer(), gold_.buffer(),
+              above_.buffer(), below_.buffer(), margin_.buffer(), shape_on_device(), samples.shape);
   std::vector<float> out;
-  for (const std::int64_t brick : bricks) {
-    const cl_int b = bits[slot(brick)];
-    out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
-  }
+  for (const cl_int b : error.to_host()) out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
   return out;
 }
 

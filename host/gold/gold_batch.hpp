@@ -124,7 +124,8 @@ class GoldBatch {
   [[nodiscard]] Index3 spacing_of(const LevelTriple& level) const;
   /// Place in arrays per brick of the blocks, [block][z][y][x].
   [[nodiscard]] std::size_t slot(std::int64_t brick) const;
-  [[nodiscard]] std::vector<std::uint8_t> flags(const std::vector<std::int64_t>& bricks) const;
+  [[nodiscard]] opencl::Range columns_of_bricks(std::uint64_t bricks) const;
+  [[nodiscard]] opencl::DeviceArray<cl_int4> places(const std::vector<std::int64_t>& bricks) const;
 
   opencl::State& state_;
   const GoldSettings& settings_;

@@ -14,40 +14,22 @@
    fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + s.gold_stride + (z))) -          \
    vload16(0, gold_column + (z)))
 
-// The bricks whose closed boxes a column meets: on a border those on both sides.
-typedef struct {
-  int x0, x1, y0, y1;
-} Around;
-inline Around bricks_around(int x, int y, int bricks_x, int bricks_y) {
-  const Around m = {max((x - 1) / VDVR_BRICK_NODES, 0), min(x / VDVR_BRICK_NODES, bricks_x - 1),
-                    max((y - 1) / VDVR_BRICK_NODES, 0), min(y / VDVR_BRICK_NODES, bricks_y - 1)};
-  return m;
-}
-inline bool is_any_wanted(__global const uchar* wanted, size_t layer, int bricks_x, Around m) {
-  bool any = false;
-  for (int by = m.y0; by <= m.y1; ++by)
-    for (int bx = m.x0; bx <= m.x1; ++bx) any = any || wanted[(layer + by) * bricks_x + bx];
-  return any;
-}
-
-// Raises error[block][brick z][brick y][brick x] to the largest that |interpolant - F| may be at the brick's
-// closed nodes, for the bricks wanted. It starts negative and stays so where no node of a brick is tested.
-// Positive floats order as their bits do.
-// One work-item does one column of one brick layer; its last node is also the next layer's first.
-__kernel void level_error(volatile __global int* error, __global const uchar* wanted,
+// Raises error[i] to the largest that |interpolant - F| may be at the closed nodes of the brick bricks[i]:
+// its block, and its place x, y, z in it. It starts negative and stays so where no node of a brick is tested.
+// Positive floats order as their bits do. One work-item does one column of one brick.
+__kernel void level_error(volatile __global int* error, __global const int4* bricks, int count,
                           __global const float* along, __global const float* gold,
                           __global const float* above, __global const float* below,
                           __global const float* margin, VdvrGoldShape s, VdvrLattice l) {
-  const int x = (int)get_global_id(0), y = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / s.bricks_z, bz = (int)get_global_id(2) - block * s.bricks_z;
-  if (x >= s.nx || y >= s.ny || block >= s.blocks) return;
+  const int i = (int)get_global_id(2);
+  if (get_global_id(0) > VDVR_BRICK_NODES || get_global_id(1) > VDVR_BRICK_NODES || i >= count) return;
+  const int block = bricks[i].s0, x = bricks[i].s1 * VDVR_BRICK_NODES + (int)get_global_id(0),
+            y = bricks[i].s2 * VDVR_BRICK_NODES + (int)get_global_id(1), bz = bricks[i].s3;
+  if (x >= s.nx || y >= s.ny) return;
   const size_t column = ((size_t)block * s.ny + y) * s.nx + x;
   const size_t gold_at =
       ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo;
   if (margin[gold_at] < s.lowest) return;
-  const size_t layer = ((size_t)block * s.bricks_z + bz) * s.bricks_y;
-  const Around m = bricks_around(x, y, s.bricks_x, s.bricks_y);
-  if (!is_any_wanted(wanted, layer, s.bricks_x, m)) return;
   const int ix = min(x / l.spacing_x, (s.nx - 1) / l.spacing_x - 1),
             iy = min(y / l.spacing_y, (s.ny - 1) / l.spacing_y - 1);
   const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
@@ -75,14 +57,12 @@ __kernel void level_error(volatile __global int* error, __global const uchar* wa
     const float e = v - gold_column[z];
     largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
   }
-  if (largest < 0.0f) return;
-  for (int by = m.y0; by <= m.y1; ++by)
-    for (int bx = m.x0; bx <= m.x1; ++bx) atomic_max(error + (layer + by) * s.bricks_x + bx, as_int(largest));
+  if (largest >= 0.0f && as_int(largest) > error[i]) atomic_max(error + i, as_int(largest));
 }
 
 // How far linear interpolation along one axis alone errs in the middles of its cells, for every level below
-// the gold rate: the largest of interpolant - gold and of gold - interpolant. errors[block][brick z][brick
-// y][brick x][axis x, y, z][level of most_levels][sign], starting at 0. A node that is no sample of the
+// the gold rate: the largest of interpolant - gold and of gold - interpolant. errors[brick i][axis x, y,
+// z][level of most_levels][sign], starting at 0. A node that is no sample of the
 // finest level is the middle of a cell of exactly one level.
 inline void raise_pair(volatile __global int* to, float plus, float minus) {
   if (plus > 0.0f && as_int(plus) > to[0]) atomic_max(to, as_int(plus));
@@ -100,18 +80,17 @@ inline int level_of_middle(int i, int levels) {
 }
 // Half the spacing of that level, in nodes; at a base sample that of the finest, which is read and not used.
 inline int half_of(int level, int levels) { return 1 << max(levels - 1 - level, 0); }
-__kernel void axis_errors(volatile __global int* errors, __global const uchar* wanted,
+__kernel void axis_errors(volatile __global int* errors, __global const int4* bricks, int count,
                           __global const float* gold, __global const float* margin, VdvrGoldShape s,
                           int levels_x, int levels_y, int levels_z, int most_levels) {
-  const int x = (int)get_global_id(0), y = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / s.bricks_z, bz = (int)get_global_id(2) - block * s.bricks_z;
-  if (x >= s.nx || y >= s.ny || block >= s.blocks) return;
+  const int i = (int)get_global_id(2);
+  if (get_global_id(0) > VDVR_BRICK_NODES || get_global_id(1) > VDVR_BRICK_NODES || i >= count) return;
+  const int block = bricks[i].s0, x = bricks[i].s1 * VDVR_BRICK_NODES + (int)get_global_id(0),
+            y = bricks[i].s2 * VDVR_BRICK_NODES + (int)get_global_id(1), bz = bricks[i].s3;
+  if (x >= s.nx || y >= s.ny) return;
   const int row = s.nx + 2 * s.halo;
   const size_t gold_at = ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * row + x + s.halo;
   if (margin[gold_at] < s.lowest) return;
-  const size_t layer = ((size_t)block * s.bricks_z + bz) * s.bricks_y;
-  const Around m = bricks_around(x, y, s.bricks_x, s.bricks_y);
-  if (!is_any_wanted(wanted, layer, s.bricks_x, m)) return;
   const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
   __global const float* column = gold + gold_at * s.gold_stride + s.halo;
   const int level_x = level_of_middle(x, levels_x), level_y = level_of_middle(y, levels_y);
@@ -141,15 +120,12 @@ __kernel void axis_errors(volatile __global int* errors, __global const uchar* w
       minus_z[l] = fmax(minus_z[l], -ez);
     }
   }
-  for (int by = m.y0; by <= m.y1; ++by)
-    for (int bx = m.x0; bx <= m.x1; ++bx) {
-      volatile __global int* out = errors + ((layer + by) * s.bricks_x + bx) * 6 * most_levels;
-      if (level_x < levels_x) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
-      if (level_y < levels_y)
-        raise_pair(out + 2 * (most_levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));
-      for (int l = 0; l < levels_z; ++l)
-        raise_pair(out + 2 * (2 * most_levels + l), largest_of_16(plus_z[l]), largest_of_16(minus_z[l]));
-    }
+  volatile __global int* out = errors + (size_t)i * 6 * most_levels;
+  if (level_x < levels_x) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
+  if (level_y < levels_y)
+    raise_pair(out + 2 * (most_levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));
+  for (int l = 0; l < levels_z; ++l)
+    raise_pair(out + 2 * (2 * most_levels + l), largest_of_16(plus_z[l]), largest_of_16(minus_z[l]));
 }
 
 // Copies the samples of tiles out of a lattice: request i writes tile samples float[sz][sy][sx] at `offset`.

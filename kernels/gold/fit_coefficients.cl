@@ -6,6 +6,9 @@
 // halo]; a lattice of every spacing-th gold node per axis, `reach` of them in the halo on every side: lattice
 // float[block][cy][cx][cz], node n at n / spacing + reach; needed uint[block][cy][cx] and
 // wanted uint[block][y + halo][x + halo], a bit for each run of 16 nodes along z, the last for all beyond it;
+// the columns of either that have a bit, one behind the other: columns of gold or of the lattice, whose x and
+// y are those of that array (most bricks of a block do not want what others want, and a work-item that finds
+// nothing to do costs as much as three that do);
 // along, low and high float[block][cy][cx][gold_stride], gold node z at z + halo. Called by
 // host/gold/fit_coefficients.cpp.
 #include "shared/gold_shape.h"
@@ -14,13 +17,13 @@
 inline bool has_run(uint runs, int z) { return runs >> min(z / 16, 31) & 1u; }
 
 // The lattice as gold has it.
-__kernel void take_lattice(__global float* lattice, __global const float* gold, __global const uint* needed,
-                           VdvrGoldBlocks g, VdvrLattice l) {
-  const int z = (int)get_global_id(0), x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
-  if (z >= l.cz || x >= l.cx || block >= g.blocks) return;
+__kernel void take_lattice(__global float* lattice, __global const float* gold,
+                           __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                           VdvrLattice l) {
+  const int z = (int)get_global_id(0), i = (int)get_global_id(1);
+  if (z >= l.cz || i >= count) return;
+  const int x = columns[i].x, y = columns[i].y, block = columns[i].block;
   const size_t of_lattice = ((size_t)block * l.cy + y) * l.cx + x;
-  if (!needed[of_lattice]) return;
   const int gx = (x - l.reach_x) * l.spacing_x + g.halo, gy = (y - l.reach_y) * l.spacing_y + g.halo;
   const size_t column = ((size_t)block * (g.ny + 2 * g.halo) + gy) * (g.nx + 2 * g.halo) + gx;
   lattice[of_lattice * l.cz + z] = gold[column * g.gold_stride + (z - l.reach_z) * l.spacing_z + g.halo];
@@ -28,11 +31,11 @@ __kernel void take_lattice(__global float* lattice, __global const float* gold, 
 
 // The lattice interpolated linearly along z at every gold node. One work-item fills one column.
 __kernel void interpolate_lattice(__global float* along, __global const float* lattice,
-                                  __global const uint* needed, VdvrGoldBlocks g, VdvrLattice l) {
-  const int x = (int)get_global_id(0), y = (int)get_global_id(1), block = (int)get_global_id(2);
-  if (x >= l.cx || y >= l.cy || block >= g.blocks) return;
-  const size_t column = ((size_t)block * l.cy + y) * l.cx + x;
-  if (!needed[column]) return;
+                                  __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                                  VdvrLattice l) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  const size_t column = ((size_t)columns[i].block * l.cy + columns[i].y) * l.cx + columns[i].x;
   __global const float* from = lattice + column * l.cz;
   __global float* to = along + column * g.gold_stride + g.halo - l.reach_z * l.spacing_z;
   const float step = 1.0f / (float)l.spacing_z;
@@ -49,17 +52,16 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
 // Error of the interpolant at 16 gold nodes along z: errors float[block][y + halo][x + halo][gold_stride].
 // Columns with a margin below `lowest` do not count and are left out.
 __kernel void lattice_errors(__global float* errors, __global const float* along, __global const float* gold,
-                             __global const float* margin, __global const uint* wanted, VdvrGoldBlocks g,
-                             VdvrLattice l, float curvature) {
-  const int z = (int)get_global_id(0) * 16,
-            x = (int)get_global_id(1);  // from the lattice's rim
-  const int deep = (l.cy - 1) * l.spacing_y + 1;
-  const int block = (int)get_global_id(2) / deep, y = (int)get_global_id(2) - block * deep;
-  if (z + 16 > g.gold_stride || x > (l.cx - 1) * l.spacing_x || block >= g.blocks) return;
-  const int row = g.nx + 2 * g.halo, gx = x - l.reach_x * l.spacing_x + g.halo,
-            gy = y - l.reach_y * l.spacing_y + g.halo;
+                             __global const float* margin, __global const VdvrMarkedColumn* columns,
+                             int count, VdvrGoldBlocks g, VdvrLattice l, float curvature) {
+  const int z = (int)get_global_id(0) * 16, i = (int)get_global_id(1);
+  if (z + 16 > g.gold_stride || i >= count || !has_run(columns[i].runs, z)) return;
+  const int row = g.nx + 2 * g.halo, gx = columns[i].x, gy = columns[i].y, block = columns[i].block;
+  // From the lattice's rim.
+  const int x = gx - g.halo + l.reach_x * l.spacing_x, y = gy - g.halo + l.reach_y * l.spacing_y;
+  if (x < 0 || y < 0 || x > (l.cx - 1) * l.spacing_x || y > (l.cy - 1) * l.spacing_y) return;
   const size_t column = ((size_t)block * (g.ny + 2 * g.halo) + gy) * row + gx;
-  if (margin[column] < g.lowest || !has_run(wanted[column], z)) return;
+  if (margin[column] < g.lowest) return;
   // The last column is no cell's lower end. The halo's outermost columns have no second
   // differences across; they lie outside what is asked for.
   const int ix = min(x / l.spacing_x, l.cx - 2), iy = min(y / l.spacing_y, l.cy - 2);
@@ -86,12 +88,12 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
 // nodes along z. Lattice columns on the rim have a cell on one side only, which has to do.
 __kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
                           __global const float* margin, __global const uint* wanted,
-                          __global const uint* needed, VdvrGoldBlocks g, VdvrLattice l) {
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
-  if (z + 16 > g.gold_stride || x >= l.cx || block >= g.blocks) return;
+                          __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                          VdvrLattice l) {
+  const int z = (int)get_global_id(0) * 16, i = (int)get_global_id(1);
+  if (z + 16 > g.gold_stride || i >= count || !has_run(columns[i].runs, z)) return;
+  const int x = columns[i].x, y = columns[i].y, block = columns[i].block;
   const size_t of_lattice = ((size_t)block * l.cy + y) * l.cx + x;
-  if (!has_run(needed[of_lattice], z)) return;
   float16 smallest = (float16)(INFINITY), largest = (float16)(-INFINITY);
   const int x0 = x > 0 ? -(l.spacing_x / 2) : 0, x1 = x + 1 < l.cx ? l.spacing_x / 2 : 0;
   const int y0 = y > 0 ? -(l.spacing_y / 2) : 0, y1 = y + 1 < l.cy ? l.spacing_y / 2 : 0;
@@ -111,12 +113,11 @@ __kernel void pool_errors(__global float* low, __global float* high, __global co
 
 // One step of the fit. Gold nodes outside [z_first, z_last] do not count, nor those beyond the lattice.
 __kernel void shift_lattice(__global float* lattice, __global const float* low, __global const float* high,
-                            __global const uint* needed, VdvrGoldBlocks g, VdvrLattice l, float share) {
-  const int k = (int)get_global_id(0), x = (int)get_global_id(1);
-  const int block = (int)get_global_id(2) / l.cy, y = (int)get_global_id(2) - block * l.cy;
-  if (k >= l.cz || x >= l.cx || block >= g.blocks) return;
-  const size_t column = ((size_t)block * l.cy + y) * l.cx + x;
-  if (!needed[column]) return;
+                            __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                            VdvrLattice l, float share) {
+  const int k = (int)get_global_id(0), i = (int)get_global_id(1);
+  if (k >= l.cz || i >= count) return;
+  const size_t column = ((size_t)columns[i].block * l.cy + columns[i].y) * l.cx + columns[i].x;
   const int centre = (k - l.reach_z) * l.spacing_z;
   const int first = max(k > 0 ? centre - l.spacing_z / 2 : centre, g.z_first),
             last = min(k + 1 < l.cz ? centre + l.spacing_z / 2 : centre, g.z_last);

@@ -10,4 +10,10 @@ typedef struct {
   int cx, cy, cz;                       // samples per block
 } VdvrLattice;
 
+// A column of blocks of gold, or of a lattice, that takes part. 16 bytes.
+typedef struct {
+  int block, y, x;
+  unsigned int runs;  // a bit for each run of 16 nodes along z
+} VdvrMarkedColumn;
+
 #endif
