@@ -10,7 +10,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrGoldBlocks) == 32 && sizeof(VdvrLattice) == 36 && sizeof(VdvrMarkedColumn) == 16);
+static_assert(sizeof(VdvrGoldBlocks) == 36 && sizeof(VdvrLattice) == 36 && sizeof(VdvrMarkedColumn) == 16);
 
 namespace {
 
@@ -47,6 +47,7 @@ VdvrGoldBlocks LatticeFit::blocks_on_device() const {
   const GoldBlocks& b = blocks_;
   return {.nx = to_int(b.nx),
           .ny = to_int(b.ny),
+          .nz = to_int(b.nz),
           .halo = to_int(b.halo),
           .gold_stride = to_int(b.gold_stride),
           .blocks = to_int(b.count),

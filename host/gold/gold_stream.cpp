@@ -164,6 +164,7 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
   if (!settings_.base_only) source_->remainder->require(selected, progress);
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
+  Batch batch(state_, settings_);  // its arrays serve all works
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
   for (const Work& w : all) {
     const auto tick = [&](double blocks) {
@@ -177,7 +178,7 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
       from += n;
       tick(static_cast<double>(n));
     }
-    if (from < w.first.size()) run_blocks(w, from, selected, on_batch, tick);
+    if (from < w.first.size()) run_blocks(batch, w, from, selected, on_batch, tick);
   }
 }
 
@@ -261,11 +262,17 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   const std::int64_t together = std::clamp<std::int64_t>(
       std::min<std::int64_t>(64 << 20, static_cast<std::int64_t>(state_.memory.left() / 3)) / per_block, 1,
       static_cast<std::int64_t>(work.first.size()));
-  batch.gold_ =
-      opencl::DeviceArray<float>(state_, count(together * gold * b.gold_stride + gold_room), "gold block");
-  batch.margin_ = opencl::DeviceArray<float>(state_, count(together * gold), "coverage margins");
-  // What lies between columns, and beyond the last, is read and not used: let it be finite.
-  batch.gold_.fill(0.0f);
+  const std::uint64_t samples = count(together * gold * b.gold_stride + gold_room);
+  if (batch.gold_.size() < samples) {
+    batch.gold_ = {};  // before the next one is allocated
+    batch.gold_ = opencl::DeviceArray<float>(state_, samples, "gold block");
+    // What lies between columns, and beyond the last, is read and not used: let it be finite.
+    batch.gold_.fill(0.0f);
+  }
+  if (batch.margin_.size() < count(together * gold)) {
+    batch.margin_ = {};
+    batch.margin_ = opencl::DeviceArray<float>(state_, count(together * gold), "coverage margins");
+  }
   return together;
 }
 
@@ -286,11 +293,11 @@ void GoldStream::take_addends(Batch& batch) {
                      of.errors, of.of_curvature);
 }
 
-void GoldStream::run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
-                            const OnBatch& on_batch, const std::function<void(double)>& tick) {
+void GoldStream::run_blocks(Batch& batch, const Work& work, std::size_t from,
+                            const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+                            const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
-  Batch batch(state_, settings_);
   const std::int64_t together = begin_batch(batch, work, slab_of(work));
   const std::int64_t nx = batch.shape_.nx + 2 * halo_, ny = batch.shape_.ny + 2 * halo_;
   const std::uint64_t block = count(nx * ny * batch.shape_.gold_stride);

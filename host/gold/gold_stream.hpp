@@ -123,7 +123,7 @@ class GoldStream {
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
   void take_addends(Batch& batch);
-  void run_blocks(const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
+  void run_blocks(Batch& batch, const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
 
   opencl::State& state_;

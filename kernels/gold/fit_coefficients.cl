@@ -62,8 +62,8 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
   if (x < 0 || y < 0 || x > (l.cx - 1) * l.spacing_x || y > (l.cy - 1) * l.spacing_y) return;
   const size_t column = ((size_t)block * (g.ny + 2 * g.halo) + gy) * row + gx;
   if (margin[column] < g.lowest) return;
-  // The last column is no cell's lower end. The halo's outermost columns have no second
-  // differences across; they lie outside what is asked for.
+  // The last column is no cell's lower end. The halo's outermost nodes have no second differences: what lies
+  // beyond them is not gold.
   const int ix = min(x / l.spacing_x, l.cx - 2), iy = min(y / l.spacing_y, l.cy - 2);
   const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
               fy = (float)(y - iy * l.spacing_y) / (float)l.spacing_y;
@@ -77,7 +77,8 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
                            vload16(0, centre - g.gold_stride) + vload16(0, centre + g.gold_stride) +
                            vload16(0, centre - (size_t)row * g.gold_stride) +
                            vload16(0, centre + (size_t)row * g.gold_stride);
-    target = f - curvature * (around - 6.0f * f);
+    const int16 node = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    target = select(f - curvature * (around - 6.0f * f), f, (node == 0) | (node >= g.nz + 2 * g.halo - 1));
   }
   const float16 e = (1.0f - fy) * ((1.0f - fx) * vload16(0, a) + fx * vload16(0, a + g.gold_stride)) +
                     fy * ((1.0f - fx) * vload16(0, b) + fx * vload16(0, b + g.gold_stride)) - target;

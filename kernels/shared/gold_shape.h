@@ -14,9 +14,9 @@ typedef struct {
   float lowest;  // columns of a smaller coverage margin are not tested
 } VdvrGoldShape;
 
-// Alone. Passed by value from host/gold/fit_coefficients.cpp to fit_coefficients.cl. 32 bytes.
+// Alone. Passed by value from host/gold/fit_coefficients.cpp to fit_coefficients.cl. 36 bytes.
 typedef struct {
-  int nx, ny;       // nodes of a block, without its halo
+  int nx, ny, nz;   // nodes of a block, without its halo
   int halo;         // nodes on every side
   int gold_stride;  // of a column of gold
   int blocks;
