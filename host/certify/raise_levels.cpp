@@ -66,28 +66,49 @@ class Raise {
     return any;
   }
 
-  // The axis that errs most; where that is not known, the coarsest ones; with isotropic levels, all.
-  bool itself() {
-    if (own_ == top_) return false;
+  // At a corner all take what the coarsest of them stores: no other's level bears on it.
+  bool owners_of_corner(const std::array<int, 3>& side) {
+    if (side[0] == 1 || side[1] == 1 || side[2] == 1) return false;
+    const auto sum = [&](std::int64_t j) {
+      const LevelTriple& l = bricks_.level[at(j)];
+      return l[0] + l[1] + l[2];
+    };
+    const auto incident = incident_bricks(bricks_, brick_, side);
+    int lowest = sum(brick_);
+    for (const std::int64_t j : incident) lowest = std::min(lowest, sum(j));
+    if (lowest == sum(brick_)) return false;
+    bool any = false;
+    for (const std::int64_t j : incident)
+      if (sum(j) == lowest) any = rise_along_worst(j) || any;
+    return any;
+  }
+
+  bool itself() { return rise_along_worst(brick_); }
+
+ private:
+  // The axis that errs most, as far as this brick knows; where that is not known, the coarsest ones; with
+  // isotropic levels, all.
+  bool rise_along_worst(std::int64_t brick) {
+    const LevelTriple own = bricks_.level[at(brick)];
+    if (own == top_) return false;
     // Samples a cell, as log2.
-    const auto density = [&](std::size_t zyx) { return own_[zyx] - bricks_.coarsening[zyx]; };
+    const auto density = [&](std::size_t zyx) { return own[zyx] - bricks_.coarsening[zyx]; };
     const int lowest = std::min({density(0), density(1), density(2)});
     std::size_t worst = 3;
     float gain = 0;
     for (std::size_t a = 0; along_ && a < 3; ++a) {
-      const int own = own_[2 - a], top = top_[2 - a];
-      const float g = error(*along_, a, own, top) - error(*along_, a, own + 1, top);
-      if (own >= top || g <= gain) continue;
+      const int level = own[2 - a], top = top_[2 - a];
+      const float g = error(*along_, a, level, top) - error(*along_, a, level + 1, top);
+      if (level >= top || g <= gain) continue;
       worst = a;
       gain = g;
     }
     for (std::size_t a = 0; a < 3; ++a)
       if (worst < 3 ? a == worst : density(2 - a) == lowest)
-        rise(to_[at(brick_)][2 - a], static_cast<std::uint8_t>(own_[2 - a] + 1));
+        rise(to_[at(brick)][2 - a], static_cast<std::uint8_t>(own[2 - a] + 1));
     return true;
   }
 
- private:
   const OpenBricks& bricks_;
   std::int64_t brick_;
   LevelTriple own_, top_;
@@ -100,12 +121,16 @@ class Raise {
 bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
                   const AxisErrors* along, std::vector<LevelTriple>& to) {
   Raise raise(bricks, brick, along, to);
+  constexpr int inside = 13;
+  bool neighbours = false;
   for (int part = 0; part < 27; ++part) {
-    if (!(violated >> part & 1)) continue;
+    if (part == inside || !(violated >> part & 1)) continue;
     const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
-    if (!raise.coarser_neighbours(side) && !raise.itself() && !raise.others(side)) return false;
+    if (raise.coarser_neighbours(side) || raise.owners_of_corner(side)) neighbours = true;
+    else if (!raise.itself() && !raise.others(side)) return false;
   }
-  return true;
+  // What a border does not hold is seen inside too, and mends with it.
+  return neighbours || !(violated >> inside & 1) || raise.itself();
 }
 
 }  // namespace vdvr

@@ -64,6 +64,27 @@ BOOST_AUTO_TEST_CASE(a_brick_without_coarser_neighbours_rises_along_the_axis_tha
   BOOST_TEST((raised(pair_of({0, 1, 1}, {0, 1, 1}), 0, inside)[0] == LevelTriple{1, 1, 1}));
 }
 
+// What a corner holds is what the coarsest brick there stores: once, four bricks of a real scan rose to gold
+// for a base sample that none of them stored.
+BOOST_AUTO_TEST_CASE(a_corner_raises_the_coarsest_that_meet_there) {
+  AxisErrors along;
+  along.of[1] = {{{0, 2}, {0, 0.5f}, {0, 0.1f}}};
+  BOOST_TEST((raised(pair_of({1, 1, 1}, {0, 0, 0}), 0, bit(2, 2, 2), along) ==
+              std::vector<LevelTriple>{{1, 1, 1}, {0, 1, 0}}));
+  // Its own.
+  BOOST_TEST((raised(pair_of({0, 1, 0}, {1, 1, 1}), 0, bit(2, 2, 2), along) ==
+              std::vector<LevelTriple>{{0, 2, 0}, {1, 1, 1}}));
+  // Nobody else meets this one.
+  BOOST_TEST((raised(pair_of({1, 1, 1}, {0, 0, 0}), 0, bit(0, 2, 2), along) ==
+              std::vector<LevelTriple>{{1, 2, 1}, {0, 0, 0}}));
+}
+
+BOOST_AUTO_TEST_CASE(inside_waits_for_a_border_that_raises_others) {
+  BOOST_TEST((raised(pair_of({1, 2, 2}, {1, 0, 0}), 0, high_x | inside) ==
+              std::vector<LevelTriple>{{1, 2, 2}, {1, 1, 0}}));
+  BOOST_TEST((raised(pair_of({1, 2, 2}, {1, 0, 0}), 0, inside)[0] == LevelTriple{2, 2, 2}));
+}
+
 BOOST_AUTO_TEST_CASE(at_the_gold_rate_the_others_rise_until_all_are_there) {
   const LevelTriple gold{top, top, top};
   BOOST_TEST((raised(pair_of(gold, {3, 3, 1}), 0, high_x) == std::vector<LevelTriple>{gold, {3, 3, 2}}));
