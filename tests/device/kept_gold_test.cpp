@@ -310,6 +310,36 @@ BOOST_AUTO_TEST_CASE(node_is_the_same_in_every_box) {
   }
 }
 
+// Of few rows and of many, more boxes than go through the device together, on several tiles.
+BOOST_AUTO_TEST_CASE(boxes_made_together_are_those_made_alone) {
+  for (const std::int64_t rows : {5, 70}) {
+    const ProjectionSet scan = noise_scan(11, rows, 60, 3);
+    Chain chain(scan);
+    const Grid grid = grid_in({40, 40, 8}, {1, 1, 1}, {-20, -20, -4});
+    KeptGold kept(device().state(), chain.filtered, chain.sups, grid, 1, 8, Interpolation::six_taps);
+    const GoldLattice lattice = kept.lattice(grid, 8);
+    std::vector<GoldBox> boxes;
+    for (std::int64_t y = 0; y < 8; ++y)
+      for (std::int64_t x = 0; x < 8; ++x) boxes.push_back({{x * 40 - 3, y * 40 - 3, 5}, {23, 23, 21}});
+    kept.prepare(lattice, boxes, {});
+    const std::int64_t stride = column_stride(21);
+    const std::uint64_t size = count(23 * 23 * stride), apart = size + 32, before = 16;
+    opencl::DeviceArray<float> together(device().state(), before + boxes.size() * apart, "boxes");
+    together.fill(-1e30f);
+    kept.fill(lattice, boxes, together, before, apart, stride);
+    const std::vector<float> all = together.to_host();
+    std::int64_t different = 0;
+    for (std::size_t b = 0; b < boxes.size(); ++b) {
+      const std::vector<float> alone = nodes_of(kept, lattice, boxes[b]).values;
+      for (std::size_t i = 0; i < size; ++i) different += all[before + b * apart + i] != alone[i] ? 1 : 0;
+      for (std::size_t i = size; i < apart; ++i) different += all[before + b * apart + i] != -1e30f ? 1 : 0;
+    }
+    BOOST_TEST(different == 0, different << " nodes of " << rows << " rows");
+    boxes[1].first[0] += 1;
+    BOOST_CHECK_THROW(kept.fill(lattice, boxes, together, before, apart, stride), std::logic_error);
+  }
+}
+
 // Rows go through the device in runs where memory is short.
 BOOST_AUTO_TEST_CASE(little_memory_changes_no_bit) {
   const ProjectionSet scan = noise_scan(24, 70, 40, 3);
