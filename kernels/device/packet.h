@@ -177,32 +177,42 @@ RAY_INLINE V4 as_columns(Turned8 a, Turned8 b) {
 #endif
 #endif
 
-// Two numbers of every lane, from one float2 a lane: PAIRS(ROW).
+// Two numbers of every lane, from one address a lane: PAIRS(ROW), ROW(n) the TWO_FLOATS of lane n. They
+// travel as one word: of two floats compilers make a load, and then as many shuffles as of four.
 typedef struct {
   V first, second;
 } V2;
 #if VDVR_LANES == 1
+#define TWO_FLOATS(p) vload2(0, p)
 RAY_INLINE V2 paired(float2 a) {
   const V2 t = {a.x, a.y};
   return t;
 }
 #define PAIRS(ROW) paired(ROW(0))
-#elif VDVR_LANES == 4
-RAY_INLINE V2 paired(float2 a, float2 b, float2 c, float2 d) {
-  const V2 t = {(V)(a.x, b.x, c.x, d.x), (V)(a.y, b.y, c.y, d.y)};
-  return t;
+#else
+#define TWO_FLOATS(p) as_ulong(vload2(0, p))
+#if VDVR_LANES == 4
+RAY_INLINE V2 paired(ulong a, ulong b, ulong c, ulong d) {
+  const float8 t = as_float8((ulong4)(a, b, c, d));
+  const V2 v = {t.even, t.odd};
+  return v;
 }
 #define PAIRS(ROW) paired(ROW(0), ROW(1), ROW(2), ROW(3))
 #else
 typedef struct {
   float8 first, second;
 } Paired8;
-RAY_INLINE Paired8 paired8(float2 a, float2 b, float2 c, float2 d, float2 e, float2 f, float2 g, float2 h) {
+RAY_INLINE Paired8 paired8(ulong a, ulong b, ulong c, ulong d, ulong e, ulong f, ulong g, ulong h) {
 #ifdef VDVR_PLAIN_VECTORS  // element by element, for simulators that cannot follow vectors that are joined
-  const Paired8 t = {(float8)(a.x, b.x, c.x, d.x, e.x, f.x, g.x, h.x),
-                     (float8)(a.y, b.y, c.y, d.y, e.y, f.y, g.y, h.y)};
+#define FLOAT_OF(w, n) as_float((uint)((w) >> (32 * (n))))
+#define EIGHT(n)                                                                                           \
+  (float8)(FLOAT_OF(a, n), FLOAT_OF(b, n), FLOAT_OF(c, n), FLOAT_OF(d, n), FLOAT_OF(e, n), FLOAT_OF(f, n), \
+           FLOAT_OF(g, n), FLOAT_OF(h, n))
+  const Paired8 t = {EIGHT(0), EIGHT(1)};
+#undef EIGHT
+#undef FLOAT_OF
 #else
-  const float8 abef = (float8)(a, b, e, f), cdgh = (float8)(c, d, g, h);
+  const float8 abef = as_float8((ulong4)(a, b, e, f)), cdgh = as_float8((ulong4)(c, d, g, h));
   const Paired8 t = {(float8)(abef.s0, abef.s2, cdgh.s0, cdgh.s2, abef.s4, abef.s6, cdgh.s4, cdgh.s6),
                      (float8)(abef.s1, abef.s3, cdgh.s1, cdgh.s3, abef.s5, abef.s7, cdgh.s5, cdgh.s7)};
 #endif
@@ -222,6 +232,7 @@ RAY_INLINE V2 as_pairs(Paired8 a, Paired8 b) {
 #define PAIRS(ROW)                                                                  \
   as_pairs(paired8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)), \
            paired8(ROW(8), ROW(9), ROW(a), ROW(b), ROW(c), ROW(d), ROW(e), ROW(f)))
+#endif
 #endif
 #endif
 

@@ -157,6 +157,22 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
 }
 #endif
 
+#if VDVR_BASE_FIRST && !VDVR_UNIFORM
+// As open_brick, but that bricks which read the base have all of it, so that a lane may go on into the next.
+RAY_INLINE OpenBrick open_whole_base(BRICKS, VdvrGrid grid, I3 at) {
+  OpenBrick b = open_brick(bricks, grid, at);
+  const OpenBrick base = open_base(grid, VDVR_F32, 0.0f, 0.0f);
+  const I tiled = (b.scale.x != base.scale.x) | (b.scale.y != base.scale.y) | (b.scale.z != base.scale.z);
+  b.low = v3(PICK(tiled, b.low.x, base.low.x), PICK(tiled, b.low.y, base.low.y),
+             PICK(tiled, b.low.z, base.low.z));
+  b.place = PICK(tiled, b.place, base.place);
+  b.top.x = PICK(tiled, b.top.x, base.top.x);
+  b.top.y = PICK(tiled, b.top.y, base.top.y);
+  b.top.z = PICK(tiled, b.top.z, base.top.z);
+  return b;
+}
+#endif
+
 // --- buffer: cells and their corners ---
 #ifdef VDVR_SAMPLER_BUFFER
 
@@ -243,7 +259,7 @@ typedef struct {
   V at, next;
 } Pair;
 #if VDVR_SAMPLE_TYPES == 1
-#define FLOAT_PAIR(n) vload2(0, s + TO_ULONG(LANE(p.lane, n)))
+#define FLOAT_PAIR(n) TWO_FLOATS(s + TO_ULONG(LANE(p.lane, n)))
 RAY_INLINE Pair float_pair(__global const float* s, Place p) {
   s += p.all;
   const V2 t = PAIRS(FLOAT_PAIR);
@@ -309,22 +325,30 @@ RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
 }
 
 #if VDVR_BASE_FIRST
+// As local_of from 0 on, of c not below it.
+RAY_INLINE I local_from_zero(V c, float scale, int top, V* fraction) {
+  const V r = c * scale;
+  I i = TO_I(r);
+  i = i > top ? (I)(top) : i;
+  *fraction = r - TO_V(i);
+  return i;
+}
+
 // As cell_at, of points whose bricks all read the base: its cells in global coordinates have the bits of the
 // brick's own, because c - low and powers of two are exact in fp32. No record is read.
 RAY_INLINE Cell base_cell_at(VdvrGrid grid, V3 c) {
   const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
             nz = grid.cells_z >> VDVR_COARSE_Z;
-  const V zero = (V)(0.0f);
   Cell cell;
-  cell.index.x = local_of(c.x, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_X)), (I)(nx - 1), &cell.fraction.x);
-  cell.index.y = local_of(c.y, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Y)), (I)(ny - 1), &cell.fraction.y);
-  cell.index.z = local_of(c.z, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Z)), (I)(nz - 1), &cell.fraction.z);
+  cell.index.x = local_from_zero(c.x, 1.0f / (float)(1 << VDVR_COARSE_X), nx - 1, &cell.fraction.x);
+  cell.index.y = local_from_zero(c.y, 1.0f / (float)(1 << VDVR_COARSE_Y), ny - 1, &cell.fraction.y);
+  cell.index.z = local_from_zero(c.z, 1.0f / (float)(1 << VDVR_COARSE_Z), nz - 1, &cell.fraction.z);
   cell.x = place((Offset)(0), 1);
   cell.y = place((Offset)(0), nx + 1);
   cell.z = place((Offset)(0), (nx + 1) * (ny + 1));
   cell.lowest = place((cell.index.z * (ny + 1) + cell.index.y) * (nx + 1) + cell.index.x, 0);
   cell.type = (I)(VDVR_F32);
-  cell.value_scale = cell.bias = zero;
+  cell.value_scale = cell.bias = (V)(0.0f);
   return cell;
 }
 #endif
