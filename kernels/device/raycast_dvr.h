@@ -75,10 +75,10 @@ RAY_INLINE V3 position_at(const Ray* ray, VdvrGrid grid, V t) {
 }
 
 RAY_INLINE V leave_axis(V entry, V inverse, I b, I radius) {
-  const V low = TO_V((b - radius) * VDVR_GRANULARITY) + LEAP_MARGIN;
-  const V high = TO_V((b + radius + 1) * VDVR_GRANULARITY) - LEAP_MARGIN;
-  const V to_low = (low - entry) * inverse, to_high = (high - entry) * inverse;
-  return MOST(to_low, to_high);
+  // The face that lies ahead.
+  const I ahead = inverse > 0.0f;
+  const V face = TO_V((b + PICK(ahead, radius + 1, -radius)) * VDVR_GRANULARITY);
+  return (face + PICK(ahead, (V)(-LEAP_MARGIN), (V)(LEAP_MARGIN)) - entry) * inverse;
 }
 // Where rays leave the cubes of bricks [b - radius, b + radius], a margin before their faces.
 RAY_INLINE V leave_bricks(const Ray* ray, I3 b, I radius) {
@@ -89,13 +89,24 @@ RAY_INLINE V leave_bricks(const Ray* ray, I3 b, I radius) {
   return LEAST(xy, z);
 }
 
-RAY_INLINE float least_lane(V v) {
-  float least = LANE(v, 0);
-#define LOWER(n) least = LEAST(LANE(v, n), least);
-  EACH(LOWER)
-#undef LOWER
-  return least;
+#if VDVR_LANES == 1
+RAY_INLINE float least_lane(V v) { return v; }
+#else
+RAY_INLINE float least_lane4(float4 v) {
+  const float2 two = LEAST(v.lo, v.hi);
+  return LEAST(two.x, two.y);
 }
+#if VDVR_LANES == 4
+RAY_INLINE float least_lane(V v) { return least_lane4(v); }
+#elif VDVR_LANES == 8
+RAY_INLINE float least_lane(V v) { return least_lane4(LEAST(v.lo, v.hi)); }
+#else
+RAY_INLINE float least_lane(V v) {
+  const float8 eight = LEAST(v.lo, v.hi);
+  return least_lane4(LEAST(eight.lo, eight.hi));
+}
+#endif
+#endif
 RAY_INLINE int most_lane(I v) {
   int most = LANE(v, 0);
 #define RAISE(n) most = max(LANE(v, n), most);
@@ -116,8 +127,9 @@ typedef struct {
   I entry;
   V fraction;
 } Row;
-RAY_INLINE Row row_of(const VdvrRaycast* p, V value) {
-  const V at = (value - p->table_lo) * p->table_scale, last = (V)((float)(p->table_size - 1));
+RAY_INLINE V place_in_table(const VdvrRaycast* p, V value) { return (value - p->table_lo) * p->table_scale; }
+RAY_INLINE Row row_at(const VdvrRaycast* p, V at) {
+  const V last = (V)((float)(p->table_size - 1));
   const V x = at > 0.0f ? LEAST(at, last) : (V)(0.0f);
   Row r;
   r.entry = TO_I(x);
@@ -125,6 +137,7 @@ RAY_INLINE Row row_of(const VdvrRaycast* p, V value) {
   r.fraction = x - TO_V(r.entry);
   return r;
 }
+RAY_INLINE Row row_of(const VdvrRaycast* p, V value) { return row_at(p, place_in_table(p, value)); }
 
 // Opacities stand behind the table once more, alone: most samples need no colour.
 RAY_INLINE V opacity_of(__global const float4* restrict table, const VdvrRaycast* p, Row r) {
@@ -247,9 +260,10 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 RAY_INLINE void composite(FIELD, BRICKS, VdvrGrid grid, __global const float4* restrict table,
                           const VdvrRaycast* p, const Ray* ray, const OpenBrick* brick,
                           const Sampled* sampled, V3 c, V t, I active, Seen* seen BOUNDS) {
-  const Row row = row_of(p, sampled->value);
+  const V at = place_in_table(p, sampled->value);
   // Most samples that show nothing lie where the transfer function's first or last entries are 0.
-  if (!ANY(active & (row.entry >= p->first_shown) & (row.entry <= p->last_shown))) return;
+  if (!ANY(active & (at >= p->shown_from) & (at < p->shown_to))) return;
+  const Row row = row_at(p, at);
   const V weight = PICK(active, (1.0f - seen->alpha) * opacity_of(table, p, row), (V)(0.0f));
   if (ANY(weight > 0.0f))
     absorb(THE_FIELD, bricks, grid, p, ray, brick, sampled, c, t, colour_of(table, row), weight,
