@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace vdvr {
 namespace {
@@ -88,13 +89,15 @@ int BakedTransfer::first_entry(float value) const {
   return std::min(static_cast<int>(x), size - 2);
 }
 
-std::pair<int, int> BakedTransfer::shown_entries() const {
+std::pair<float, float> BakedTransfer::shown_places() const {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
   const auto shows = [](std::uint8_t s) { return s == 0; };
   const auto first = std::find_if(stretch.begin(), stretch.end(), shows);
-  if (first == stretch.end()) return {size, -1};
+  if (first == stretch.end()) return {kFar, -kFar};
   const auto last = std::find_if(stretch.rbegin(), stretch.rend(), shows);
-  // A value between two entries is made of both.
-  return {static_cast<int>(first - stretch.begin()) - 1, static_cast<int>(stretch.rend() - last) - 1};
+  // A value between two entries is made of both, one beyond all is the outermost.
+  const auto from = first - stretch.begin() - 1, to = stretch.rend() - last;
+  return {from > 0 ? static_cast<float>(from) : -kFar, to < size - 1 ? static_cast<float>(to) : kFar};
 }
 
 std::uint8_t BakedTransfer::stretch_of(float low, float high) const {

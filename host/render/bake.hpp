@@ -22,8 +22,8 @@ struct BakedTransfer {
 
   /// The entry that kernels start from, by the same fp32 operations.
   [[nodiscard]] int first_entry(float value) const;
-  /// The first and the last entry from which a value may show something; (size, -1) where none does.
-  [[nodiscard]] std::pair<int, int> shown_entries() const;
+  /// Between which places, (value - lo) * scale, a value may show something; from above to where none does.
+  [[nodiscard]] std::pair<float, float> shown_places() const;
   /// 0 where values within [lo, hi] may show something, else the stretch that they all lie in.
   [[nodiscard]] std::uint8_t stretch_of(float lo, float hi) const;
 };

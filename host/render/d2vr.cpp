@@ -159,8 +159,8 @@ opencl::Defines defines_for(const char* kernel, const RenderOptions& o, const Ra
                             int lanes) {
   return {{"VDVR_KERNEL", kernel},
           {"VDVR_GRANULARITY", std::to_string(kGranularity)},
-          {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
-          {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
+          {"VDVR_GROUP_X", std::to_string(group_for(tuning.group_x, lanes))},
+          {"VDVR_GROUP_Y", std::to_string(group_for(tuning.group_y, lanes))},
           {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
           {"VDVR_FIXED_LIGHTS", o.lights.empty() && o.head_light ? "0" : "1"},
           {"VDVR_D2VR_DERIVATIVE", o.gradient == GradientKind::analytic ? "1" : "0"},

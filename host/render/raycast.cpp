@@ -119,8 +119,8 @@ opencl::Defines raycast_defines(const Impl& v, const RenderOptions& o, SamplerKi
       {"VDVR_KERNEL", kernel_of(o).number},
       {"VDVR_GRANULARITY", std::to_string(v.field.grid.granularity)},
       {sampler == SamplerKind::image3d ? "VDVR_SAMPLER_IMAGE3D" : "VDVR_SAMPLER_BUFFER", "1"},
-      {"VDVR_GROUP_X", std::to_string(tuning.group_x)},
-      {"VDVR_GROUP_Y", std::to_string(tuning.group_y)},
+      {"VDVR_GROUP_X", std::to_string(group_for(tuning.group_x, lanes))},
+      {"VDVR_GROUP_Y", std::to_string(group_for(tuning.group_y, lanes))},
       {"VDVR_GEOMETRY", o.output == RenderOutput::colour ? "0" : "1"},
       {"VDVR_BOUNDS", o.output == RenderOutput::error ? "1" : "0"},
       {"VDVR_GRADIENT_ANALYTIC", gradient == GradientKind::analytic ? "1" : "0"},
@@ -135,14 +135,17 @@ opencl::Defines raycast_defines(const Impl& v, const RenderOptions& o, SamplerKi
   return defines;
 }
 
+int group_for(int asked, int lanes) { return asked > 0 ? asked : lanes == 16 ? 16 : 8; }
+
 opencl::Range packet_range(const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
   // Pixels of one packet (shared/packet.h).
   const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
+  const int group_x = group_for(tuning.group_x, lanes), group_y = group_for(tuning.group_y, lanes);
   const auto packets = [](std::int64_t pixels, int packet) {
     return static_cast<std::uint64_t>((pixels + packet - 1) / packet);
   };
   return {{packets(o.width, packet_x), packets(o.height, packet_y), 1},
-          {packets(tuning.group_x, packet_x), packets(tuning.group_y, packet_y), 1}};
+          {packets(group_x, packet_x), packets(group_y, packet_y), 1}};
 }
 
 namespace {

@@ -73,7 +73,7 @@ VdvrRaycast make_params(const DrawnField& v, const RenderOptions& o, const Baked
   p.table_lo = table.lo;
   p.table_scale = table.scale;
   p.table_size = table.size;
-  std::tie(p.first_shown, p.last_shown) = table.shown_entries();
+  std::tie(p.shown_from, p.shown_to) = table.shown_places();
   p.termination = static_cast<float>(o.termination);
   // Below 1/32 of the range per base cell a gradient is mostly noise in reconstructions from few views.
   p.gradient_full = (v.value_range.second - v.value_range.first) / 32;

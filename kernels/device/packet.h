@@ -30,10 +30,12 @@
 #define LANE(v, n) (v).s##n
 #define ANY(m) any_lane(m)
 #define NOT(m) (~(m))
+// No number is negative, and such a one needs no sign in an address.
+#define AT(p, i) (p)[(uint)(i)]
 #if VDVR_LANES == 4
 #define PACKET(NAME) NAME##4
 #define EACH(F) F(0) F(1) F(2) F(3)
-#define GATHER(T, p, i) ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3]))
+#define GATHER(T, p, i) ((T)(AT(p, (i).s0), AT(p, (i).s1), AT(p, (i).s2), AT(p, (i).s3)))
 #define PACKET_X 2
 #define PACKET_Y 2
 #define COLUMNS (int4)(0, 1, 0, 1)
@@ -41,9 +43,9 @@
 #elif VDVR_LANES == 8
 #define PACKET(NAME) NAME##8
 #define EACH(F) F(0) F(1) F(2) F(3) F(4) F(5) F(6) F(7)
-#define GATHER(T, p, i)                                                                           \
-  ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], \
-       (p)[(i).s7]))
+#define GATHER(T, p, i)                                                                          \
+  ((T)(AT(p, (i).s0), AT(p, (i).s1), AT(p, (i).s2), AT(p, (i).s3), AT(p, (i).s4), AT(p, (i).s5), \
+       AT(p, (i).s6), AT(p, (i).s7)))
 #define PACKET_X 4
 #define PACKET_Y 2
 #define COLUMNS (int8)(0, 1, 2, 3, 0, 1, 2, 3)
@@ -51,10 +53,10 @@
 #elif VDVR_LANES == 16
 #define PACKET(NAME) NAME##16
 #define EACH(F) F(0) F(1) F(2) F(3) F(4) F(5) F(6) F(7) F(8) F(9) F(a) F(b) F(c) F(d) F(e) F(f)
-#define GATHER(T, p, i)                                                                           \
-  ((T)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5], (p)[(i).s6], \
-       (p)[(i).s7], (p)[(i).s8], (p)[(i).s9], (p)[(i).sa], (p)[(i).sb], (p)[(i).sc], (p)[(i).sd], \
-       (p)[(i).se], (p)[(i).sf]))
+#define GATHER(T, p, i)                                                                          \
+  ((T)(AT(p, (i).s0), AT(p, (i).s1), AT(p, (i).s2), AT(p, (i).s3), AT(p, (i).s4), AT(p, (i).s5), \
+       AT(p, (i).s6), AT(p, (i).s7), AT(p, (i).s8), AT(p, (i).s9), AT(p, (i).sa), AT(p, (i).sb), \
+       AT(p, (i).sc), AT(p, (i).sd), AT(p, (i).se), AT(p, (i).sf)))
 #define PACKET_X 4
 #define PACKET_Y 4
 #define COLUMNS (int16)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3)
@@ -177,32 +179,45 @@ RAY_INLINE V4 as_columns(Turned8 a, Turned8 b) {
 #endif
 #endif
 
-// Two numbers of every lane, from one float2 a lane: PAIRS(ROW).
+// Two numbers of every lane, from one address a lane: PAIRS(ROW), ROW(n) the TWO_FLOATS of lane n. They
+// travel as one word: of two floats compilers make a load, and then as many shuffles as of four.
 typedef struct {
   V first, second;
 } V2;
 #if VDVR_LANES == 1
+#define TWO_FLOATS(p) vload2(0, p)
 RAY_INLINE V2 paired(float2 a) {
   const V2 t = {a.x, a.y};
   return t;
 }
 #define PAIRS(ROW) paired(ROW(0))
-#elif VDVR_LANES == 4
-RAY_INLINE V2 paired(float2 a, float2 b, float2 c, float2 d) {
-  const V2 t = {(V)(a.x, b.x, c.x, d.x), (V)(a.y, b.y, c.y, d.y)};
-  return t;
+#else
+#define TWO_FLOATS(p) as_ulong(vload2(0, p))
+#if VDVR_LANES == 4
+RAY_INLINE V2 paired(ulong a, ulong b, ulong c, ulong d) {
+  const float8 t = as_float8((ulong4)(a, b, c, d));
+  const V2 v = {t.even, t.odd};
+  return v;
 }
 #define PAIRS(ROW) paired(ROW(0), ROW(1), ROW(2), ROW(3))
 #else
 typedef struct {
   float8 first, second;
 } Paired8;
-RAY_INLINE Paired8 paired8(float2 a, float2 b, float2 c, float2 d, float2 e, float2 f, float2 g, float2 h) {
+#define PAIRS8(ROW, i)                                                                               \
+  paired8(ROW((i).s0), ROW((i).s1), ROW((i).s2), ROW((i).s3), ROW((i).s4), ROW((i).s5), ROW((i).s6), \
+          ROW((i).s7))
+RAY_INLINE Paired8 paired8(ulong a, ulong b, ulong c, ulong d, ulong e, ulong f, ulong g, ulong h) {
 #ifdef VDVR_PLAIN_VECTORS  // element by element, for simulators that cannot follow vectors that are joined
-  const Paired8 t = {(float8)(a.x, b.x, c.x, d.x, e.x, f.x, g.x, h.x),
-                     (float8)(a.y, b.y, c.y, d.y, e.y, f.y, g.y, h.y)};
+#define FLOAT_OF(w, n) as_float((uint)((w) >> (32 * (n))))
+#define EIGHT(n)                                                                                           \
+  (float8)(FLOAT_OF(a, n), FLOAT_OF(b, n), FLOAT_OF(c, n), FLOAT_OF(d, n), FLOAT_OF(e, n), FLOAT_OF(f, n), \
+           FLOAT_OF(g, n), FLOAT_OF(h, n))
+  const Paired8 t = {EIGHT(0), EIGHT(1)};
+#undef EIGHT
+#undef FLOAT_OF
 #else
-  const float8 abef = (float8)(a, b, e, f), cdgh = (float8)(c, d, g, h);
+  const float8 abef = as_float8((ulong4)(a, b, e, f)), cdgh = as_float8((ulong4)(c, d, g, h));
   const Paired8 t = {(float8)(abef.s0, abef.s2, cdgh.s0, cdgh.s2, abef.s4, abef.s6, cdgh.s4, cdgh.s6),
                      (float8)(abef.s1, abef.s3, cdgh.s1, cdgh.s3, abef.s5, abef.s7, cdgh.s5, cdgh.s7)};
 #endif
@@ -224,5 +239,41 @@ RAY_INLINE V2 as_pairs(Paired8 a, Paired8 b) {
            paired8(ROW(8), ROW(9), ROW(a), ROW(b), ROW(c), ROW(d), ROW(e), ROW(f)))
 #endif
 #endif
+#endif
+
+// The pairs at the numbers i of four arrays.
+typedef struct {
+  V2 a, b, c, d;
+} FourPairs;
+RAY_INLINE FourPairs four_pairs(__global const float* a, __global const float* b, __global const float* c,
+                                __global const float* d, Offset i) {
+#define OF_A(n) TWO_FLOATS(a + TO_ULONG(n))
+#define OF_B(n) TWO_FLOATS(b + TO_ULONG(n))
+#define OF_C(n) TWO_FLOATS(c + TO_ULONG(n))
+#define OF_D(n) TWO_FLOATS(d + TO_ULONG(n))
+#if VDVR_LANES == 16
+  // Half the lanes at a time: their numbers then stay in registers.
+  const Paired8 la = PAIRS8(OF_A, i.lo), lb = PAIRS8(OF_B, i.lo), lc = PAIRS8(OF_C, i.lo),
+                ld = PAIRS8(OF_D, i.lo);
+  const Paired8 ha = PAIRS8(OF_A, i.hi), hb = PAIRS8(OF_B, i.hi), hc = PAIRS8(OF_C, i.hi),
+                hd = PAIRS8(OF_D, i.hi);
+  const FourPairs p = {as_pairs(la, ha), as_pairs(lb, hb), as_pairs(lc, hc), as_pairs(ld, hd)};
+#else
+#define A_LANE(n) OF_A(LANE(i, n))
+#define B_LANE(n) OF_B(LANE(i, n))
+#define C_LANE(n) OF_C(LANE(i, n))
+#define D_LANE(n) OF_D(LANE(i, n))
+  const FourPairs p = {PAIRS(A_LANE), PAIRS(B_LANE), PAIRS(C_LANE), PAIRS(D_LANE)};
+#undef A_LANE
+#undef B_LANE
+#undef C_LANE
+#undef D_LANE
+#endif
+#undef OF_A
+#undef OF_B
+#undef OF_C
+#undef OF_D
+  return p;
+}
 
 #endif

@@ -47,36 +47,19 @@ RAY_INLINE V between(V a, V b, V t) {
 #endif
 }
 
-// What stands beside the corners of a cell, as bits of floats.
-typedef struct {
-  Pair g00, g01, g10, g11;
-} Gradients;
-RAY_INLINE Gradients gradients_beside(__global const float* words, const Sampled* k, Place y, Place z) {
-  const Place i = k->cell.lowest, iy = after(i, y), iz = after(i, z), iyz = after(iy, z);
-  const Gradients g = {float_pair(words, i), float_pair(words, iy), float_pair(words, iz),
-                       float_pair(words, iyz)};
-  return g;
-}
-
 // Density per length along the world axes: what stands at the corners of the cell, interpolated as the field
 // is. Read here and not with the values: most samples are not lit. The grid's step is the gradients' here.
 RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,
                           float3 cells_per_length, I needed) {
   const V3 f = k->cell.fraction;
   __global const float* words = (__global const float*)field + grid.lit_samples;
-#if VDVR_MAY_SHARE
-  Gradients w;
-  if (k->alike) w = gradients_beside(words, k, k->ay, k->az);
-  else w = gradients_beside(words, k, k->cell.y, k->cell.z);
-#else
-  const Gradients w = gradients_beside(words, k, k->cell.y, k->cell.z);
-#endif
+  const Corners w = float_corners(words, k);  // bits of floats
 #define OF(AXIS, g) TO_V(AXIS(AS_I(w.g)))
 #define BLEND(AXIS)                                                         \
-  between(between(between(OF(AXIS, g00.at), OF(AXIS, g00.next), f.x),       \
-                  between(OF(AXIS, g01.at), OF(AXIS, g01.next), f.x), f.y), \
-          between(between(OF(AXIS, g10.at), OF(AXIS, g10.next), f.x),       \
-                  between(OF(AXIS, g11.at), OF(AXIS, g11.next), f.x), f.y), \
+  between(between(between(OF(AXIS, p00.at), OF(AXIS, p00.next), f.x),       \
+                  between(OF(AXIS, p01.at), OF(AXIS, p01.next), f.x), f.y), \
+          between(between(OF(AXIS, p10.at), OF(AXIS, p10.next), f.x),       \
+                  between(OF(AXIS, p11.at), OF(AXIS, p11.next), f.x), f.y), \
           f.z)
   const V3 g = v3(BLEND(LIT_X), BLEND(LIT_Y), BLEND(LIT_Z));
 #undef BLEND

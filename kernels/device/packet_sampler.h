@@ -157,6 +157,22 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
 }
 #endif
 
+#if VDVR_BASE_FIRST && !VDVR_UNIFORM
+// As open_brick, but that bricks which read the base have all of it, so that a lane may go on into the next.
+RAY_INLINE OpenBrick open_whole_base(BRICKS, VdvrGrid grid, I3 at) {
+  OpenBrick b = open_brick(bricks, grid, at);
+  const OpenBrick base = open_base(grid, VDVR_F32, 0.0f, 0.0f);
+  const I tiled = (b.scale.x != base.scale.x) | (b.scale.y != base.scale.y) | (b.scale.z != base.scale.z);
+  b.low = v3(PICK(tiled, b.low.x, base.low.x), PICK(tiled, b.low.y, base.low.y),
+             PICK(tiled, b.low.z, base.low.z));
+  b.place = PICK(tiled, b.place, base.place);
+  b.top.x = PICK(tiled, b.top.x, base.top.x);
+  b.top.y = PICK(tiled, b.top.y, base.top.y);
+  b.top.z = PICK(tiled, b.top.z, base.top.z);
+  return b;
+}
+#endif
+
 // --- buffer: cells and their corners ---
 #ifdef VDVR_SAMPLER_BUFFER
 
@@ -243,7 +259,7 @@ typedef struct {
   V at, next;
 } Pair;
 #if VDVR_SAMPLE_TYPES == 1
-#define FLOAT_PAIR(n) vload2(0, s + TO_ULONG(LANE(p.lane, n)))
+#define FLOAT_PAIR(n) TWO_FLOATS(s + TO_ULONG(LANE(p.lane, n)))
 RAY_INLINE Pair float_pair(__global const float* s, Place p) {
   s += p.all;
   const V2 t = PAIRS(FLOAT_PAIR);
@@ -309,22 +325,30 @@ RAY_INLINE Cell cell_at(VdvrGrid grid, const OpenBrick* b, V3 c) {
 }
 
 #if VDVR_BASE_FIRST
+// As local_of from 0 on, of c not below it.
+RAY_INLINE I local_from_zero(V c, float scale, int top, V* fraction) {
+  const V r = c * scale;
+  I i = TO_I(r);
+  i = i > top ? (I)(top) : i;
+  *fraction = r - TO_V(i);
+  return i;
+}
+
 // As cell_at, of points whose bricks all read the base: its cells in global coordinates have the bits of the
 // brick's own, because c - low and powers of two are exact in fp32. No record is read.
 RAY_INLINE Cell base_cell_at(VdvrGrid grid, V3 c) {
   const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
             nz = grid.cells_z >> VDVR_COARSE_Z;
-  const V zero = (V)(0.0f);
   Cell cell;
-  cell.index.x = local_of(c.x, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_X)), (I)(nx - 1), &cell.fraction.x);
-  cell.index.y = local_of(c.y, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Y)), (I)(ny - 1), &cell.fraction.y);
-  cell.index.z = local_of(c.z, zero, (V)(1.0f / (float)(1 << VDVR_COARSE_Z)), (I)(nz - 1), &cell.fraction.z);
+  cell.index.x = local_from_zero(c.x, 1.0f / (float)(1 << VDVR_COARSE_X), nx - 1, &cell.fraction.x);
+  cell.index.y = local_from_zero(c.y, 1.0f / (float)(1 << VDVR_COARSE_Y), ny - 1, &cell.fraction.y);
+  cell.index.z = local_from_zero(c.z, 1.0f / (float)(1 << VDVR_COARSE_Z), nz - 1, &cell.fraction.z);
   cell.x = place((Offset)(0), 1);
   cell.y = place((Offset)(0), nx + 1);
   cell.z = place((Offset)(0), (nx + 1) * (ny + 1));
   cell.lowest = place((cell.index.z * (ny + 1) + cell.index.y) * (nx + 1) + cell.index.x, 0);
   cell.type = (I)(VDVR_F32);
-  cell.value_scale = cell.bias = zero;
+  cell.value_scale = cell.bias = (V)(0.0f);
   return cell;
 }
 #endif
@@ -338,24 +362,56 @@ typedef struct {
   V s000, s001, s010, s011, s100, s101, s110, s111;
   V value;
 #if VDVR_MAY_SHARE
-  int alike;     // all lanes have the strides that follow
-  Place ay, az;  // else the cell's own hold
+  int alike;   // all lanes have the strides that follow
+  int ay, az;  // else the cell's own hold
 #endif
 } Sampled;
 
-RAY_INLINE void load_corners(FIELD, Place y, Place z, Sampled* k) {
-  const Cell* q = &k->cell;
-  const Place i = q->lowest, iy = after(i, y), iz = after(i, z), iyz = after(iy, z);
-  const Pair p00 = load_pair(field, q, i), p01 = load_pair(field, q, iy);
-  const Pair p10 = load_pair(field, q, iz), p11 = load_pair(field, q, iyz);
-  k->s000 = p00.at;
-  k->s001 = p00.next;
-  k->s010 = p01.at;
-  k->s011 = p01.next;
-  k->s100 = p10.at;
-  k->s101 = p10.next;
-  k->s110 = p11.at;
-  k->s111 = p11.next;
+// What stands at the corners of a cell: pairs along x, p<z><y>.
+typedef struct {
+  Pair p00, p01, p10, p11;
+} Corners;
+
+#if VDVR_SAMPLE_TYPES == 1
+// Of cells whose strides all lanes share.
+RAY_INLINE Corners corners_alike(__global const float* s, Offset lane, int y, int z) {
+  const FourPairs q = four_pairs(s, s + y, s + z, s + y + z, lane);
+  const Corners c = {
+      {q.a.first, q.a.second}, {q.b.first, q.b.second}, {q.c.first, q.c.second}, {q.d.first, q.d.second}};
+  return c;
+}
+RAY_INLINE Corners float_corners(__global const float* s, const Sampled* k) {
+#if VDVR_UNIFORM
+  return corners_alike(s, k->cell.lowest.lane, k->cell.y.all, k->cell.z.all);
+#else
+#if VDVR_MAY_SHARE
+  if (k->alike) return corners_alike(s, k->cell.lowest.lane, k->ay, k->az);
+#endif
+  const Place i = k->cell.lowest, iy = after(i, k->cell.y), iz = after(i, k->cell.z),
+              iyz = after(iy, k->cell.z);
+  const Corners c = {float_pair(s, i), float_pair(s, iy), float_pair(s, iz), float_pair(s, iyz)};
+  return c;
+#endif
+}
+#endif
+
+RAY_INLINE void load_corners(FIELD, Sampled* k) {
+#if VDVR_SAMPLE_TYPES == 1
+  const Corners q = float_corners((__global const float*)field, k);
+#else
+  const Cell* c = &k->cell;
+  const Place i = c->lowest, iy = after(i, c->y), iz = after(i, c->z), iyz = after(iy, c->z);
+  const Corners q = {load_pair(field, c, i), load_pair(field, c, iy), load_pair(field, c, iz),
+                     load_pair(field, c, iyz)};
+#endif
+  k->s000 = q.p00.at;
+  k->s001 = q.p00.next;
+  k->s010 = q.p01.at;
+  k->s011 = q.p01.next;
+  k->s100 = q.p10.at;
+  k->s101 = q.p10.next;
+  k->s110 = q.p11.at;
+  k->s111 = q.p11.next;
 }
 
 // As vdvr_sample_in_brick: x first, then y, then z.
@@ -370,13 +426,10 @@ RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   k.cell = cell_at(grid, b, c);
 #if VDVR_MAY_SHARE
   k.alike = b->alike;
-  k.ay = place((Offset)(0), LANE(b->stride_y, 0));
-  k.az = place((Offset)(0), LANE(b->stride_z, 0));
-  if (k.alike) load_corners(field, k.ay, k.az, &k);
-  else load_corners(field, k.cell.y, k.cell.z, &k);
-#else
-  load_corners(field, k.cell.y, k.cell.z, &k);
+  k.ay = LANE(b->stride_y, 0);
+  k.az = LANE(b->stride_z, 0);
 #endif
+  load_corners(field, &k);
   interpolate(&k);
   return k;
 }
@@ -391,16 +444,15 @@ RAY_INLINE Sampled sample_base_first(FIELD, const OpenBrick* b, int all_base, Vd
   if (all_base) {
     k.cell = base_cell_at(grid, c);
     k.alike = 1;
-    k.ay = k.cell.y;
-    k.az = k.cell.z;
+    k.ay = k.cell.y.all;
+    k.az = k.cell.z.all;
   } else {
     k.cell = cell_at(grid, b, c);
     k.alike = b->alike;
-    k.ay = place((Offset)(0), LANE(b->stride_y, 0));
-    k.az = place((Offset)(0), LANE(b->stride_z, 0));
+    k.ay = LANE(b->stride_y, 0);
+    k.az = LANE(b->stride_z, 0);
   }
-  if (k.alike) load_corners(field, k.ay, k.az, &k);
-  else load_corners(field, k.cell.y, k.cell.z, &k);
+  load_corners(field, &k);
   interpolate(&k);
   return k;
 #endif

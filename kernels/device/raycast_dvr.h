@@ -75,10 +75,10 @@ RAY_INLINE V3 position_at(const Ray* ray, VdvrGrid grid, V t) {
 }
 
 RAY_INLINE V leave_axis(V entry, V inverse, I b, I radius) {
-  const V low = TO_V((b - radius) * VDVR_GRANULARITY) + LEAP_MARGIN;
-  const V high = TO_V((b + radius + 1) * VDVR_GRANULARITY) - LEAP_MARGIN;
-  const V to_low = (low - entry) * inverse, to_high = (high - entry) * inverse;
-  return MOST(to_low, to_high);
+  // The face that lies ahead.
+  const I ahead = inverse > 0.0f;
+  const V face = TO_V((b + PICK(ahead, radius + 1, -radius)) * VDVR_GRANULARITY);
+  return (face + PICK(ahead, (V)(-LEAP_MARGIN), (V)(LEAP_MARGIN)) - entry) * inverse;
 }
 // Where rays leave the cubes of bricks [b - radius, b + radius], a margin before their faces.
 RAY_INLINE V leave_bricks(const Ray* ray, I3 b, I radius) {
@@ -89,13 +89,24 @@ RAY_INLINE V leave_bricks(const Ray* ray, I3 b, I radius) {
   return LEAST(xy, z);
 }
 
-RAY_INLINE float least_lane(V v) {
-  float least = LANE(v, 0);
-#define LOWER(n) least = LEAST(LANE(v, n), least);
-  EACH(LOWER)
-#undef LOWER
-  return least;
+#if VDVR_LANES == 1
+RAY_INLINE float least_lane(V v) { return v; }
+#else
+RAY_INLINE float least_lane4(float4 v) {
+  const float2 two = LEAST(v.lo, v.hi);
+  return LEAST(two.x, two.y);
 }
+#if VDVR_LANES == 4
+RAY_INLINE float least_lane(V v) { return least_lane4(v); }
+#elif VDVR_LANES == 8
+RAY_INLINE float least_lane(V v) { return least_lane4(LEAST(v.lo, v.hi)); }
+#else
+RAY_INLINE float least_lane(V v) {
+  const float8 eight = LEAST(v.lo, v.hi);
+  return least_lane4(LEAST(eight.lo, eight.hi));
+}
+#endif
+#endif
 RAY_INLINE int most_lane(I v) {
   int most = LANE(v, 0);
 #define RAISE(n) most = max(LANE(v, n), most);
@@ -116,8 +127,9 @@ typedef struct {
   I entry;
   V fraction;
 } Row;
-RAY_INLINE Row row_of(const VdvrRaycast* p, V value) {
-  const V at = (value - p->table_lo) * p->table_scale, last = (V)((float)(p->table_size - 1));
+RAY_INLINE V place_in_table(const VdvrRaycast* p, V value) { return (value - p->table_lo) * p->table_scale; }
+RAY_INLINE Row row_at(const VdvrRaycast* p, V at) {
+  const V last = (V)((float)(p->table_size - 1));
   const V x = at > 0.0f ? LEAST(at, last) : (V)(0.0f);
   Row r;
   r.entry = TO_I(x);
@@ -125,20 +137,15 @@ RAY_INLINE Row row_of(const VdvrRaycast* p, V value) {
   r.fraction = x - TO_V(r.entry);
   return r;
 }
+RAY_INLINE Row row_of(const VdvrRaycast* p, V value) { return row_at(p, place_in_table(p, value)); }
 
 // Opacities stand behind the table once more, alone: most samples need no colour.
 RAY_INLINE V opacity_of(__global const float4* restrict table, const VdvrRaycast* p, Row r) {
   __global const float* opacity = (__global const float*)(table + p->table_size);
-  V a, b;
-#define TWO(n)                                              \
-  {                                                         \
-    const float2 q = vload2(0, opacity + LANE(r.entry, n)); \
-    LANE(a, n) = q.x;                                       \
-    LANE(b, n) = q.y;                                       \
-  }
-  EACH(TWO)
+#define TWO(n) TWO_FLOATS(opacity + LANE(r.entry, n))
+  const V2 q = PAIRS(TWO);
 #undef TWO
-  return (1.0f - r.fraction) * a + r.fraction * b;
+  return (1.0f - r.fraction) * q.first + r.fraction * q.second;
 }
 
 RAY_INLINE V3 colour_of(__global const float4* restrict table, Row r) {
@@ -249,12 +256,31 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 }
 
 #if VDVR_KERNEL == VDVR_KERNEL_DVR
+// Composites what was sampled at c, parameter t, in the lanes `active`.
+RAY_INLINE void composite(FIELD, BRICKS, VdvrGrid grid, __global const float4* restrict table,
+                          const VdvrRaycast* p, const Ray* ray, const OpenBrick* brick,
+                          const Sampled* sampled, V3 c, V t, I active, Seen* seen BOUNDS) {
+  const V at = place_in_table(p, sampled->value);
+  // Most samples that show nothing lie where the transfer function's first or last entries are 0.
+  if (!ANY(active & (at >= p->shown_from) & (at < p->shown_to))) return;
+  const Row row = row_at(p, at);
+  const V weight = PICK(active, (1.0f - seen->alpha) * opacity_of(table, p, row), (V)(0.0f));
+  if (ANY(weight > 0.0f))
+    absorb(THE_FIELD, bricks, grid, p, ray, brick, sampled, c, t, colour_of(table, row), weight,
+           (V)(SHADED_WEIGHT * p->step), seen THE_BOUNDS);
+}
+
+#define DVR_ARGUMENTS                                                                          \
+  FIELD, BRICKS, VdvrGrid grid, __global const uchar *restrict distance,                       \
+      __global const float4 *restrict table, VdvrRaycast p, __global float4 *restrict picture, \
+      __global uint *restrict row_samples BOUNDS
+
+#if VDVR_BASE_FIRST
+#include "device/raycast_base_first.h"
+#else
 // Emission and absorption, front to back; opacity in `table` is that of one step. Geometry: of the sample
 // that brings the opacity to a half.
-__kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
-                                    __global const float4* restrict table, VdvrRaycast p,
-                                    __global float4* restrict picture,
-                                    __global uint* restrict row_samples BOUNDS) {
+__kernel VDVR_HINT void raycast_dvr(DVR_ARGUMENTS) {
   THE_PIXELS;
   Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0;
@@ -262,30 +288,14 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
   const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
   const int end = most_lane(ends);
   OpenBrick brick = no_brick();
-#if VDVR_BASE_FIRST
-  I empty;
-  int all_base = 0;
-#endif
   int k = 0;
   while (k < end) {
-    I active = (k < ends) & (seen.alpha < p.termination);
+    const I active = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(active)) break;
     const float t = ((float)k + 0.5f) * p.step;
     const V3 c = position_at(&ray, grid, (V)(t));
     if (ANY(active & NOT(is_inside(&brick, c)))) {
       const I3 at = brick_at(grid, c);
-#if VDVR_BASE_FIRST
-      const I guide = TO_I(GATHER(U8, distance, brick_index(grid, at)));
-      const I radius = (guide & (VDVR_GUIDE_EMPTY - 1)) - 1;
-      empty = (guide & VDVR_GUIDE_EMPTY) != 0;
-      if (!ANY(active & NOT(empty))) {
-        k = leap_to(leave_bricks(&ray, at, radius), active, p.inverse_step, 0.5f, k, end);
-        continue;
-      }
-      all_base = !ANY(active & (guide == 0));
-      if (all_base) brick = boxed_bricks(grid, at, radius);
-      else brick = open_brick(bricks, grid, at);
-#else
       if (p.skip) {
         const I away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
         if (!ANY(active & (away == 0))) {
@@ -294,28 +304,16 @@ __kernel VDVR_HINT void raycast_dvr(FIELD, BRICKS, VdvrGrid grid, __global const
         }
       }
       brick = open_brick(bricks, grid, at);
-#endif
     }
-#if VDVR_BASE_FIRST
-    // What stands in the base in the place of an empty brick's tile is not the field.
-    active &= NOT(empty);
-    const Sampled sampled = sample_base_first(THE_FIELD, &brick, all_base, grid, c);
-#else
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
-#endif
-    const Row row = row_of(&p, sampled.value);
     samples += PICK(active, (I)(1), (I)(0));
-    // Most samples that show nothing lie where the transfer function's first or last entries are 0.
-    if (ANY(active & (row.entry >= p.first_shown) & (row.entry <= p.last_shown))) {
-      const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of(table, &p, row), (V)(0.0f));
-      if (ANY(weight > 0.0f))
-        absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, (V)(t), colour_of(table, row), weight,
-               (V)(SHADED_WEIGHT * p.step), &seen THE_BOUNDS);
-    }
+    composite(THE_FIELD, bricks, grid, table, &p, &ray, &brick, &sampled, c, (V)(t), active,
+              &seen THE_BOUNDS);
     ++k;
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);
 }
+#endif
 #endif
 
 #endif

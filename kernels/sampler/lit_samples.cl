@@ -34,6 +34,63 @@ RAY_INLINE U stored_gradient(V3 g, float per_gradient) {
   return AS_U(a | b << 10 | c << 20);
 }
 
+// --- samples of the base around which all is base: rows in the place of cells ---
+
+// Samples of the base from number i on, as the sampler decodes them.
+#if VDVR_LANES == 1
+#define ROW_AT(TYPE, i) TO_V(((__global const TYPE*)field)[i])
+#else
+#define ROW_AT(TYPE, i) TO_V(PACKET(vload)(0, (__global const TYPE*)field + (i)))
+#endif
+RAY_INLINE V base_row(FIELD, const VdvrLitBlock* b, ulong i) {
+  if (b->base_type == VDVR_F32) return ROW_AT(float, i);
+  return (b->base_type == VDVR_U16 ? ROW_AT(ushort, i) : ROW_AT(uchar, i)) * b->base_scale + b->base_bias;
+}
+
+// As gradient_at has it along one axis at a sample: fractions are 0 or 1 there, and the lerps with them give
+// their ends to the bit. `half_cell` is of a spacing; `width` what the difference spans, in cells.
+RAY_INLINE V central(V before, V here, V after, float half_cell, float width) {
+  const V lo = half_cell * before + (1.0f - half_cell) * here;
+  const V hi = (1.0f - half_cell) * here + half_cell * after;
+  return (hi - lo) / width;
+}
+RAY_INLINE float width_at(float c, int cells) {
+  return min(c + GRADIENT_REACH, (float)cells) - max(c - GRADIENT_REACH, 0.0f);
+}
+
+// Whether the samples at c, which stand in the base from number `first` of their row on, are in the base as
+// those beside them are, and these in the row.
+RAY_INLINE int is_plain(BRICKS, VdvrGrid grid, const VdvrLitBlock* block, int first, V3 c) {
+  if (block->tiles || first < 1 || first + VDVR_LANES >= block->size_x) return 0;
+#if VDVR_UNIFORM
+  return 1;
+#else
+  __global const int* bits = (__global const int*)bricks + 1;
+  const I b = GATHER(I, bits, brick_index(grid, brick_at(grid, c)) * (Offset)(VDVR_BRICK_WORDS));
+  return !ANY((b & 512) == 0);
+#endif
+}
+
+// Their values and gradients.
+RAY_INLINE V plain_samples(FIELD, VdvrGrid grid, const VdvrLitBlock* b, int first, int y, int z,
+                           float3 cells_per_length, V3* gradient) {
+  const ulong across = (ulong)b->size_x, plane = across * (ulong)b->size_y;
+  const ulong at = (ulong)z * plane + (ulong)y * across + (ulong)first;
+  const ulong back = y > 0 ? at - across : at, ahead = y < b->size_y - 1 ? at + across : at;
+  const ulong below = z > 0 ? at - plane : at, above = z < b->size_z - 1 ? at + plane : at;
+  const V here = base_row(field, b, at);
+  const float half_x = GRADIENT_REACH / (float)(1 << VDVR_COARSE_X),
+              half_y = GRADIENT_REACH / (float)(1 << VDVR_COARSE_Y),
+              half_z = GRADIENT_REACH / (float)(1 << VDVR_COARSE_Z);
+  const V dx = central(base_row(field, b, at - 1), here, base_row(field, b, at + 1), half_x, 1.0f);
+  const V dy = central(base_row(field, b, back), here, base_row(field, b, ahead), half_y,
+                       width_at((float)(y << VDVR_COARSE_Y), grid.cells_y));
+  const V dz = central(base_row(field, b, below), here, base_row(field, b, above), half_z,
+                       width_at((float)(z << VDVR_COARSE_Z), grid.cells_z));
+  *gradient = v3(dx * cells_per_length.x, dy * cells_per_length.y, dz * cells_per_length.z);
+  return here;
+}
+
 // Samples VDVR_LANES at a time along x: global id (x / lanes, z * size_y + y, tile).
 __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
                                         __global const uint* restrict tile_bricks, VdvrLitBlock block,
@@ -58,20 +115,27 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
          TO_V(own.y * VDVR_GRANULARITY) + (float)y / vdvr_per_cell(block.level_y, VDVR_COARSE_Y),
          TO_V(own.z * VDVR_GRANULARITY) + (float)z / vdvr_per_cell(block.level_z, VDVR_COARSE_Z)),
       grid);
-  const OpenBrick around = open_brick(bricks, grid, brick_at(grid, c));
-  const Sampled there = sample_open(field, &around, grid, c);
   const float3 cells_per_length =
       (float3)(block.cells_per_length_x, block.cells_per_length_y, block.cells_per_length_z);
-  const V3 gradient =
-      gradient_at(field, bricks, grid, &around, &there, c, cells_per_length, (I)(VDVR_LANES > 1 ? -1 : 1));
+  V3 gradient;
+  V value;
+  if (is_plain(bricks, grid, &block, first, c)) {
+    value = plain_samples(field, grid, &block, first, y, z, cells_per_length, &gradient);
+  } else {
+    const OpenBrick around = open_brick(bricks, grid, brick_at(grid, c));
+    const Sampled there = sample_open(field, &around, grid, c);
+    gradient =
+        gradient_at(field, bricks, grid, &around, &there, c, cells_per_length, (I)(VDVR_LANES > 1 ? -1 : 1));
 #if VDVR_UNIFORM
-  const V value = there.value;
+    value = there.value;
 #else
-  // The sample as its own tile has it.
-  const OpenBrick stored = block.tiles ? open_brick(bricks, grid, own)
-                                       : open_base(grid, block.base_type, block.base_scale, block.base_bias);
-  const V value = sample_open(field, &stored, grid, c).value;
+    // The sample as its own tile has it.
+    const OpenBrick stored = block.tiles
+                                 ? open_brick(bricks, grid, own)
+                                 : open_base(grid, block.base_type, block.base_scale, block.base_bias);
+    value = sample_open(field, &stored, grid, c).value;
 #endif
+  }
   const U words = stored_gradient(gradient, block.per_gradient);
   const ulong place =
       block.first +

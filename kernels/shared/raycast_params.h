@@ -43,7 +43,7 @@ typedef struct {
   float length_unit;         // world units per length
   float table_lo, table_scale;
   int table_size;
-  int first_shown, last_shown;  // entries from which a value may show something; none: first above last
+  float shown_from, shown_to;  // places in the table, [from, to), of values that may show something
   float termination;
   float gradient_full;  // gradient, density per length, from which on a sample is fully shaded
   float slack;          // rounding allowance of the sampler on a brick's range
