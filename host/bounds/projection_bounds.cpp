@@ -17,6 +17,7 @@
 
 #include "host/bounds/node_functional.hpp"
 #include "host/bounds/six_taps.hpp"
+#include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -49,10 +50,11 @@ using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 std::vector<double> view_sups(opencl::State& state, const opencl::DeviceArray<float>& d, std::int64_t views,
                               std::int64_t columns, std::int64_t rows, int order) {
   const auto padded = static_cast<std::int64_t>(opencl::round_up(count(rows), 16));
-  RowSup row_sup(state, "bounds/projection_bounds", "row_sup");
+  const auto lanes = static_cast<std::uint64_t>(column_tuning(state.info).lanes);
+  RowSup row_sup(state, "bounds/projection_bounds", "row_sup", {{"VDVR_LANES", std::to_string(lanes)}});
   opencl::DeviceArray<float> sup(state, count(views * padded), "row maxima");
-  row_sup({{count(padded), count(views), 1}, {16, 1, 1}}, sup.buffer(), d.buffer(), to_int(views),
-          to_int(columns), to_int(padded));
+  row_sup({{count(padded) / lanes, count(views), 1}, {16 / lanes, 1, 1}}, sup.buffer(), d.buffer(),
+          to_int(views), to_int(columns), to_int(padded));
   const auto host = sup.to_host();
   require_finite(host, order);
   std::vector<double> out(at(views));
