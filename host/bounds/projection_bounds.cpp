@@ -150,10 +150,13 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
          views * underflow(g, gain);
 }
 
-// Views per chunk so that slabs of derivatives stay near 64 MiB.
-std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
+// Views per chunk so that slabs of derivatives stay near 64 MiB, and what is made on the way beside them
+// within what is left.
+std::int64_t view_chunk(const opencl::State& state, const FilteredScan& scan, std::int64_t columns,
+                        std::int64_t rows) {
   const std::int64_t per_view = columns * (rows + 16) * 4;
-  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
+  const auto budget = static_cast<std::int64_t>(std::min(std::uint64_t{64} << 20, state.memory.left() / 6));
+  return std::clamp<std::int64_t>(budget / per_view, 1, scan.geometry.views());
 }
 
 // Where sups are sampled. A signal sampled L times denser than Nyquist rises above its samples by at most
@@ -247,7 +250,7 @@ std::pair<double, double> sum_of_sups(opencl::State& state, Upsampler& upsampler
   std::optional<DenseValues> by_transforms;
   if (DenseValues::suit(state, g)) by_transforms.emplace(state, upsampler, scan, dense);
   const std::int64_t chunk =
-      view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
+      view_chunk(state, scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
   for (std::int64_t first = 0; first < g.views(); first += chunk) {
     const std::int64_t n = std::min(chunk, g.views() - first);
     for (const double m :
@@ -316,7 +319,7 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
       sum += m;
     return sum;
   };
-  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
+  const std::int64_t chunk = view_chunk(state, scan, columns.count, static_cast<std::int64_t>(rows.size()));
   for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
     sups.value += rise * sups_of(columns, rows, 0, 0, dense, first, n);
     sups.second_u += rise * sups_of(columns, rows, 2, 0, dense, first, n);
