@@ -19,7 +19,7 @@ constexpr std::int64_t layers = 6, timed_blocks = 3;
 constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
 // Of a large grid: columns of blocks to look at, samples times views that may be back-projected for them, and
 // kept nodes around a block.
-constexpr double fewest_columns = 4, most_back_projected = 6e9, kept_around = 40;
+constexpr double fewest_columns = 4, most_back_projected = 3e9, kept_around = 40;
 
 // The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
 // trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
