@@ -93,7 +93,10 @@ void add_grid(Arguments& args) {
       .value("size", "NxNxN", "cells in x, y, z (default: the covered region)")
       .value("spacing", "S[,SZ]", "cell width, and height where it differs (default: the detector pitch)")
       .value("origin", "X,Y,Z", "first sample (default: centred)")
-      .value("roi", "X0,Y0,Z0,X1,Y1,Z1", "certify the points of this box only");
+      .value(
+          "roi", "X0,Y0,Z0,X1,Y1,Z1",
+          "certify the points of this box only; without --size the grid is the box's bricks, and so is the "
+          "range that --epsilon is a fraction of");
 }
 
 GridOptions grid_options(const Arguments& args, const std::string& size_option) {

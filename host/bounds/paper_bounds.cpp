@@ -84,31 +84,34 @@ class Derivatives {
 }  // namespace
 
 std::vector<Bound> paper_projection_bounds(opencl::State& state, const FilteredScan& scan,
-                                           const std::vector<int>& rates) {
+                                           const std::vector<int>& rates, std::int64_t step) {
   const ParallelGeometry& g = scan.geometry;
+  const std::int64_t looked_at = (g.views() + step - 1) / step;
   // So many views at once that three times as much stays small, whatever the scan's size.
   constexpr std::int64_t together_samples = std::int64_t{16} << 20;
   const std::int64_t view = g.rows * g.columns,
-                     together = std::clamp<std::int64_t>(together_samples / view, 1, g.views());
+                     together = std::clamp<std::int64_t>(together_samples / view, 1, looked_at);
   double uu = 0, vv = 0, uuv = 0, uvv = 0;
-  for (std::int64_t first = 0; first < g.views(); first += together) {
-    const std::int64_t n = std::min(together, g.views() - first);
-    Derivatives d(state,
-                  std::span<const float>(scan.samples)
-                      .subspan(static_cast<std::size_t>(first * view), static_cast<std::size_t>(n * view)),
-                  {g.rows, g.columns, 1}, {g.pitch_v, g.pitch_u, 1}, n);
+  for (std::int64_t first = 0; first < looked_at; first += together) {
+    const std::int64_t n = std::min(together, looked_at - first);
+    std::vector<float> some(static_cast<std::size_t>(n * view));
+    for (std::int64_t i = 0; i < n; ++i)
+      std::copy_n(scan.samples.data() + (first + i) * step * view, view, some.data() + i * view);
+    Derivatives d(state, some, {g.rows, g.columns, 1}, {g.pitch_v, g.pitch_u, 1}, n);
     uu += d.maximum({0, 2, 0});
     vv += d.maximum({2, 0, 0});
     uuv += d.maximum({1, 2, 0});
     uvv += d.maximum({2, 1, 0});
   }
+  const double share = static_cast<double>(g.views()) / static_cast<double>(looked_at);
+  for (double* sum : {&uu, &vv, &uuv, &uvv}) *sum *= share;
   std::vector<Bound> out;
   for (const int rate : rates) {
-    const double step = std::max(g.pitch_u, g.pitch_v) / rate;
+    const double width = std::max(g.pitch_u, g.pitch_v) / rate;
     out.push_back(
         {"projection", "paper Eq. 5, at samples", rate, std::pow(g.pitch_u / rate, 2) / 8 * uu, false});
     out.push_back({"projection", "paper Eq. 7, at samples", rate,
-                   step * step / 8 * (uu + vv) + std::pow(step, 3) / 4 * (uuv + uvv), false});
+                   width * width / 8 * (uu + vv) + std::pow(width, 3) / 4 * (uuv + uvv), false});
   }
   return out;
 }

@@ -12,10 +12,12 @@
 #include <map>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "host/bounds/node_functional.hpp"
 #include "host/bounds/six_taps.hpp"
+#include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -44,21 +46,26 @@ void require_finite(const std::vector<float>& sups, int order) {
 
 using RowSup = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
 
-// The largest |d| of every view of a slab of derivatives.
-std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
-  RowSup row_sup(state, "bounds/projection_bounds", "row_sup");
-  opencl::DeviceArray<float> sup(state, count(d.views * d.rows_padded), "row maxima");
-  row_sup({{count(d.rows_padded), count(d.views), 1}, {16, 1, 1}}, sup.buffer(), d.values.buffer(),
-          to_int(d.views), to_int(d.columns.count), to_int(d.rows_padded));
+// The largest |d| of every view of a slab: float d[row / 16][view][column][16].
+std::vector<double> view_sups(opencl::State& state, const opencl::DeviceArray<float>& d, std::int64_t views,
+                              std::int64_t columns, std::int64_t rows, int order) {
+  const auto padded = static_cast<std::int64_t>(opencl::round_up(count(rows), 16));
+  const auto lanes = static_cast<std::uint64_t>(column_tuning(state.info).lanes);
+  RowSup row_sup(state, "bounds/projection_bounds", "row_sup", {{"VDVR_LANES", std::to_string(lanes)}});
+  opencl::DeviceArray<float> sup(state, count(views * padded), "row maxima");
+  row_sup({{count(padded) / lanes, count(views), 1}, {16 / lanes, 1, 1}}, sup.buffer(), d.buffer(),
+          to_int(views), to_int(columns), to_int(padded));
   const auto host = sup.to_host();
   require_finite(host, order);
-  std::vector<double> out(static_cast<std::size_t>(d.views));
-  for (std::size_t k = 0; k < out.size(); ++k)
-    for (std::int64_t z = 0; z < d.rows; ++z)
-      out[k] = std::max(out[k],
-                        static_cast<double>(
-                            host[k * static_cast<std::size_t>(d.rows_padded) + static_cast<std::size_t>(z)]));
+  std::vector<double> out(at(views));
+  for (std::int64_t k = 0; k < views; ++k)
+    for (std::int64_t z = 0; z < rows; ++z)
+      out[at(k)] = std::max(out[at(k)], static_cast<double>(host[at(k * padded + z)]));
   return out;
+}
+
+std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
+  return view_sups(state, d.values, d.views, d.columns.count, d.rows, order);
 }
 
 }  // namespace
@@ -107,15 +114,24 @@ const HalfColumnTaps& half_column_facts(int phases) {
 
 }  // namespace
 
+namespace {
+
+// What n samples of at most `largest` err once transforms have made them `rate` times finer.
+double transform_error(std::int64_t n, int rate, double largest, double sup) {
+  const HalfColumnTaps& taps = half_column_facts(rate / 2);
+  // Rounded once; before that in double precision, 32 products of the taps' magnitudes among them.
+  const double half = half_column_error(n) * std::sqrt(static_cast<double>(n));
+  return unit_roundoff * 1.001 * sup + (taps.sup + 0x1p-46) * sup + taps.norm * half * largest;
+}
+
+}  // namespace
+
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
                     double largest, double sup) {
   if (!upsampler.transforms(columns))
     return unit_roundoff * (product_error(detector_columns, upsampler.run()) + 2) * upsampler.gain_u() *
            largest;
-  const HalfColumnTaps& taps = half_column_facts(columns.rate / 2);
-  // Rounded once; before that in double precision, 32 products of the taps' magnitudes among them.
-  const double half = half_column_error(detector_columns) * std::sqrt(static_cast<double>(detector_columns));
-  return unit_roundoff * 1.001 * sup + (taps.sup + 0x1p-46) * sup + taps.norm * half * largest;
+  return transform_error(detector_columns, columns.rate, largest, sup);
 }
 
 namespace {
@@ -134,10 +150,13 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
          views * underflow(g, gain);
 }
 
-// Views per chunk so that slabs of derivatives stay near 64 MiB.
-std::int64_t view_chunk(const FilteredScan& scan, std::int64_t columns, std::int64_t rows) {
+// Views per chunk so that slabs of derivatives stay near 64 MiB, and what is made on the way beside them
+// within what is left.
+std::int64_t view_chunk(const opencl::State& state, const FilteredScan& scan, std::int64_t columns,
+                        std::int64_t rows) {
   const std::int64_t per_view = columns * (rows + 16) * 4;
-  return std::clamp<std::int64_t>((std::int64_t{64} << 20) / per_view, 1, scan.geometry.views());
+  const auto budget = static_cast<std::int64_t>(std::min(std::uint64_t{64} << 20, state.memory.left() / 6));
+  return std::clamp<std::int64_t>(budget / per_view, 1, scan.geometry.views());
 }
 
 // Where sups are sampled. A signal sampled L times denser than Nyquist rises above its samples by at most
@@ -158,22 +177,100 @@ struct DenseGrid {
 
 }  // namespace
 
+namespace {
+
+// |q| on the dense grid, view by view, where rows are many: columns first, then rows by transforms as well,
+// which a product would take rows squared for.
+class DenseValues {
+ public:
+  // Rows from which on that is the faster.
+  static constexpr std::int64_t fewest_rows = 96;
+  static bool suit(const opencl::State& state, const ParallelGeometry& g) {
+    return g.rows >= fewest_rows && ColumnUpsampling::is_possible(state);
+  }
+
+  DenseValues(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const DenseGrid& dense)
+      : state_(state),
+        upsampler_(upsampler),
+        scan_(scan),
+        columns_(dense.columns),
+        rows_(upsampled_columns(scan.geometry.rows, DenseGrid::density, 0)),
+        along_v_(state, scan.geometry.rows, DenseGrid::density) {
+    for (std::int64_t v = 0; v < scan.geometry.rows; ++v) own_rows_.push_back(static_cast<double>(v));
+  }
+
+  std::vector<double> sups(std::int64_t first, std::int64_t views) {
+    const std::int64_t V = scan_.geometry.rows,
+                       chunks = static_cast<std::int64_t>(opencl::round_up(count(columns_.count), 16)) / 16;
+    const UpsampledSlab slab = upsampler_(columns_, own_rows_, 0, 0, 1, first, views);
+    resize(turned_, count(chunks * views * V * 16), "columns of rows");
+    resize(values_, count(chunks * views * rows_.count * 16), "dense values");
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> turn(state_, "bounds/projection_bounds",
+                                                                        "turn");
+    turn({{count(V), count(chunks), count(views)}, {1, 1, 1}}, turned_.buffer(), slab.values.buffer(),
+         to_int(views), to_int(columns_.count), to_int(V));
+    along_v_(values_, {0, count(rows_.count * 16), count(views * rows_.count * 16)}, turned_,
+             {0, count(V * 16), count(views * V * 16)}, rows_, views, chunks);
+    return view_sups(state_, values_, views, rows_.count, columns_.count, 0);
+  }
+
+  // What the values err, of views whose samples sum up to `samples`: columns by a part of their own, which
+  // the series along v makes grow, and rows by theirs.
+  [[nodiscard]] double rounding(double samples) {
+    const ParallelGeometry& g = scan_.geometry;
+    const double gain_u = upsampler_.gain_u(), gain_v = lebesgue_constant(g.rows);
+    const double columns = column_error(upsampler_, g.columns, columns_, samples, gain_u * samples),
+                 largest = gain_u * samples + columns;
+    return gain_v * columns + transform_error(g.rows, DenseGrid::density, largest, gain_v * largest) +
+           static_cast<double>(g.views()) * gain_v * underflow(g, gain_u);
+  }
+
+ private:
+  void resize(opencl::DeviceArray<float>& array, std::uint64_t size, const char* what) {
+    if (array.size() == size) return;
+    array = {};  // before the next one is allocated
+    array = opencl::DeviceArray<float>(state_, size, what);
+  }
+
+  opencl::State& state_;
+  Upsampler& upsampler_;
+  const FilteredScan& scan_;
+  UpsampledColumns columns_, rows_;
+  ColumnUpsampling along_v_;
+  std::vector<double> own_rows_;
+  opencl::DeviceArray<float> turned_, values_;
+};
+
+// The sum over views of sup |q| without its rounding, and that.
+std::pair<double, double> sum_of_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
+  const ParallelGeometry& g = scan.geometry;
+  const DenseGrid dense(scan);
+  double samples = 0, sum = 0;
+  for (const double m : scan.view_max) samples += m;
+  std::optional<DenseValues> by_transforms;
+  if (DenseValues::suit(state, g)) by_transforms.emplace(state, upsampler, scan, dense);
+  const std::int64_t chunk =
+      view_chunk(state, scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
+  for (std::int64_t first = 0; first < g.views(); first += chunk) {
+    const std::int64_t n = std::min(chunk, g.views() - first);
+    for (const double m :
+         by_transforms
+             ? by_transforms->sups(first, n)
+             : view_sups(state, upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first, n), 0))
+      sum += dense.rise * m;
+  }
+  return {sum, by_transforms ? dense.rise * by_transforms->rounding(samples)
+                             : derivative_rounding(upsampler, scan, dense.columns, 0, samples,
+                                                   static_cast<double>(g.views()))};
+}
+
+}  // namespace
+
 FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
   const ParallelGeometry& g = scan.geometry;
   FieldSups sups;
-  const DenseGrid dense(scan);
-  const std::int64_t chunk =
-      view_chunk(scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
-  for (std::int64_t first = 0; first < g.views(); first += chunk)
-    for (const double m : view_sups(state,
-                                    upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first,
-                                              std::min(chunk, g.views() - first)),
-                                    0))
-      sups.value += dense.rise * m;
-  double samples = 0;
-  for (const double m : scan.view_max) samples += m;
-  sups.value +=
-      derivative_rounding(upsampler, scan, dense.columns, 0, samples, static_cast<double>(g.views()));
+  const auto [sum, rounding] = sum_of_sups(state, upsampler, scan);
+  sups.value = sum + rounding;
   sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
   if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
   return sups;
@@ -222,7 +319,7 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
       sum += m;
     return sum;
   };
-  const std::int64_t chunk = view_chunk(scan, columns.count, static_cast<std::int64_t>(rows.size()));
+  const std::int64_t chunk = view_chunk(state, scan, columns.count, static_cast<std::int64_t>(rows.size()));
   for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
     sups.value += rise * sups_of(columns, rows, 0, 0, dense, first, n);
     sups.second_u += rise * sups_of(columns, rows, 2, 0, dense, first, n);

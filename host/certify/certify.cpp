@@ -4,10 +4,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "host/bounds/covered_range.hpp"
+#include "host/gold/gold_settings.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {
@@ -44,6 +48,25 @@ void check_options(const CertifyOptions& options) {
     throw InputError("`closing` paper feeds bricks with samples of F: take `coefficients` sampled with it");
   if (plan.levels != Levels::isotropic)
     throw InputError("`closing` paper is defined for isotropic levels only");
+}
+
+constexpr const char* of_region_note =
+    "the grid is that part of the default one whose bricks meet `roi`: the range is the range there";
+
+// Of the default grid, what the region of interest meets.
+Grid grid_of_region(const ParallelGeometry& geometry, const FieldOptions& field,
+                    const std::array<double, 6>& roi, const Grid& whole, int granularity) {
+  const Grid grid = cropped_to(roi, whole, fitting_granularity(granularity, whole));
+  ParallelGeometry used = geometry;
+  used.center = center_of(field, geometry);
+  const Coverage coverage(used);
+  const std::vector<std::uint8_t> inside = covered_in_plane(grid, coverage);
+  if (std::find(inside.begin(), inside.end(), 1) == inside.end())
+    throw InputError(fmt::format(
+        "`roi` from ({:.6g}, {:.6g}) to ({:.6g}, {:.6g}) in x and y lies outside of what the scan covers: a "
+        "disc of radius {:.6g} around the axis",
+        roi[0], roi[1], roi[3], roi[4], coverage.inner_radius()));
+  return grid;
 }
 
 // What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
@@ -101,8 +124,13 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& toler
   check_options(options);
   FieldOptions field = options.field;
   field.center = center_of(field, scan.geometry);
-  const Grid grid = make_grid(scan.geometry, options.grid);
-  return make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
+  Grid grid = make_grid(scan.geometry, options.grid);
+  const bool cropped = options.build.roi && !options.grid.size;
+  if (cropped)
+    grid = grid_of_region(scan.geometry, field, *options.build.roi, grid, options.plan.granularity);
+  Plan plan = make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
+  if (cropped) plan.notes.emplace_back(of_region_note);
+  return plan;
 }
 
 BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,

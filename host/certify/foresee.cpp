@@ -19,7 +19,7 @@ constexpr std::int64_t layers = 6, timed_blocks = 3;
 constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
 // Of a large grid: columns of blocks to look at, samples times views that may be back-projected for them, and
 // kept nodes around a block.
-constexpr double fewest_columns = 4, most_back_projected = 6e9, kept_around = 40;
+constexpr double fewest_columns = 4, most_back_projected = 3e9, kept_around = 40;
 
 // The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
 // trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
@@ -290,8 +290,9 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
   out.kept_bytes =
       kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
-  out.seconds = first_pass + kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
-                                 static_cast<double>(kept.tiles() + missing);
+  out.kept_seconds = kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
+                     static_cast<double>(kept.tiles() + missing);
+  out.seconds = first_pass + out.kept_seconds;
   const auto add = [&](bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
     out.seconds += small.seconds(fine, purpose, of);
   };

@@ -10,6 +10,7 @@ namespace vdvr {
 struct Foreseen {
   double samples_ratio = 0;  ///< samples stored per base sample, index and tiles included
   double seconds = 0;        ///< of classification and verification
+  double kept_seconds = 0;   ///< of those, what gold takes that is kept
   std::uint64_t tile_bytes = 0;
   std::uint64_t kept_bytes = 0;  ///< of gold that will be kept and is not yet
 };

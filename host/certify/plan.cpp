@@ -106,8 +106,8 @@ std::vector<Bound> global_bounds(opencl::State& state, const FilteredScan& scan,
   };
   if (with_paper && 10 * static_cast<double>(g.views() * g.rows * g.columns) *
                             static_cast<double>(std::max(g.rows, g.columns)) <
-                        4e10)
-    append(paper_projection_bounds(state, scan, bound_rates));
+                        4e10 * static_cast<double>(step))
+    append(paper_projection_bounds(state, scan, bound_rates, step));
   if (with_paper && 18 * static_cast<double>(grid.sample_count()) *
                             static_cast<double>(*std::max_element(grid.cells.begin(), grid.cells.end())) <
                         2e10)
@@ -359,9 +359,12 @@ class Planner {
 
   // The reference range and the coverage, at rates whose own error cannot matter.
   void reconstruct_reference() {
-    // Estimates do with the cubic, which is off by some hundredths of what bounds allow.
-    plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid, 8,
-                                   estimates_views_ ? Interpolation::cubic : Interpolation::six_taps, {});
+    // Estimates do with four taps on columns at 4x, which are off by a hundredth of what is at the detector's
+    // finest: half of the columns are half of the cache lines.
+    plan_.base = estimates_views_ ? reconstruct_field(state_, prepared_->filtered, prepared_->upsampler,
+                                                      plan_.grid, 4, Interpolation::cubic, {})
+                                  : reconstruct_field(state_, prepared_->filtered, prepared_->upsampler,
+                                                      plan_.grid, 8, Interpolation::six_taps, {});
     check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
@@ -464,6 +467,7 @@ class Planner {
         foresee_build(state_, gold, plan_.base, stored, looked_at, plan_.epsilon_abs - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
+    plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
     // What the trial took, the scan and the base samples twice included, and the gold that was not kept yet;
@@ -490,7 +494,7 @@ class Planner {
 namespace {
 
 // A scan of more samples is judged from a window of its rows.
-constexpr std::int64_t most_samples_planned = std::int64_t{64} << 20;
+constexpr std::int64_t most_samples_planned = std::int64_t{8} << 20;
 
 // The plan of a window of rows, for the whole scan.
 Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, const Grid& grid) {
@@ -501,10 +505,12 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
       fmt::format("estimated from the rows {} to {} of {}: the range, the bounds and what is foreseen may "
                   "differ in other rows",
                   window.first, window.first + window.rows - 1, g.rows));
-  // What is kept and computed grows with the rows.
-  const double all_rows = static_cast<double>(g.rows) / static_cast<double>(window.rows);
-  plan.seconds *= all_rows;
-  plan.memory_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.memory_bytes) * all_rows);
+  // What is filtered and kept grows with the rows, what is tested with the grid's height.
+  const double all_rows = static_cast<double>(g.rows) / static_cast<double>(window.rows),
+               all_cells = static_cast<double>(grid.cells[2]) / static_cast<double>(window.grid.cells[2]);
+  plan.seconds = plan.seconds_of_rows * all_rows + (plan.seconds - plan.seconds_of_rows) * all_cells;
+  plan.seconds_of_rows *= all_rows;
+  plan.memory_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.memory_bytes) * all_cells);
   plan.grid = grid;
   plan.gold_samples = 1;
   for (const std::int64_t cells : grid.cells)

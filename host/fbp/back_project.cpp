@@ -2,6 +2,7 @@
 #include "host/fbp/back_project.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -16,6 +17,15 @@ namespace {
 
 int taps_of(Interpolation interpolation) {
   return interpolation == Interpolation::six_taps ? 6 : interpolation == Interpolation::cubic ? 4 : 2;
+}
+
+// Where rows are few, no more lanes than hold them; a second vector only where there is one.
+ColumnTuning fitting(ColumnTuning tuning, std::int64_t rows) {
+  const auto least =
+      static_cast<int>(std::bit_ceil(static_cast<std::uint64_t>(std::clamp<std::int64_t>(rows, 4, 16))));
+  tuning.lanes = std::min(tuning.lanes, least);
+  if (rows <= tuning.lanes) tuning.vectors = 1;
+  return tuning;
 }
 
 struct ViewStep {
@@ -55,11 +65,12 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
 
 void back_project(opencl::State& state, const ParallelGeometry& geometry, const UpsampledSlab& slab,
                   const ColumnBlocks& blocks, Interpolation interpolation, opencl::DeviceArray<float>& out,
-                  const ColumnTuning& tuning) {
+                  const ColumnTuning& wanted) {
   const auto count = [](std::int64_t n) { return static_cast<std::uint64_t>(n); };
   const std::size_t views = static_cast<std::size_t>(slab.views), n = blocks.first.size();
   const std::int64_t rows_wanted = blocks.rows < 0 ? slab.rows : blocks.rows;
   const auto padded = static_cast<std::int64_t>(opencl::round_up(count(rows_wanted), 16));
+  const ColumnTuning tuning = fitting(wanted, rows_wanted);
   if (blocks.first_row % 16 != 0 || blocks.first_row + padded > slab.rows_padded)
     throw std::logic_error("back_project: rows outside the slab");
 
@@ -102,7 +113,9 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
        {"VDVR_TILE", std::to_string(tuning.tile)},
        {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
-  const std::int64_t carried = tuning.lanes * tuning.vectors;
+  const std::int64_t carried = tuning.lanes * tuning.vectors,
+                     computed =
+                         rows_wanted <= 16 ? std::max<std::int64_t>(tuning.lanes, rows_wanted) : padded;
   const VdvrColumnBlocks shape{
       .views = ints(slab.views),
       .columns = ints(slab.columns.count),
@@ -113,7 +126,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
       .blocks = ints(n),
       .first_chunk = ints(blocks.first_row / 16),
       .out_row = ints(blocks.out_row)};
-  kernel({{count((padded + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
+  kernel({{count((computed + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
            count((blocks.ny + tile_y - 1) / tile_y) * n},
           tuning.local},
          out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), shape);

@@ -50,6 +50,14 @@ double cosine_sum(const double* a, std::int64_t n, double x) {
   return a[0] + 0.5 * c * b1 - b2;
 }
 
+// n zeros, in memory or in scratch.
+std::shared_ptr<double[]> zeros(std::size_t n, const std::shared_ptr<Scratch>& scratch) {
+  if (!scratch) return std::make_shared<double[]>(n);
+  const std::span<float> mapped = scratch->map(2 * n, "the cosine coefficients");
+  void* pages = mapped.data();
+  return {static_cast<double*>(pages), [scratch, mapped](double*) { scratch->unmap(mapped); }};
+}
+
 }  // namespace
 
 ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress)
@@ -62,7 +70,7 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
   const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
   std::vector<double> mirrored(at(2 * U - 1));  // [U - 1 + i - j]: the kernel at i - j
   for (std::int64_t i = 0; i < 2 * U - 1; ++i) mirrored[at(i)] = g[at(std::abs(i - (U - 1)))];
-  coefficients_.assign(at(K * U * V), 0.0);
+  const std::shared_ptr<double[]> coefficients = zeros(at(K * U * V), scan.data.scratch());
   const double kernel_norm = std::accumulate(mirrored.begin(), mirrored.end(), 0.0,
                                              [](double s, double x) { return s + std::abs(x); });
   std::vector<double> rounding(at(K));
@@ -92,7 +100,7 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
         double sum = 0;
         for (std::int64_t v = 0; v < V; ++v) sum += rows[at(v * U + m)] * cos_v[at(l * V + v)];
         const double a = sum * (l == 0 ? 1.0 : 2.0) / static_cast<double>(V);
-        coefficients_[at((k * U + m) * V + l)] = a;
+        coefficients[(k * U + m) * V + l] = a;
         norm += std::abs(a);
       }
     rows_norm = absolute_sum(rows);
@@ -102,6 +110,7 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
                                  2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm +
                                  (2 * u + 10 * v + 32) * norm);
   });
+  coefficients_ = coefficients;
   rounding_ = std::accumulate(rounding.begin(), rounding.end(), 0.0);
 }
 
@@ -130,7 +139,7 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
     for (std::size_t k = 0; k < static_cast<std::size_t>(K); ++k) {
       const double c = std::cos(geometry_.theta_rad[k]), s = std::sin(geometry_.theta_rad[k]);
       for (std::size_t m = 0; m < columns; ++m) {
-        const double* a = coefficients_.data() + (k * columns + m) * rows;
+        const double* a = coefficients_.get() + (k * columns + m) * rows;
         std::array<double, group> sum{};
         for (std::size_t l = 0; l < rows; ++l)
           for (std::size_t h = 0; h < group; ++h) sum[h] += a[l] * basis[l * group + h];

@@ -120,14 +120,12 @@ ColumnUpsampling::ColumnUpsampling(opencl::State& state, std::int64_t columns, i
   const std::vector<std::complex<double>> root = roots_of(length_);
   root_ = on_device(state, root, "roots of unity");
   spectrum_ = on_device(state, spectrum_of(columns, root), "spectrum between columns");
-  // Phases 1 .. , read three at a time.
   const int phases = rate / 2;
   std::vector<double> taps(half_column_taps, 0.0);
   for (int p = 1; p < phases; ++p) {
     const std::vector<double> of_phase = taps_between_half_columns(static_cast<double>(p) / phases);
     taps.insert(taps.end(), of_phase.begin(), of_phase.end());
   }
-  taps.resize(taps.size() + 2 * half_column_taps, 0.0);
   taps_ = opencl::DeviceArray<double>(state, std::span<const double>(taps), "taps between half columns");
 }
 

@@ -29,7 +29,11 @@ std::optional<RowWindow> row_window(const ProjectionSet& scan, const Grid& grid,
   RowWindow out;
   out.rows = std::max(fewest_rows, most_samples / (g.views() * g.columns));
   if (out.rows >= g.rows) return std::nullopt;
-  out.first = (g.rows - out.rows) / 2;
+  // Around the grid's middle.
+  const double middle = grid.origin[2] + 0.5 * static_cast<double>(grid.cells[2]) * grid.spacing[2];
+  const double middle_row = middle / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1);
+  out.first = std::clamp<std::int64_t>(std::llround(middle_row - 0.5 * static_cast<double>(out.rows - 1)), 0,
+                                       g.rows - out.rows);
   // Heights of the outermost of these rows, and the nodes of the grid between them.
   const auto height = [&](std::int64_t row) {
     return (static_cast<double>(row) - 0.5 * static_cast<double>(g.rows - 1)) * g.pitch_v;

@@ -15,8 +15,8 @@ struct RowWindow {
   std::int64_t first = 0, rows = 0;  ///< of the detector
 };
 
-/// The middle rows of the detector that hold about `most_samples`; nothing where all rows do, or where the
-/// grid has no cell between them. Copies those rows.
+/// The rows of the detector around the grid's middle that hold about `most_samples`; nothing where all rows
+/// do, or where the grid has no cell between them. Copies those rows.
 std::optional<RowWindow> row_window(const ProjectionSet& scan, const Grid& grid, std::int64_t most_samples);
 
 }  // namespace vdvr

@@ -337,7 +337,9 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;
   check_scan(used);
-  const std::uint64_t bytes = static_cast<std::uint64_t>(scan.size()) * sizeof(double);
+  const std::uint64_t all = static_cast<std::uint64_t>(scan.size()) * sizeof(double);
+  const std::uint64_t bytes =
+      scan.data.scratch() ? std::min(all, scan.data.scratch()->resident_bytes()) : all;
   state.memory.take(bytes, "cosine coefficients of the filtered projections");
   struct Give {
     opencl::State& state;

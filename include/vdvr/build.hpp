@@ -15,8 +15,8 @@
 namespace vdvr {
 
 struct BuildOptions {
-  std::optional<std::array<double, 6>>
-      roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box only
+  std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box
+                                             ///< only; what that does to the grid, certify.hpp says
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
   StorageChoice storage = StorageChoice::automatic;
   /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()

@@ -17,7 +17,8 @@ namespace vdvr {
 /// Defaults that work; what is left open is taken from the scan or chosen by trial.
 struct CertifyOptions {
   FieldOptions field;  ///< center: the scan's, unless given
-  GridOptions grid;    ///< the covered region at the detector's pitch, unless given
+  GridOptions grid;    ///< the covered region at the detector's pitch, unless given; with `build.roi` and no
+                       ///< `size` those of its bricks that the region meets: the range is then theirs
   RateOptions rates;
   PlanSettings plan;  ///< foresee: of make_plan alone; certify() needs nothing of it
   BuildOptions build;

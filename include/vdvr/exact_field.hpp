@@ -2,6 +2,7 @@
 // (docs/geometry.md).
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,7 +16,8 @@ namespace vdvr {
 
 class VDVR_API ExactField {
  public:
-  /// Cost: views * rows * columns^2 (ramp filter and cosine coefficients as direct sums), once.
+  /// Cost: views * rows * columns^2 (ramp filter and cosine coefficients as direct sums), once. Memory: 8
+  /// bytes a sample, in scratch where the scan lies there.
   ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress = {});
 
   /// F at world points. Cost per point: views * columns (plus rows * columns * views once per distinct z).
@@ -26,13 +28,17 @@ class VDVR_API ExactField {
   [[nodiscard]] const ParallelGeometry& geometry() const { return geometry_; }
   /// Cosine coefficients of the filtered projections times their weights: double [view][m][l], m along u, l
   /// along v.
-  [[nodiscard]] std::span<const double> coefficients() const { return coefficients_; }
+  [[nodiscard]] std::span<const double> coefficients() const {
+    return {coefficients_.get(),
+            static_cast<std::size_t>(geometry_.views() * geometry_.rows * geometry_.columns)};
+  }
   /// Bounds the double-precision rounding of the coefficients and of sums over them, at any point.
   [[nodiscard]] double rounding() const { return rounding_; }
 
  private:
   ParallelGeometry geometry_;
-  std::vector<double> coefficients_;  ///< [view][column coefficient m][row coefficient l], weights included
+  std::shared_ptr<const double[]>
+      coefficients_;  ///< [view][column coefficient m][row coefficient l], weights included; copies share it
   double rounding_ = 0;
 };
 

@@ -23,4 +23,8 @@ VDVR_API bool is_inside(const RegionOfInterest& region, const Vec3& point);
 VDVR_API std::vector<std::uint8_t> bricks_of(const RegionOfInterest& region, const Grid& grid,
                                              int granularity);
 
+/// The grid's bricks that bricks_of selects, from the first to the last along each axis, as a grid of their
+/// own: its samples and bricks are some of the grid's. Throws InputError where there are none.
+VDVR_API Grid cropped_to(const std::array<double, 6>& region, const Grid& grid, int granularity);
+
 }  // namespace vdvr

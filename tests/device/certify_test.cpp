@@ -1,7 +1,9 @@
 // What a program over the library is promised: certify() completes and refuses, verify_file() holds a file to
 // its projections.
 #define BOOST_TEST_MODULE certify
+#include <algorithm>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -10,6 +12,7 @@
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/verify.hpp"
 #include "vdvr/verify_file.hpp"
 
 using namespace vdvr;
@@ -65,6 +68,66 @@ BOOST_AUTO_TEST_CASE(planned_before_or_at_once_it_is_the_same_volume) {
   const BuildResult again = certify(device(), scan(), plan);
   BOOST_TEST(again.certificate.content_sha256 == certified().certificate.content_sha256);
   BOOST_TEST(again.certificate.options_json == certified().certificate.options_json);
+}
+
+// Without a size the grid is the region's: the same samples of F, the same bricks, and a range of its own.
+BOOST_AUTO_TEST_CASE(a_region_of_interest_makes_the_default_grid_as_large_as_it) {
+  CertifyOptions options;
+  options.build.roi = {-5.5, -2, -1, 1, 6.25, 2};
+  const Tolerance tolerance{{}, 0.05};
+  const BuildResult part = certify(device(), scan(), tolerance, options);
+  const Plan whole = make_plan(device(), scan(), tolerance),
+             planned = make_plan(device(), scan(), tolerance, options);
+  const Grid &grid = part.volume.grid, &all = whole.grid;
+  BOOST_TEST(grid.sample_count() < all.sample_count() / 2);
+  BOOST_TEST(part.certificate.holds_buffer);
+  BOOST_TEST((part.certificate.roi == options.build.roi));
+  const VerifyResult verified = verify(device(), scan(), part.volume, part.certificate, {.exhaustive = true});
+  BOOST_TEST(verified.holds, verified.failure);
+  const std::vector<std::string>& notes = part.certificate.notes;
+  BOOST_TEST(std::any_of(notes.begin(), notes.end(), [](const auto& n) { return names(n, "`roi`"); }));
+
+  // Samples of both plans, place by place: what rounding may move either by.
+  const double rounding = whole.budget.arithmetic.value + planned.budget.arithmetic.value;
+  Index3 first{};
+  for (std::size_t a = 0; a < 3; ++a)
+    first[a] = static_cast<std::int64_t>(std::round((grid.origin[a] - all.origin[a]) / all.spacing[a]));
+  const Index3 n = grid.samples(), m = all.samples();
+  double largest = 0, least = INFINITY, most = -INFINITY;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        const auto v =
+            static_cast<double>(planned.base.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]);
+        const std::int64_t in_all = ((z + first[2]) * m[1] + y + first[1]) * m[0] + x + first[0];
+        largest = std::max(
+            largest, std::abs(v - static_cast<double>(whole.base.samples[static_cast<std::size_t>(in_all)])));
+        if (!is_covered(scan().geometry, scan().geometry.center, grid.position({x, y, z}))) continue;
+        least = std::min(least, v);
+        most = std::max(most, v);
+      }
+  BOOST_TEST(largest <= rounding);
+  // A fraction of what is there.
+  BOOST_TEST(part.certificate.reference_range == most - least);
+  BOOST_TEST(part.certificate.reference_range < whole.reference_range);
+
+  // A grid that was asked for stays whole.
+  options.grid.size = all.cells;
+  BOOST_TEST((make_plan(device(), scan(), tolerance, options).grid.cells == all.cells));
+}
+
+BOOST_AUTO_TEST_CASE(a_region_of_interest_beyond_the_scan_is_refused) {
+  const auto refused = [](const std::array<double, 6>& roi, const std::string& why) {
+    CertifyOptions options;
+    options.build.roi = roi;
+    options.grid.spacing = 0.25;
+    const std::string said = refusal([&] { make_plan(device(), scan(), part_of_range(0.2), options); });
+    BOOST_TEST(names(said, why), "'" << said << "'");
+  };
+  refused({30, 0, -1, 40, 1, 1}, "meets no brick");
+  refused({0, 0, 10, 1, 1, 20}, "along z");
+  // In a corner of the default grid, which the scan does not cover.
+  refused({9.6, 9.6, -1, 10, 10, 1}, "what the scan covers");
 }
 
 BOOST_AUTO_TEST_CASE(a_tolerance_out_of_reach_is_refused) {

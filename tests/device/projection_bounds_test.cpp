@@ -354,6 +354,56 @@ BOOST_AUTO_TEST_CASE(sups_of_values_alone_are_no_smaller) {
   }
 }
 
+// The largest |q| of each view on the grid that sups are sampled on, by the series itself.
+double sampled_sups(const FilteredScan& scan, int density) {
+  const ParallelGeometry& g = scan.geometry;
+  const auto places = [&](std::int64_t n) {
+    std::vector<double> out;
+    for (std::int64_t j = 0; j <= density * n; ++j) out.push_back(-0.5 + static_cast<double>(j) / density);
+    return out;
+  };
+  const auto U = static_cast<std::size_t>(g.columns), V = static_cast<std::size_t>(g.rows);
+  const std::vector<double> u = places(g.columns), v = places(g.rows),
+                            of_u = resampling_matrix(g.columns, u, 0, 1, density),
+                            of_v = resampling_matrix(g.rows, v, 0, 1, density);
+  double total = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(g.views()); ++k) {
+    std::vector<double> columns(u.size() * V, 0.0);
+    for (std::size_t j = 0; j < u.size(); ++j)
+      for (std::size_t i = 0; i < U; ++i)
+        for (std::size_t l = 0; l < V; ++l)
+          columns[j * V + l] += of_u[j * U + i] * static_cast<double>(scan.samples[(k * U + i) * V + l]);
+    double largest = 0;
+    for (std::size_t j = 0; j < u.size(); ++j)
+      for (std::size_t h = 0; h < v.size(); ++h) {
+        double q = 0;
+        for (std::size_t l = 0; l < V; ++l) q += of_v[h * V + l] * columns[j * V + l];
+        largest = std::max(largest, std::abs(q));
+      }
+    total += largest;
+  }
+  return total;
+}
+
+// Where rows are many they go by transforms: the sup is that of the series, and what it is charged for
+// rounding is small beside it.
+BOOST_AUTO_TEST_CASE(sups_of_many_rows_are_those_of_the_series) {
+  for (const auto& [views, rows, columns] :
+       {std::tuple{3, 95, 9}, {3, 96, 9}, {2, 97, 33}, {2, 130, 17}, {1, 257, 4}, {1, 100, 65}}) {
+    Chain chain(noise_scan(views + 1, rows, columns, 5));
+    const double sampled = sampled_sups(chain.filtered, 4),
+                 rise = std::pow(1 / std::cos(std::numbers::pi / 8), 2);
+    const FieldSups sups = value_sups(Chain::state(), chain.upsampler, chain.filtered);
+    BOOST_TEST(sampled * rise <= sups.value, rows << " rows");
+    // A hundred roundings of what the series along both axes can make of the samples.
+    double samples = 0;
+    for (const double m : chain.filtered.view_max) samples += m;
+    const double most = samples * lebesgue_constant(rows) * lebesgue_constant(columns);
+    BOOST_TEST(sups.value <= sampled * rise + 100 * unit_roundoff * most, rows << " rows");
+    BOOST_TEST(dense_sups(chain.scan, 0, 0, 5) <= sups.value, rows << " rows");
+  }
+}
+
 BOOST_AUTO_TEST_CASE(sups_at_the_samples_alone_can_be_too_small) {
   // Why the paper's Eq. 7 is printed but never decides.
   const Chain chain(noise_scan(13, 7, 27));

@@ -59,10 +59,22 @@ BOOST_AUTO_TEST_CASE(nodes_lie_where_they_lay) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(rows_lie_around_the_middle_of_the_grid) {
+  const ProjectionSet scan = scan_of(100, 1);
+  GridOptions options;
+  options.size = Index3{8, 8, 8};
+  for (const auto& [z, first] : {std::pair{-4.0, 37}, {20.0, 61}, {-49.0, 0}, {41.0, 73}}) {
+    options.origin = Vec3{-4, -4, z};
+    const auto window = row_window(scan, make_grid(scan.geometry, options), 5 * 24 * 27);
+    BOOST_REQUIRE(window.has_value());
+    BOOST_TEST(window->first == first);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(nothing_where_the_grid_lies_elsewhere) {
   const ProjectionSet scan = scan_of(100, 1);
   GridOptions options;
   options.size = Index3{8, 8, 8};
-  options.origin = Vec3{-4, -4, 30};
+  options.origin = Vec3{-4, -4, 60};
   BOOST_TEST(!row_window(scan, make_grid(scan.geometry, options), 5 * 24 * 27).has_value());
 }

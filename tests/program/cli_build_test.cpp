@@ -143,6 +143,26 @@ BOOST_AUTO_TEST_CASE(plan_draws_pictures_and_overwrites_none_without_force) {
   check_refused({"plan", small_scan(), "--epsilon", "20%", "--pictures", small_scan()}, "not a folder");
 }
 
+// plan, build, verify and probe of a part of the default grid.
+BOOST_AUTO_TEST_CASE(a_region_of_interest_without_a_size_is_all_that_is_planned_and_built) {
+  const std::string file = at("region.vdvr"), box = "--roi=-3,-2,-1,2,3,1";
+  const auto json_of = [](const std::vector<std::string>& words) {
+    const Ended r = run(words);
+    BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
+    return nlohmann::json::parse(r.out);
+  };
+  const auto whole = json_of({"plan", small_scan(), "--epsilon", "20%", "--json"}),
+             part = json_of({"plan", small_scan(), "--epsilon", "20%", box, "--json"}),
+             built = json_of({"build", small_scan(), "--epsilon", "20%", box, "-o", file, "--json"});
+  BOOST_TEST(part["grid"]["cells"][0].get<int>() < whole["grid"]["cells"][0].get<int>());
+  BOOST_TEST(part["grid"] == built["grid"]);
+  BOOST_TEST(part["notes"].dump().find("`roi`") != std::string::npos);
+  BOOST_TEST(built["certificate"]["roi"].size() == 6u);
+  BOOST_TEST(run({"verify", file, "--projections", small_scan(), "--exhaustive"}).code == 0);
+  check_refused({"plan", small_scan(), "--epsilon", "20%", box, "--size", "8x8x8"}, "--size");
+  check_refused({"plan", small_scan(), "--epsilon", "20%", "--roi=90,0,0,91,1,1"}, "meets no brick");
+}
+
 BOOST_AUTO_TEST_CASE(run_writes_the_certificate_and_the_pictures) {
   const std::string output = at("run");
   const Ended r = run({"run", small_scan(), "--epsilon", "20%", "-o", output, "--json"});

@@ -110,8 +110,9 @@ int plan_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  refuse(args, {"roi", "window"},
-         "a plan is for the whole grid; use --size and --origin, or give it to build");
+  refuse(args, {"window"}, "a plan is for the whole grid; give it to build");
+  if (args.has("size"))
+    refuse(args, {"roi"}, "with --size a plan is for that grid, the whole of it; leave out one of the two");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
   Wanted wanted = wanted_of(args);
   // Pictures show the whole volume.
