@@ -167,33 +167,42 @@ BOOST_AUTO_TEST_CASE(a_field_that_does_not_vary_along_z_is_not_refined_along_z) 
 }
 
 // The cell test makes T of a cell by itself, node_slack.cl in arrays. In a grid of one brick both look at the
-// same cells.
-BOOST_AUTO_TEST_CASE(slack_of_cells_is_that_of_nodes) {
+// same cells. Fields above and below F show what either side takes.
+BOOST_AUTO_TEST_CASE(totals_of_cells_are_those_of_nodes) {
   attacks::Chain chain(noise_scan(20, 14, 17, 5));
   for (const int rate : {4, 8})
-    for (const double spacing : {0.4, 0.8, 1.2}) {
-      GoldSettings settings = Case::settings_of(grid_around_axis({4, 4, 4}, spacing), rate);
-      settings.granularity = 4;
-      GoldStream gold(attacks::device().state(), chain.filtered, chain.sups, settings);
-      const MixedVolume nothing = as_mixed(std::vector<float>(125, 0.0f), settings);
-      const DeviceField field(attacks::device().state(), nothing);
-      const std::vector<std::uint8_t> all(1, 1);
-      const opencl::DeviceArray<std::uint8_t> selected(attacks::device().state(),
-                                                       std::span<const std::uint8_t>(all), "the brick");
-      double of_cells = 0, of_nodes = 0;
-      gold.run(
-          all,
-          [&](GoldStream::Batch& batch) {
-            of_cells = static_cast<double>(batch.measure(field, 1.0f, selected).front().slack);
-            batch.for_each_node(0, [&](const Index3&, float, const Slack& s) {
-              if (s.tested()) of_nodes = std::max(of_nodes, static_cast<double>(std::max(s.above, s.below)));
-            });
-          },
-          {}, "slack");
-      BOOST_TEST(of_nodes > 0);
-      // Two sums and a product more or less are rounded in either.
-      BOOST_TEST(std::abs(of_cells - of_nodes) <= 6 * unit_roundoff * of_nodes);
-    }
+    for (const double spacing : {0.4, 0.8, 1.2})
+      for (const float value : {-1.0f, 0.0f, 1.0f}) {
+        GoldSettings settings = Case::settings_of(grid_around_axis({4, 4, 4}, spacing), rate);
+        settings.granularity = 4;
+        GoldStream gold(attacks::device().state(), chain.filtered, chain.sups, settings);
+        const float size = value * static_cast<float>(chain.sups.value);
+        const DeviceField field(attacks::device().state(), as_mixed(std::vector<float>(125, size), settings));
+        const std::vector<std::uint8_t> all(1, 1);
+        const opencl::DeviceArray<std::uint8_t> selected(attacks::device().state(),
+                                                         std::span<const std::uint8_t>(all), "the brick");
+        BrickMeasure cells;
+        Slack largest{0, 0};
+        double total = 0, magnitude = 0;
+        gold.run(
+            all,
+            [&](GoldStream::Batch& batch) {
+              cells = batch.measure(field, 1.0f, selected).front();
+              batch.for_each_node(0, [&](const Index3&, float g, const Slack& s) {
+                if (!s.tested()) return;
+                largest = {std::max(largest.above, s.above), std::max(largest.below, s.below)};
+                total = std::max(total, static_cast<double>(s.total(size - g)));
+                magnitude = std::max(magnitude, std::abs(static_cast<double>(g)));
+              });
+            },
+            {}, "totals");
+        BOOST_TEST(std::min(largest.above, largest.below) > 0.0f);
+        // Half a dozen roundings more or less, of gold and of what is added to it.
+        magnitude += static_cast<double>(std::abs(size) + std::max(largest.above, largest.below));
+        BOOST_TEST(std::abs(static_cast<double>(cells.total) - total) <= 6 * unit_roundoff * magnitude);
+        BOOST_TEST(std::abs(static_cast<double>(cells.slack - std::max(largest.above, largest.below))) <=
+                   6 * unit_roundoff * magnitude);
+      }
 }
 
 // A level that coarse gold proposed for fine gold: no promise.
