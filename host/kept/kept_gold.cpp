@@ -382,15 +382,21 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
                             const opencl::DeviceArray<float>& out) {
   const Span z = heights_span(lattice, boxes.front());
   const std::int64_t padded = heights_->padded, stride = few_rows() ? stride_ : run_->stride;
-  // Tiles that came later than the run were not foreseen by it: heights can be made again.
-  if (!few_rows() && run_bytes() > state_.memory.left() / 2) {
-    run_->tiles.clear();
-    run_->pages.clear();
-  }
   std::map<std::size_t, std::vector<VdvrColumns>> by_page;
   std::uint64_t first = 0;
   VdvrAlongZ shape{};
+  const auto resample = [&] {
+    for (const auto& [page, parts] : by_page)
+      (*heights_->weights)(state_, few_rows() ? pages_[page] : run_->pages[page], out, parts, shape);
+    by_page.clear();
+  };
   for (const GoldBox& box : boxes) {
+    // Tiles that came later than the run were not foreseen by it: heights can be made again.
+    if (!few_rows() && run_bytes() > state_.memory.left() / 2) {
+      resample();
+      run_->tiles.clear();
+      run_->pages.clear();
+    }
     const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
     for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
       for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
@@ -410,8 +416,7 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
     shape.out_y = count(x.count * padded);
     first += count(x.count * y.count * padded);
   }
-  for (const auto& [page, parts] : by_page)
-    (*heights_->weights)(state_, few_rows() ? pages_[page] : run_->pages[page], out, parts, shape);
+  resample();
 }
 
 void KeptGold::fill(const GoldLattice& lattice, std::span<const GoldBox> boxes,
