@@ -397,10 +397,10 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   ChainErrors out;
   out.ramp = filter_error_bound(upsampler, scan);
   out.columns = w.gain * column_error(upsampler, g.columns, columns, samples, sups.value);
-  // Six taps: in compensated runs, and their own roundings known; else a rounding for each run, and eight for
+  // Six taps: a view's by themselves, in compensated runs of such sums, and their own roundings known; else a rounding for each run, and eight for
   // weights.
   const double terms = interpolation == Interpolation::six_taps
-                           ? product_error(6 * g.views(), to_int(std::llround(w.taps * run)))
+                           ? product_error(6 * g.views(), to_int(std::llround(w.taps + run)))
                            : w.taps * run + std::ceil(views / run) + 8;
   out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);

@@ -104,14 +104,17 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
   }
   const opencl::DeviceArray<cl_int2> device_rows(state, std::span<const cl_int2>(rows), "wanted columns");
 
-  const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1;
+  const int tile_x = tuning.tile == 8 ? 4 : 1, tile_y = tuning.tile == 8 ? 2 : 1, tiles_x = tuning.tiles,
+            tiles_y = tuning.tiles * tile_x / tile_y;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrColumnBlocks> kernel(
       state, "fbp/back_project", "back_project",
       {{"VDVR_TAPS", std::to_string(taps_of(interpolation))},
        {"VDVR_RUN", std::to_string(view_run(interpolation))},
        {"VDVR_LANES", std::to_string(tuning.lanes)},
        {"VDVR_TILE", std::to_string(tuning.tile)},
-       {"VDVR_VECTORS", std::to_string(tuning.vectors)}});
+       {"VDVR_VECTORS", std::to_string(tuning.vectors)},
+       {"VDVR_TILES_X", std::to_string(tiles_x)},
+       {"VDVR_TILES_Y", std::to_string(tiles_y)}});
   const auto ints = [](auto v) { return static_cast<cl_int>(v); };
   const std::int64_t carried = tuning.lanes * tuning.vectors,
                      computed =
@@ -126,8 +129,9 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
       .blocks = ints(n),
       .first_chunk = ints(blocks.first_row / 16),
       .out_row = ints(blocks.out_row)};
-  kernel({{count((computed + carried - 1) / carried), count((blocks.nx + tile_x - 1) / tile_x),
-           count((blocks.ny + tile_y - 1) / tile_y) * n},
+  kernel({{count((computed + carried - 1) / carried),
+           count((blocks.nx + tile_x * tiles_x - 1) / (tile_x * tiles_x)),
+           count((blocks.ny + tile_y * tiles_y - 1) / (tile_y * tiles_y)) * n},
           tuning.local},
          out.buffer(), slab.values.buffer(), device_steps.buffer(), device_rows.buffer(), shape);
 }

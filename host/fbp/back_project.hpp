@@ -37,9 +37,10 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
                   const ColumnTuning& tuning);
 
 /// Views that are summed before their sum is added to the others': 64 multiply-adds. With six taps, whose
-/// roundings what follows multiplies, 12, and what the additions round off is summed beside them.
+/// roundings what follows multiplies, sums of six products are summed, and what adding their runs rounds off
+/// is summed beside them.
 inline std::int64_t view_run(Interpolation interpolation) {
-  return interpolation == Interpolation::six_taps ? 2 : interpolation == Interpolation::cubic ? 16 : 32;
+  return interpolation == Interpolation::six_taps ? 8 : interpolation == Interpolation::cubic ? 16 : 32;
 }
 
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not

@@ -91,11 +91,12 @@ class Trial {
 
 std::vector<ColumnTuning> candidates_for(const DeviceInfo& device) {
   std::vector<ColumnTuning> all{column_tuning(device)};
-  const auto add = [&](int lanes, int tile, int vectors, std::array<std::uint64_t, 3> local) {
+  const auto add = [&](int lanes, int tile, int vectors, int tiles, std::array<std::uint64_t, 3> local) {
     const ColumnTuning& r = all.front();
-    if (lanes == r.lanes && tile == r.tile && vectors == r.vectors && local == r.local) return;
+    if (lanes == r.lanes && tile == r.tile && vectors == r.vectors && tiles == r.tiles && local == r.local)
+      return;
     if (local[0] * local[1] * local[2] > device.max_work_group) return;
-    all.push_back({r.device_class, lanes, tile, vectors, local, r.product_columns});
+    all.push_back({r.device_class, lanes, tile, vectors, tiles, local, r.product_columns});
   };
   if (device.is_gpu) {
     for (const int lanes : {1, 4})
@@ -103,13 +104,16 @@ std::vector<ColumnTuning> candidates_for(const DeviceInfo& device) {
         for (const int vectors : {1, 2})
           for (const auto& local :
                {std::array<std::uint64_t, 3>{32, 4, 2}, {16, 4, 4}, {64, 2, 1}, {32, 8, 1}})
-            add(lanes, tile, vectors, local);
+            add(lanes, tile, vectors, 1, local);
   } else {
+    // Many tiles are a work-group's worth of work by themselves.
     for (const int lanes : {8, 16})
       for (const int tile : {1, 8})
-        for (const int vectors : {1, 2})
+        for (const int vectors : {1, 2}) {
           for (const auto& local : {std::array<std::uint64_t, 3>{1, 8, 16}, {1, 4, 8}, {1, 16, 16}})
-            add(lanes, tile, vectors, local);
+            add(lanes, tile, vectors, 1, local);
+          for (const int tiles : {2, 4, 8}) add(lanes, tile, vectors, tiles, {1, 1, 1});
+        }
   }
   return all;
 }
@@ -148,13 +152,13 @@ TuneResult tune(Device& device, std::int64_t size, std::int64_t views, int repet
     }
     if (!(worst <= trial.tolerance()))
       throw MismatchError(
-          fmt::format("tune: lanes {}, tile {}, vectors {} differ by {:.3g}, rounding allows "
+          fmt::format("tune: lanes {}, tile {}, vectors {}, tiles {} differ by {:.3g}, rounding allows "
                       "{:.3g}: the device's compiler is not to be trusted with them",
-                      t.lanes, t.tile, t.vectors, worst, trial.tolerance()));
+                      t.lanes, t.tile, t.vectors, t.tiles, worst, trial.tolerance()));
     std::vector<double> seconds;
     for (int i = 0; i < repetitions; ++i) seconds.push_back(trial.seconds(t));
     result.candidates.push_back(
-        {t.lanes, t.tile, t.vectors, t.local, trial.updates() / median(seconds) / 1e9, c == 0});
+        {t.lanes, t.tile, t.vectors, t.tiles, t.local, trial.updates() / median(seconds) / 1e9, c == 0});
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(),
                    [](const TuneCandidate& a, const TuneCandidate& b) { return a.gups > b.gups; });

@@ -17,6 +17,7 @@ struct ColumnTuning {
   int lanes = 16;   ///< samples of z per work-item: VDVR_LANES
   int tile = 8;     ///< columns of a back-projection's work-item: VDVR_TILE, 1 or 8
   int vectors = 1;  ///< of z per work-item of a back-projection: VDVR_VECTORS, 1 or 2
+  int tiles = 1;    ///< of a work-item of a back-projection, along x: VDVR_TILES_X; along y as many columns
   std::array<std::uint64_t, 3> local{1, 16, 16};  ///< work-group
   /// Rows of at most so many columns are ramp-filtered by a matrix product, others by FFT.
   std::int64_t product_columns = 2048;

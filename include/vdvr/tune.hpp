@@ -12,7 +12,7 @@
 namespace vdvr {
 
 struct TuneCandidate {
-  int lanes = 0, tile = 0, vectors = 0;
+  int lanes = 0, tile = 0, vectors = 0, tiles = 0;
   std::array<std::uint64_t, 3> local{};
   double gups = 0;        ///< 1e9 sample updates per second, median
   bool recorded = false;  ///< what the table in the source says for this class of device

@@ -13,7 +13,8 @@ namespace vdvr::cli {
 namespace {
 
 Json row_of(const TuneCandidate& c) {
-  return {{"lanes", c.lanes}, {"tile", c.tile}, {"vectors", c.vectors}, {"local", c.local}, {"gups", c.gups}};
+  return {{"lanes", c.lanes}, {"tile", c.tile},   {"vectors", c.vectors},
+          {"tiles", c.tiles}, {"local", c.local}, {"gups", c.gups}};
 }
 
 }  // namespace
