@@ -51,9 +51,9 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wante
   return planned;
 }
 
-BuildResult build_planned(Device& device, const Planned& planned, const Wanted& wanted,
+BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted,
                           const Progress& progress) {
-  return certify(device, planned.scan, planned.plan, wanted.options, progress);
+  return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
 }
 
 std::filesystem::path journal_path(const std::filesystem::path& output) {

@@ -35,8 +35,8 @@ struct Planned {
 };
 /// Reads IN and plans.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
-/// The second half of vdvr::certify.
-BuildResult build_planned(Device& device, const Planned& planned, const Wanted& wanted,
+/// The second half of vdvr::certify. Takes the plan.
+BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted,
                           const Progress& progress);
 
 /// The journal of an output file: beside it, with this name.

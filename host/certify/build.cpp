@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "host/bounds/covered_range.hpp"
 #include "host/certify/build_journal.hpp"
@@ -43,33 +44,24 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// Brick by brick, what the base samples round to.
-struct Base {
-  Lattice lattice;
-  std::vector<float> samples;
-  [[nodiscard]] bool rounds() const { return lattice.step > 0; }
-};
-
-// Where bricks of the region read it, the base that suits the trilinear filter best; elsewhere F.
-std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, const Plan& plan,
+// Where bricks of the region read it, the base that suits the trilinear filter best; elsewhere F. The plan
+// gives its samples away.
+std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, Plan& plan,
                                const GoldSettings& settings, const std::vector<std::uint8_t>& selected,
                                const Progress& progress) {
-  std::vector<float> base = take_base(plan.base, plan.layout.coarsening);
+  std::vector<float> base = take_base(std::exchange(plan.base, {}), plan.layout.coarsening);
   if (plan.settings.comparison.coefficients == Coefficients::midrange)
     fit_base_samples(state, from.filtered, from.sups, settings, selected, base, progress,
                      from.source(settings));
   return base;
 }
 
-// On the lattice of integer samples.
-Base stored_base(std::vector<float> samples, const Plan& plan, const Units& units, StorageChoice storage) {
-  Base base;
-  base.samples = std::move(samples);
-  base.lattice = choose_lattice(base.samples, storage,
-                                most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
-                                units.density());
-  round_base(base.samples, base.lattice);
-  return base;
+// Of integer samples.
+Lattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
+                   StorageChoice storage) {
+  return choose_lattice(base, storage,
+                        most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
+                        units.density());
 }
 
 // What every step of a build reads. All but the scan, and what is thrown, in `units`.
@@ -108,15 +100,16 @@ GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const 
   return settings;
 }
 
-OpenBricks open_bricks(const Plan& plan, const Base& base) {
+OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const Lattice& lattice) {
   OpenBricks bricks;
   bricks.grid = plan.grid;
   bricks.granularity = plan.layout.granularity;
   bricks.rate = plan.rates.gold;
   bricks.coarsening = plan.layout.coarsening;
   bricks.sampled = plan.settings.comparison.coefficients == Coefficients::sampled;
-  bricks.base = base.samples;
-  bricks.lattice = base.lattice;
+  bricks.base = base;
+  round_base(bricks.base, lattice);
+  bricks.lattice = lattice;
   const auto count = at(Bricks(plan.grid, plan.layout.granularity).size());
   bricks.level.assign(count, LevelTriple{0, 0, 0});
   bricks.involved.assign(count, 0);
@@ -174,7 +167,8 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
   // Those that may hold a tested node.
   std::vector<std::uint8_t> near = in.gold.fine.gold().bricks_near_coverage();
   for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && in.selected[i];
-  test.classify(DeviceField(in.state, as_mixed(bricks.base, in.gold.fine.gold().settings())), strict, near);
+  const DeviceField base(in.state, as_mixed(bricks.base, in.gold.fine.gold().settings()));
+  test.classify(base, strict, near);
   in.watch.lap("classify");
 }
 
@@ -200,6 +194,12 @@ std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks
   return raised;
 }
 
+std::uint64_t sample_bytes(const MixedVolume& volume) {
+  std::uint64_t bytes = volume.base.bytes();
+  for (const auto& [kind, block] : volume.tiles) bytes += block.bytes();
+  return bytes;
+}
+
 // Closes, packs, measures; raises bricks until every node is within the tolerance.
 Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, double tolerance) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
@@ -208,17 +208,21 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   Measured out;
   MixedVolume before;
   HostMemory closed(in.state);
+  std::uint64_t closed_bytes = 0;
   CloseBoundaries close(bricks, in.plan.settings.comparison.closing);
   std::vector<std::uint8_t> raised;
   for (int round = 0;; ++round) {
     // A repair compares with the volume before it.
-    if (round < 2) closed.count(4 * bricks.base.size() + test.tile_bytes(), "the closed volume");
     MixedVolume volume = round > 0 ? close.again(before, raised) : close.first();
     // Where integers round, a raised brick can change more than those it touches.
     const std::vector<std::uint8_t> changed = round > 0 ? changed_bricks(before, volume, close.made())
                                                         : std::vector<std::uint8_t>(pending.size(), 1);
     for (std::size_t i = 0; i < pending.size(); ++i)
       pending[i] = bricks.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
+    before = {};
+    closed.uncount(std::exchange(closed_bytes, 0));
+    closed.count(sample_bytes(volume), "the closed volume");
+    closed_bytes = sample_bytes(volume);
     in.watch.lap("close");
     const DeviceField field(in.state, volume);
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
@@ -240,9 +244,11 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 }
 
 // The volume of these base samples within the tolerance.
-Measured measured_volume(const Inputs& in, const Base& base, double tolerance) {
+Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
+                         double tolerance) {
   HostMemory tiles(in.state);
-  OpenBricks bricks = open_bricks(in.plan, base);
+  tiles.count(4 * base.size(), "the base samples, rounded,");
+  OpenBricks bricks = open_bricks(in.plan, base, lattice);
   std::optional<ClassifyBricks> test;
   test.emplace(in.state, in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
@@ -340,7 +346,7 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
   host.count(scan.data.resident_bytes(), "the projections, as read,");
-  host.count(4 * 4 * plan.base.samples.size(), "the base samples");
+  host.count(4 * plan.base.samples.size(), "the base samples");
 }
 
 SamplerTerms with_reserve(SamplerTerms terms) {
@@ -351,7 +357,7 @@ SamplerTerms with_reserve(SamplerTerms terms) {
 
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too much
 // or the samplers take more than was reserved. All but the scan, and what is thrown, in `units`.
-BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Plan& plan,
+BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
                            const BuildOptions& options, const Progress& progress) {
   opencl::State& state = device.state();
   BuildResult result;
@@ -374,10 +380,11 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
   GoldSettings settings = gold_settings(plan, options, {});
-  const std::vector<float> fitted = fitted_base(state, *from, plan, settings, selected, progress);
+  const FieldSlopes slopes = field_slopes(as_mixed(plan.base));
+  const std::string digest = options.journal ? plan_digest(scan, plan) : "";
+  const std::vector<float> base = fitted_base(state, *from, plan, settings, selected, progress);
   watch.lap("fit");
-  Base base = stored_base(fitted, plan, units, options.storage);
-  settings.lattice = base.lattice;
+  settings.lattice = lattice_of(base, plan, units, options.storage);
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   JournalledRates journalled(gold, options.journal);
   watch.lap("bounds");
@@ -386,27 +393,28 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 
   const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), progress, watch};
   const double underflow = from_world(sampler_underflow(device.info()), units);
-  const auto sampler_of = [&](const MixedVolume& volume, std::int64_t atlas) {
-    return sampler_terms(field_slopes(volume), plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold,
+  const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
+    return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold,
                          underflow);
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
   // more if that was short.
-  SamplerTerms reserve = with_reserve(sampler_of(as_mixed(plan.base), longest_atlas(device.info())));
+  SamplerTerms reserve = with_reserve(sampler_of(slopes, longest_atlas(device.info())));
+  Lattice lattice = settings.lattice;
   for (int attempt = 0;; ++attempt) {
     const double tolerance = node_tolerance(in, reserve);
     if (attempt == 0 && options.journal)
-      options.journal->begin(journal_head(device, scan, plan, options, gold.fine(), tolerance));
+      options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
     Measured measured;
     try {
-      measured = measured_volume(in, base, tolerance);
+      measured = measured_volume(in, base, lattice, tolerance);
     } catch (const ToleranceError&) {
       // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-      if (!base.rounds() || options.storage != StorageChoice::automatic) throw;
-      base = stored_base(fitted, plan, units, StorageChoice::f32);
+      if (!(lattice.step > 0) || options.storage != StorageChoice::automatic) throw;
+      lattice = lattice_of(base, plan, units, StorageChoice::f32);
       continue;
     }
-    const SamplerTerms sampler = sampler_of(measured.volume, atlas_length(device.info(), measured.volume));
+    const SamplerTerms sampler = sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
     result.certificate = certify(in, device, scan, filtered, options, measured, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt >= 2 || result.certificate.comparison) {
@@ -419,19 +427,20 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 
 }  // namespace
 
-BuildResult build(Device& device, const ProjectionSet& scan, const Plan& plan, const BuildOptions& options,
+BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                   const Progress& progress) {
   check_line_integrals(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
   const Units units = units_of(scan);
-  if (units.are_world()) return build_in_units(device, scan, units, plan, options, progress);
+  if (units.are_world()) return build_in_units(device, scan, units, std::move(plan), options, progress);
+  const Grid grid = plan.grid;
   BuildOptions wanted = options;
   if (options.roi) wanted.roi = from_world(*options.roi, units);
   if (options.window)
     wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
-  BuildResult result = build_in_units(device, scan, units, from_world(plan, units), wanted, progress);
+  BuildResult result = build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, progress);
   scale(result.volume, units.density());
-  result.volume.grid = plan.grid;
+  result.volume.grid = grid;
   result.certificate = to_world(std::move(result.certificate), units);
   return result;
 }

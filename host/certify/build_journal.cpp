@@ -23,14 +23,18 @@ void update(Sha256& sha, const std::vector<T>& values) {
   sha.update(values.data(), values.size() * sizeof(T));
 }
 
-// The plan is made again by a resumed process: its base samples, which all of the scan and the field went
-// into, stand for it, and for the scan where that has no hash of its own.
-std::string digest(const ProjectionSet& scan, const Plan& plan) {
+}  // namespace
+
+// Base samples, which all of the scan and the field went into, stand for both, also where the scan has no hash
+// of its own.
+std::string plan_digest(const ProjectionSet& scan, const Plan& plan) {
   Sha256 sha;
   update(sha, scan.geometry.theta_rad);
   update(sha, plan.base.samples);
   return sha.hex();
 }
+
+namespace {
 
 const char* name(StorageChoice storage) {
   switch (storage) {
@@ -48,7 +52,8 @@ const char* name(StorageChoice storage) {
 }  // namespace
 
 JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& plan,
-                         const BuildOptions& options, const GoldStream& stream, double tolerance) {
+                         const std::string& digest, const BuildOptions& options, const GoldStream& stream,
+                         double tolerance) {
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
@@ -79,7 +84,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"roi", options.roi ? exact_list(*options.roi) : "none"},
       {"bricks per block", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
       {"tolerance of a node", exact(tolerance)},
-      {"plan", digest(scan, plan)}};
+      {"plan", digest}};
   return head;
 }
 

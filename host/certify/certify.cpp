@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "host/bounds/covered_range.hpp"
 #include "host/gold/gold_settings.hpp"
@@ -96,10 +97,10 @@ std::string options_json(const Plan& plan, const BuildOptions& build, const Para
   return j.dump();
 }
 
-BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, const Plan& plan,
-                             const BuildOptions& options, const Progress& progress) {
+BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
+                             const Progress& progress) {
   try {
-    return build(device, scan, plan, options, progress);
+    return build(device, scan, std::move(plan), options, progress);
   } catch (const ToleranceError&) {
     if (options.journal) options.journal->remove();  // going on would end here again
     throw;
@@ -137,17 +138,17 @@ BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& 
                     const CertifyOptions& options, const Progress& progress) {
   CertifyOptions used = options;
   used.plan.foresee = false;
-  const Plan plan = make_plan(device, scan, tolerance, used, progress);
-  return certify(device, scan, plan, used, progress);
+  return certify(device, scan, make_plan(device, scan, tolerance, used, progress), used, progress);
 }
 
-BuildResult certify(Device& device, const ProjectionSet& scan, const Plan& plan,
-                    const CertifyOptions& options, const Progress& progress) {
+BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan, const CertifyOptions& options,
+                    const Progress& progress) {
   check_options(options);
-  BuildResult result = build_or_give_up(device, scan, plan, options.build, progress);
+  std::string noted = options_json(plan, options.build, scan.geometry);
+  BuildResult result = build_or_give_up(device, scan, std::move(plan), options.build, progress);
   Certificate& c = result.certificate;
   refuse_empty_promise(c);
-  c.options_json = options_json(plan, options.build, scan.geometry);
+  c.options_json = std::move(noted);
   c.content_sha256 = content_sha256(result.volume);
   return result;
 }

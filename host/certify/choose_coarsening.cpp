@@ -258,7 +258,8 @@ LevelTriple choose_coarsening(const Volume& base, const std::vector<std::uint8_t
   return best;
 }
 
-std::vector<float> take_base(const Volume& volume, const LevelTriple& c) {
+std::vector<float> take_base(Volume volume, const LevelTriple& c) {
+  if (c == LevelTriple{}) return std::move(volume.samples);
   const Index3 n = volume.grid.samples();
   std::vector<float> out;
   for (std::int64_t z = 0; z < n[2]; z += std::int64_t{1} << c[0])

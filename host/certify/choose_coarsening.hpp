@@ -28,6 +28,6 @@ LevelTriple choose_coarsening(const Volume& base, const std::vector<std::uint8_t
 bool is_possible(const LevelTriple& coarsening, const Grid& grid, int granularity, int rate);
 
 /// The samples of a grid that its base has.
-std::vector<float> take_base(const Volume& volume, const LevelTriple& coarsening);
+std::vector<float> take_base(Volume volume, const LevelTriple& coarsening);
 
 }  // namespace vdvr

@@ -5,6 +5,7 @@
 
 #include "host/certify/build_journal.hpp"
 #include "host/system/casts.hpp"
+#include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -74,7 +75,8 @@ ClassifyBricks::ClassifyBricks(opencl::State& state, JournalledRates& gold, Open
       host_(host),
       fine_(gold.fine),
       coarse_(gold.coarse),
-      progress_(std::move(progress)),
+      progress_(progress),
+      whole_progress_(std::move(progress)),
       refuse_(std::move(refuse)) {}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
@@ -93,6 +95,35 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
   measures_.assign(bricks_.level.size(), {});
   along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);
+  for_each_band(
+      near, [&](const std::vector<std::uint8_t>& of_band) { classify_band(base, tolerance, of_band); });
+}
+
+// Whole blocks of either rate, so that a block is the same in a band as in all.
+void ClassifyBricks::for_each_band(const std::vector<std::uint8_t>& selected, const Work& work) {
+  const GoldStream& fine = fine_.gold();
+  const Bricks bricks(bricks_.grid, bricks_.granularity);
+  const Index3 n = bricks.along();
+  const std::int64_t block = coarse_ ? coarse_->gold().block_bricks()[2] : fine.block_bricks()[2];
+  const std::int64_t cells = fine.source()->kept.cells_together(),
+                     band = std::max<std::int64_t>(1, cells / bricks_.granularity / block) * block;
+  for (std::int64_t first = 0; first < n[2]; first += band) {
+    const std::int64_t last = std::min(n[2], first + band), layer = n[0] * n[1];
+    std::vector<std::uint8_t> of_band(selected.size(), 0);
+    std::copy(selected.begin() + first * layer, selected.begin() + last * layer,
+              of_band.begin() + first * layer);
+    progress_ = [&, first, last](const std::string& stage, double share) {
+      report(whole_progress_, stage,
+             (static_cast<double>(first) + share * static_cast<double>(last - first)) /
+                 static_cast<double>(n[2]));
+    };
+    work(of_band);
+  }
+  progress_ = whole_progress_;
+}
+
+void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
+                                   const std::vector<std::uint8_t>& near) {
   std::vector<std::uint8_t> refined = near;
   if (coarse_) {
     std::vector<std::uint8_t> undecided(near.size(), 0);
@@ -294,6 +325,14 @@ void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, 
 void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
                              double tolerance, const std::vector<std::uint8_t>& pending,
                              const std::string& stage) {
+  for_each_band(pending, [&](const std::vector<std::uint8_t>& of_band) {
+    measure_band(field, stored, tolerance, of_band, stage);
+  });
+}
+
+void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored,
+                                  double tolerance, const std::vector<std::uint8_t>& pending,
+                                  const std::string& stage) {
   std::vector<std::uint8_t> rest = pending;
   if (coarse_) {
     // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.

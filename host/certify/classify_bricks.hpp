@@ -102,6 +102,13 @@ class ClassifyBricks {
     bool passes = false;
     AxisErrors along{};
   };
+  /// Bricks along z that share heights of kept gold, and calls `work` for each run of them with those of
+  /// `selected` that lie in it.
+  using Work = std::function<void(const std::vector<std::uint8_t>& selected)>;
+  void for_each_band(const std::vector<std::uint8_t>& selected, const Work& work);
+  void classify_band(const DeviceField& base, double tolerance, const std::vector<std::uint8_t>& near);
+  void measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored, double tolerance,
+                    const std::vector<std::uint8_t>& pending, const std::string& stage);
   void test(JournalledGold& gold, const DeviceField& base, double tolerance,
             const std::vector<std::uint8_t>& selected, const std::string& stage,
             const std::function<void(const Levels&)>& visit);
@@ -123,7 +130,7 @@ class ClassifyBricks {
   HostMemory& host_;
   JournalledGold& fine_;
   std::optional<JournalledGold>& coarse_;
-  Progress progress_;
+  Progress progress_, whole_progress_;  // of a band, of all
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;
   std::vector<AxisErrors> along_;

@@ -31,6 +31,8 @@ constexpr std::uint64_t run_page_bytes = std::uint64_t{8} << 20;
 constexpr std::uint64_t floats_together = std::uint64_t{1} << 20;
 // Kept heights around those asked for: boxes of other halos will read them.
 constexpr std::int64_t run_margin = 32;
+// Of heights that many blocks share, where they are not few.
+constexpr std::uint64_t heights_bytes = std::uint64_t{1} << 30;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
@@ -268,6 +270,19 @@ std::vector<double> KeptGold::rows_of(double first, double step, std::int64_t he
   return resampling_matrix(g.rows, positions, 0, 1.0, 0);
 }
 
+std::int64_t KeptGold::cells_together() const {
+  const std::int64_t cells = grid_.cells[2];
+  if (few_rows()) return cells;
+  std::uint64_t tiles = 0;
+  for (std::int64_t y = 0; y <= grid_.cells[1] * rates_[1]; y += side)
+    for (std::int64_t x = 0; x <= grid_.cells[0] * rates_[0]; x += side)
+      if (margin_of({y / side, x / side}) >= -reach_) ++tiles;
+  const auto heights = static_cast<std::int64_t>(heights_bytes / (4 * count(side * side)) /
+                                                 std::max<std::uint64_t>(1, tiles));
+  if (heights >= cells * rates_[2] + 1 + 2 * run_margin) return cells;
+  return std::clamp<std::int64_t>((heights - 4 * run_margin) / rates_[2], 1, cells);
+}
+
 void KeptGold::require_run(const Span& z) {
   if (run_ && run_->low <= z.low && z.low + z.count <= run_->low + run_->count) return;
   // Beyond the grid as far as halos and filters read.
@@ -278,9 +293,14 @@ void KeptGold::require_run(const Span& z) {
   const auto bytes = [&](std::int64_t heights) {
     return count(4 * side * side * column_stride(heights)) * tiles_.size();
   };
-  if (bytes(run.count) > (state_.memory.left() + run_bytes()) / 4) {
+  const std::uint64_t room = (state_.memory.left() + run_bytes()) / 2;
+  if (bytes(run.count) > room / 2) {
+    // Passes go upwards: as many heights as a band of them reads, where these fit.
+    const std::int64_t least = z.count + 2 * run_margin,
+                       band = cells_together() * rates_[2] + 4 * run_margin;
     run.low = z.low - run_margin;
-    run.count = z.count + 2 * run_margin;
+    run.count = band > least && bytes(band) <= room ? std::min(band, all_high - run.low) : least;
+    run.count = std::max(run.count, least);
   }
   run_.reset();
   const HeightWeights weights =

@@ -71,6 +71,10 @@ class KeptGold {
     fill(lattice, std::span<const GoldBox>(&box, 1), out, first, 0, stride);
   }
 
+  /// Cells of the grid along z whose heights, made of all rows, lie in a gigabyte where every column of the
+  /// grid is asked for; all where rows are few. Follows from scan and grid alone.
+  [[nodiscard]] std::int64_t cells_together() const;
+
   /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
   [[nodiscard]] double seconds() const { return seconds_; }
   [[nodiscard]] std::int64_t tiles() const { return static_cast<std::int64_t>(tiles_.size()); }

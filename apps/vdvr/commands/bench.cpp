@@ -129,14 +129,15 @@ int bench_fbp(Arguments& args) {
 
 /// Seconds of the plain reconstruction of the same grid, interpolated from the detector's own columns as
 /// `bench fbp` does: what a certificate's cost is measured by.
-std::vector<double> seconds_of_fbp(Device& device, const Planned& planned, std::size_t repetitions) {
+std::vector<double> seconds_of_fbp(Device& device, const ProjectionSet& scan, const Grid& grid,
+                                   const FieldOptions& field, std::size_t repetitions) {
   ReconstructOptions options;
-  options.field = planned.plan.field;
+  options.field = field;
   options.upsampling = 1;
   std::vector<double> seconds;
   for (std::size_t i = 0; i <= repetitions; ++i) {
     const auto start = Clock::now();
-    reconstruct(device, planned.scan, planned.plan.grid, options,
+    reconstruct(device, scan, grid, options,
                 [](const std::string&, double) { throw_if_stopped(); });
     if (i > 0) seconds.push_back(since(start));  // the first builds kernels
   }
@@ -160,21 +161,24 @@ int bench_build(Arguments& args) {
   std::optional<BuildResult> built;  // checked by build itself: it throws unless the certificate holds
   double plan_seconds = 0;
   Planned planned;
+  Grid grid;
+  FieldOptions field;
   for (std::size_t i = 0; i < repetitions; ++i) {
     built.reset();
     planned = {};
     const auto start = Clock::now();
     planned = read_and_plan(device, args, wanted, progress.callback());
     plan_seconds = since(start);
+    grid = planned.plan.grid;
+    field = planned.plan.field;
     built = build_planned(device, planned, wanted, progress.callback());
     seconds.push_back(since(start));
   }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   const std::uint64_t peak_device_bytes = device.peak_memory();
-  planned.plan.prepared = nullptr;
   const std::vector<double> fbp_seconds =
-      seconds_of_fbp(device, planned, std::max<std::size_t>(3, repetitions));
+      seconds_of_fbp(device, planned.scan, grid, field, std::max<std::size_t>(3, repetitions));
   progress.clear();
   Json line = bench_line("build", device, repetitions);
   line["cells"] = built->volume.grid.cells;

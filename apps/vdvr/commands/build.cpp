@@ -15,7 +15,7 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
                const std::filesystem::path& output) {
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
-  const Planned planned = read_and_plan(device, args, wanted, progress.callback());
+  Planned planned = read_and_plan(device, args, wanted, progress.callback());
   const BuildResult result = build_planned(device, planned, wanted, progress.callback());
   throw_if_stopped();
   write_vdvr(output, result.volume, result.certificate, wanted.compression);
