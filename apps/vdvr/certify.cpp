@@ -51,8 +51,7 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wante
   return planned;
 }
 
-BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted,
-                          const Progress& progress) {
+BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
   return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
 }
 

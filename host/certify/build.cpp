@@ -394,8 +394,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), progress, watch};
   const double underflow = from_world(sampler_underflow(device.info()), units);
   const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
-    return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold,
-                         underflow);
+    return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold, underflow);
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
   // more if that was short.
@@ -414,7 +413,8 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
       lattice = lattice_of(base, plan, units, StorageChoice::f32);
       continue;
     }
-    const SamplerTerms sampler = sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
+    const SamplerTerms sampler =
+        sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
     result.certificate = certify(in, device, scan, filtered, options, measured, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || attempt >= 2 || result.certificate.comparison) {
@@ -438,7 +438,8 @@ BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const Bu
   if (options.roi) wanted.roi = from_world(*options.roi, units);
   if (options.window)
     wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
-  BuildResult result = build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, progress);
+  BuildResult result =
+      build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, progress);
   scale(result.volume, units.density());
   result.volume.grid = grid;
   result.certificate = to_world(std::move(result.certificate), units);

@@ -25,8 +25,8 @@ void update(Sha256& sha, const std::vector<T>& values) {
 
 }  // namespace
 
-// Base samples, which all of the scan and the field went into, stand for both, also where the scan has no hash
-// of its own.
+// Base samples, which all of the scan and the field went into, stand for both, also where the scan has no
+// hash of its own.
 std::string plan_digest(const ProjectionSet& scan, const Plan& plan) {
   Sha256 sha;
   update(sha, scan.geometry.theta_rad);

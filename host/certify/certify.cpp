@@ -97,8 +97,8 @@ std::string options_json(const Plan& plan, const BuildOptions& build, const Para
   return j.dump();
 }
 
-BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
-                             const Progress& progress) {
+BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, Plan plan,
+                             const BuildOptions& options, const Progress& progress) {
   try {
     return build(device, scan, std::move(plan), options, progress);
   } catch (const ToleranceError&) {

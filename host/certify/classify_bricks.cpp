@@ -95,8 +95,8 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
   measures_.assign(bricks_.level.size(), {});
   along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);
-  for_each_band(
-      near, [&](const std::vector<std::uint8_t>& of_band) { classify_band(base, tolerance, of_band); });
+  for_each_band(near,
+                [&](const std::vector<std::uint8_t>& of_band) { classify_band(base, tolerance, of_band); });
 }
 
 // Whole blocks of either rate, so that a block is the same in a band as in all.

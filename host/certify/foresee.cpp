@@ -290,8 +290,9 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
   out.kept_bytes =
       kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
-  out.kept_seconds = kept.seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
-                     static_cast<double>(kept.tiles() + missing);
+  out.kept_seconds = kept.column_seconds() +
+                     kept.tile_seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
+                         static_cast<double>(kept.tiles() + missing);
   out.seconds = first_pass + out.kept_seconds;
   const auto add = [&](bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
     out.seconds += small.seconds(fine, purpose, of);

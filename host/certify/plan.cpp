@@ -291,7 +291,8 @@ class Planner {
   Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
           const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
       : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
-    host_.count(scan.data.resident_bytes(), "the projections, as read,");
+    scan_bytes_ = scan.data.resident_bytes();
+    host_.count(scan_bytes_, "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
     ParallelGeometry used = scan.geometry;
     if (field.center) used.center = *field.center;
@@ -470,10 +471,20 @@ class Planner {
     plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
-    // What the trial took, the scan and the base samples twice included, and the gold that was not kept yet;
-    // the base samples once more, the stored field on the device, and the tiles before and after closing.
+    foresee_memory(foreseen, gold.fine().source()->kept);
+  }
+
+  // Gold that is kept; the base samples, fitted, rounded and on the device; tiles before and after closing
+  // and on the device; the scan as read and filtered; and what the trial took beside these, batches of
+  // blocks.
+  void foresee_memory(const Foreseen& foreseen, const KeptGold& kept) {
+    const std::uint64_t base = 4 * plan_.base.samples.size(),
+                        scan = scan_bytes_ + prepared_->filtered.samples.resident_bytes(),
+                        held = scan + 2 * base + kept.bytes(), peak = state_.memory.peak();
+    plan_.memory_of_rows = kept.bytes() + foreseen.kept_bytes;
+    plan_.memory_of_cells = 3 * (foreseen.tile_bytes + base);
     plan_.memory_bytes =
-        state_.memory.peak() + foreseen.kept_bytes + 3 * foreseen.tile_bytes + 4 * plan_.base.samples.size();
+        scan + plan_.memory_of_rows + plan_.memory_of_cells + (peak > held ? peak - held : 0);
   }
 
   Device& device_;
@@ -484,7 +495,8 @@ class Planner {
   Plan plan_;
   std::shared_ptr<PreparedScan> prepared_;
   std::optional<Coverage> coverage_;
-  double preparation_ = 0;  // seconds that build will take again
+  std::uint64_t scan_bytes_ = 0;  // as read
+  double preparation_ = 0;        // seconds that build will take again
   std::vector<std::uint8_t> looked_at_;
   bool estimates_views_ = false;
 };
@@ -497,7 +509,8 @@ namespace {
 constexpr std::int64_t most_samples_planned = std::int64_t{8} << 20;
 
 // The plan of a window of rows, for the whole scan.
-Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, const Grid& grid) {
+Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, const Grid& grid,
+                 bool on_gpu) {
   const ParallelGeometry& g = scan.geometry;
   plan.estimated = true;
   plan.prepared = nullptr;
@@ -510,7 +523,12 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
                all_cells = static_cast<double>(grid.cells[2]) / static_cast<double>(window.grid.cells[2]);
   plan.seconds = plan.seconds_of_rows * all_rows + (plan.seconds - plan.seconds_of_rows) * all_cells;
   plan.seconds_of_rows *= all_rows;
-  plan.memory_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.memory_bytes) * all_cells);
+  const bool kept_in_scratch = scan.data.scratch() && !on_gpu;
+  plan.memory_bytes -= plan.memory_of_rows + plan.memory_of_cells;
+  plan.memory_of_rows =
+      kept_in_scratch ? 0 : static_cast<std::uint64_t>(static_cast<double>(plan.memory_of_rows) * all_rows);
+  plan.memory_of_cells = static_cast<std::uint64_t>(static_cast<double>(plan.memory_of_cells) * all_cells);
+  plan.memory_bytes += plan.memory_of_rows + plan.memory_of_cells + 2 * scan.data.resident_bytes();
   plan.grid = grid;
   plan.gold_samples = 1;
   for (const std::int64_t cells : grid.cells)
@@ -532,7 +550,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     if (const auto window = row_window(scan, grid, most_samples_planned))
       return of_all_rows(
           make_plan(device, window->scan, window->grid, field, rates, tolerance, settings, progress), *window,
-          scan, grid);
+          scan, grid, device.info().is_gpu);
   check_rates(rates);
   check_granularity(settings.granularity);
   check_tolerance(tolerance);

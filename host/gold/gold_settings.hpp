@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -38,6 +39,8 @@ struct GoldSettings {
   bool grid_only = false;    ///< slack counts as 0: the paper's test, for comparison
   Lattice lattice{};         ///< on which tiles will be stored; classification leaves room for it
   LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x
+  /// Of heights that blocks of kept gold share (kept_gold.hpp).
+  std::uint64_t heights_bytes = std::uint64_t{1} << 30;
 
   /// How far outside the covered region samples are kept: as far as a base cell that meets it reaches.
   [[nodiscard]] double kept() const {

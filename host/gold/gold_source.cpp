@@ -13,7 +13,7 @@ double gold_reach(const GoldSettings& settings) {
 GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
                        const GoldSettings& settings)
     : kept(state, scan, sups, settings.grid, gold_reach(settings), settings.upsampling,
-           settings.interpolation) {
+           settings.interpolation, settings.heights_bytes) {
   if (!settings.base_only) remainder.emplace(state, kept, scan, sups, settings.grid, settings.granularity);
 }
 

@@ -2,7 +2,6 @@
 #include "host/gold/gold_stream.hpp"
 
 #include <fmt/format.h>
-#include <cstdio>
 
 #include <algorithm>
 #include <bit>
@@ -161,16 +160,12 @@ void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const On
                              For purpose) {
   begin(purpose);
   const std::vector<Work> all = partition(selected);
-  const auto dbg0 = std::chrono::steady_clock::now();
-  struct Dbg { std::chrono::steady_clock::time_point t; std::string s; int rate; For p; long n; double c=0; ~Dbg(){ fprintf(stderr, "DBG %s rate %d purpose %d bricks %ld samples %.3g seconds %.2f\n", s.c_str(), rate, static_cast<int>(p), n, c, std::chrono::duration<double>(std::chrono::steady_clock::now()-t).count()); } } dbg{dbg0, stage, settings_.rate, purpose, static_cast<long>(std::count(selected.begin(), selected.end(), 1))};
   source_->kept.prepare(lattice_, boxes(all), progress);
   if (!settings_.base_only) source_->remainder->require(selected, progress);
-  fprintf(stderr, "DBG   prepared %.2f\n", std::chrono::duration<double>(std::chrono::steady_clock::now()-dbg0).count());
   const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
   double total = 0, done = 0;
   Batch batch(state_, settings_);  // its arrays serve all works
   for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
-  dbg.c = total;
   for (const Work& w : all) {
     const auto tick = [&](double blocks) {
       done += blocks * cost(w);

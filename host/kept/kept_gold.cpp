@@ -31,8 +31,6 @@ constexpr std::uint64_t run_page_bytes = std::uint64_t{8} << 20;
 constexpr std::uint64_t floats_together = std::uint64_t{1} << 20;
 // Kept heights around those asked for: boxes of other halos will read them.
 constexpr std::int64_t run_margin = 32;
-// Of heights that many blocks share, where they are not few.
-constexpr std::uint64_t heights_bytes = std::uint64_t{1} << 30;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
@@ -46,13 +44,14 @@ std::int64_t rate_of(double spacing, double pitch) {
 }  // namespace
 
 KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
-                   double reach, int upsampling, Interpolation interpolation)
+                   double reach, int upsampling, Interpolation interpolation, std::uint64_t heights_bytes)
     : state_(state),
       scan_(scan),
       upsampler_(state, scan, ColumnMethod::accurate),
       sups_(sups),
       grid_(grid),
       reach_(reach),
+      heights_bytes_(heights_bytes),
       interpolation_(interpolation),
       coverage_(scan.geometry) {
   const ParallelGeometry& g = scan.geometry;
@@ -184,18 +183,34 @@ std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
   return {out.begin(), out.end()};
 }
 
+std::vector<KeptGold::TileAt> KeptGold::all_tiles() const {
+  std::vector<TileAt> out;
+  const auto beyond = [&](std::size_t a) {
+    return static_cast<std::int64_t>(std::ceil(reach_ / spacing_[a]));
+  };
+  const auto last = [&](std::size_t a) { return floor_div(grid_.cells[a] * rates_[a] + beyond(a), side); };
+  for (std::int64_t ty = floor_div(-beyond(1), side); ty <= last(1); ++ty)
+    for (std::int64_t tx = floor_div(-beyond(0), side); tx <= last(0); ++tx)
+      if (margin_of({ty, tx}) >= -reach_) out.emplace_back(ty, tx);
+  return out;
+}
+
 std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const {
   return static_cast<std::int64_t>(new_tiles(lattice, boxes).size());
 }
 
 void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes,
                        const Progress& progress) {
-  const std::vector<TileAt> tiles = new_tiles(lattice, boxes);
+  std::vector<TileAt> tiles = new_tiles(lattice, boxes);
   if (tiles.empty()) return;
-  const auto start = std::chrono::steady_clock::now();
+  std::vector<TileAt> all = all_tiles();
+  std::erase_if(all, [&](const TileAt& tile) { return tiles_.contains(tile); });
+  if (2 * tiles.size() > all.size()) {
+    std::set<TileAt> both(tiles.begin(), tiles.end());
+    both.insert(all.begin(), all.end());
+    tiles.assign(both.begin(), both.end());
+  }
   back_project_tiles(tiles, progress);
-  state_.queue.finish();
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // Rows in runs whose upsampled columns fit beside the tiles; every run serves all tiles.
@@ -206,9 +221,9 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
   const std::size_t first_page = pages_.size();
   for (std::size_t i = 0; i < tiles.size(); i += each) {
     const std::size_t n = std::min(each, tiles.size() - i);
-    pages_.emplace_back(state_, n * tile, "gold that is kept");
+    pages_.emplace_back(state_, scratch(), n * tile, "gold that is kept");
     // Columns that nobody reads are not computed: let them be finite.
-    pages_.back().fill(0.0f);
+    if (!scratch()) pages_.back().fill(0.0f);
   }
   std::int64_t rows = static_cast<std::int64_t>(opencl::round_up(count(g.rows), 16));
   while (rows > 16 && upsampler_.slab_bytes(columns_, rows) >
@@ -218,7 +233,11 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     std::vector<double> heights;
     for (std::int64_t r = first; r < std::min(g.rows, first + rows); ++r)
       heights.push_back(static_cast<double>(r));
+    const auto start = std::chrono::steady_clock::now();
     const UpsampledSlab slab = upsampler_(columns_, heights);
+    state_.queue.finish();
+    const auto upsampled = std::chrono::steady_clock::now();
+    column_seconds_ += std::chrono::duration<double>(upsampled - start).count();
     for (std::size_t page = first_page; page < pages_.size(); ++page) {
       const std::size_t begin = (page - first_page) * each, n = std::min(each, tiles.size() - begin);
       ColumnBlocks blocks = blocks_of(tiles.subspan(begin, n));
@@ -233,6 +252,7 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
                  static_cast<double>(g.rows));
     }
     state_.queue.finish();  // before the next rows are allocated
+    tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - upsampled).count();
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
@@ -272,13 +292,9 @@ std::vector<double> KeptGold::rows_of(double first, double step, std::int64_t he
 
 std::int64_t KeptGold::cells_together() const {
   const std::int64_t cells = grid_.cells[2];
-  if (few_rows()) return cells;
-  std::uint64_t tiles = 0;
-  for (std::int64_t y = 0; y <= grid_.cells[1] * rates_[1]; y += side)
-    for (std::int64_t x = 0; x <= grid_.cells[0] * rates_[0]; x += side)
-      if (margin_of({y / side, x / side}) >= -reach_) ++tiles;
-  const auto heights = static_cast<std::int64_t>(heights_bytes / (4 * count(side * side)) /
-                                                 std::max<std::uint64_t>(1, tiles));
+  if (few_rows() || scratch()) return cells;
+  const auto heights = static_cast<std::int64_t>(heights_bytes_ / (4 * count(side * side)) /
+                                                 std::max<std::size_t>(1, all_tiles().size()));
   if (heights >= cells * rates_[2] + 1 + 2 * run_margin) return cells;
   return std::clamp<std::int64_t>((heights - 4 * run_margin) / rates_[2], 1, cells);
 }
@@ -294,10 +310,9 @@ void KeptGold::require_run(const Span& z) {
     return count(4 * side * side * column_stride(heights)) * tiles_.size();
   };
   const std::uint64_t room = (state_.memory.left() + run_bytes()) / 2;
-  if (bytes(run.count) > room / 2) {
+  if (!scratch() && bytes(run.count) > room / 2) {
     // Passes go upwards: as many heights as a band of them reads, where these fit.
-    const std::int64_t least = z.count + 2 * run_margin,
-                       band = cells_together() * rates_[2] + 4 * run_margin;
+    const std::int64_t least = z.count + 2 * run_margin, band = cells_together() * rates_[2] + 4 * run_margin;
     run.low = z.low - run_margin;
     run.count = band > least && bytes(band) <= room ? std::min(band, all_high - run.low) : least;
     run.count = std::max(run.count, least);
@@ -306,9 +321,14 @@ void KeptGold::require_run(const Span& z) {
   const HeightWeights weights =
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
-  run.a_page = std::max<std::size_t>(1, run_page_bytes / (4 * count(side * side * run.stride)));
+  run.a_page = std::max<std::size_t>(
+      1, (scratch() ? page_bytes : run_page_bytes) / (4 * count(side * side * run.stride)));
   run.from_rows.emplace(state_, weights);
   run_ = std::move(run);
+}
+
+std::shared_ptr<Scratch> KeptGold::scratch() const {
+  return state_.info.is_gpu ? nullptr : scan_.samples.scratch();
 }
 
 std::uint64_t KeptGold::bytes() const {
@@ -326,7 +346,8 @@ KeptGold::Place KeptGold::heights_of(const TileAt& tile, const Place& place) {
   if (const auto known = run_->tiles.find(tile); known != run_->tiles.end()) return known->second;
   const std::uint64_t size = count(side * side * run_->stride);
   const std::size_t i = run_->tiles.size();
-  if (i % run_->a_page == 0) run_->pages.emplace_back(state_, run_->a_page * size, "heights of kept gold");
+  if (i % run_->a_page == 0)
+    run_->pages.emplace_back(state_, scratch(), run_->a_page * size, "heights of kept gold");
   const Place out{i / run_->a_page, i % run_->a_page * size};
   run_->tiles.emplace(tile, out);
   VdvrAlongZ shape{};
@@ -412,7 +433,7 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
   };
   for (const GoldBox& box : boxes) {
     // Tiles that came later than the run were not foreseen by it: heights can be made again.
-    if (!few_rows() && run_bytes() > state_.memory.left() / 2) {
+    if (!few_rows() && !scratch() && run_bytes() > state_.memory.left() / 2) {
       resample();
       run_->tiles.clear();
       run_->pages.clear();

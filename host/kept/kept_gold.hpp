@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -44,9 +45,11 @@ struct GoldBox {
 class KeptGold {
  public:
   /// Kept for nodes of a coverage margin of at least -`reach` (world units). All but the numbers is referred
-  /// to. Rates of the grid's own lattice follow from its spacing and the detector's pitch.
+  /// to. Rates of the grid's own lattice follow from its spacing and the detector's pitch. `heights_bytes`:
+  /// of heights that cells_together() of every column share.
   KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, const Grid& grid,
-           double reach, int upsampling, Interpolation interpolation);
+           double reach, int upsampling, Interpolation interpolation,
+           std::uint64_t heights_bytes = std::uint64_t{1} << 30);
 
   /// Kept nodes to a cell of the grid, by axis: powers of two, so that their spacing is at most half a pixel.
   [[nodiscard]] const Index3& rates() const { return rates_; }
@@ -56,8 +59,9 @@ class KeptGold {
   /// Cost: milliseconds for each new ratio.
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
 
-  /// Back-projects what `boxes` will read and is not kept yet. Throws ResourceError where memory does not
-  /// suffice. Cost: views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
+  /// Back-projects what `boxes` will read and is not kept yet; where that is most of what can be kept, all of
+  /// it, since the columns of the detector are upsampled anew each time. Throws ResourceError where memory
+  /// does not suffice. Cost: views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
   void prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress);
 
   /// float out[box][y][x][stride] from `first` on, `apart` floats from box to box: gold at the nodes of boxes
@@ -71,12 +75,14 @@ class KeptGold {
     fill(lattice, std::span<const GoldBox>(&box, 1), out, first, 0, stride);
   }
 
-  /// Cells of the grid along z whose heights, made of all rows, lie in a gigabyte where every column of the
-  /// grid is asked for; all where rows are few. Follows from scan and grid alone.
+  /// Cells of the grid along z whose heights, made of all rows, take `heights_bytes` where every column of
+  /// the grid is asked for; all where rows are few, or heights lie in scratch.
   [[nodiscard]] std::int64_t cells_together() const;
 
-  /// Seconds and kept tiles of all calls of prepare, and how many tiles boxes would add.
-  [[nodiscard]] double seconds() const { return seconds_; }
+  /// Seconds of all calls of prepare, for the columns of the detector and for the tiles, kept tiles, and how
+  /// many tiles boxes would add.
+  [[nodiscard]] double column_seconds() const { return column_seconds_; }
+  [[nodiscard]] double tile_seconds() const { return tile_seconds_; }
   [[nodiscard]] std::int64_t tiles() const { return static_cast<std::int64_t>(tiles_.size()); }
   /// Of all tiles, with the heights made of them.
   [[nodiscard]] std::uint64_t bytes() const;
@@ -102,6 +108,8 @@ class KeptGold {
   [[nodiscard]] Span heights_span(const GoldLattice& lattice, const GoldBox& box) const;
   [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice,
                                               const std::vector<GoldBox>& boxes) const;
+  /// All within reach of the covered part of the grid.
+  [[nodiscard]] std::vector<TileAt> all_tiles() const;
   [[nodiscard]] double margin_of(const TileAt& tile) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
@@ -120,6 +128,8 @@ class KeptGold {
   [[nodiscard]] std::uint64_t run_bytes() const;
   [[nodiscard]] bool few_rows() const { return scan_.geometry.rows <= most_few_rows; }
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
+  /// Where the scan lies there and the device computes in the host's memory; else none.
+  [[nodiscard]] std::shared_ptr<Scratch> scratch() const;
 
   opencl::State& state_;
   const FilteredScan& scan_;
@@ -127,6 +137,7 @@ class KeptGold {
   const FieldSups& sups_;
   Grid grid_;
   double reach_;
+  std::uint64_t heights_bytes_;
   Interpolation interpolation_;
   Coverage coverage_;
   UpsampledColumns columns_;
@@ -155,7 +166,7 @@ class KeptGold {
   };
   std::optional<Heights> heights_;
   std::array<opencl::DeviceArray<float>, 2> buffers_;
-  double seconds_ = 0;
+  double column_seconds_ = 0, tile_seconds_ = 0;
 };
 
 }  // namespace vdvr

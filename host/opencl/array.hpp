@@ -4,13 +4,16 @@
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "host/opencl/state.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/scratch.hpp"
 
 namespace vdvr::opencl {
 
@@ -34,21 +37,40 @@ class DeviceArray {
       : DeviceArray(state, values.size(), what) {
     write(values);
   }
-  ~DeviceArray() {
-    if (state_) state_->release(size_bytes(), std::move(buffer_));
+  /// In scratch files, which kernels of a device that computes in the host's memory read where they lie;
+  /// there alone. Zeros. Without `scratch` as above.
+  DeviceArray(State& state, std::shared_ptr<Scratch> scratch, std::uint64_t count, const std::string& what)
+      : DeviceArray() {
+    if (!scratch) {
+      *this = DeviceArray(state, count, what);
+      return;
+    }
+    static_assert(std::is_same_v<T, float>);
+    count_ = count;
+    what_ = what;
+    const std::span<float> mapped = scratch->map(static_cast<std::size_t>(count), what);
+    pages_ = {mapped.data(), [scratch, mapped](void*) { scratch->unmap(mapped); }};
+    state_ = &state;
+    guard("map", [&] {
+      buffer_ =
+          cl::Buffer(state.context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, size_bytes(), mapped.data());
+    });
   }
+  ~DeviceArray() { release(); }
   DeviceArray(DeviceArray&& o) noexcept
       : state_(std::exchange(o.state_, nullptr)),
         count_(std::exchange(o.count_, 0)),
         what_(std::move(o.what_)),
-        buffer_(std::move(o.buffer_)) {}
+        buffer_(std::move(o.buffer_)),
+        pages_(std::move(o.pages_)) {}
   DeviceArray& operator=(DeviceArray&& o) noexcept {
     if (this != &o) {
-      if (state_) state_->release(size_bytes(), std::move(buffer_));
+      release();
       state_ = std::exchange(o.state_, nullptr);
       count_ = std::exchange(o.count_, 0);
       what_ = std::move(o.what_);
       buffer_ = std::move(o.buffer_);
+      pages_ = std::move(o.pages_);
     }
     return *this;
   }
@@ -127,10 +149,20 @@ class DeviceArray {
     }
   }
 
+  void release() noexcept {
+    if (!state_) return;
+    if (!pages_) return state_->release(size_bytes(), std::move(buffer_));
+    // Kernels may still read what is about to be unmapped.
+    clFinish(state_->queue());
+    buffer_ = {};
+    pages_ = nullptr;
+  }
+
   State* state_ = nullptr;
   std::uint64_t count_ = 0;
   std::string what_;
   cl::Buffer buffer_;
+  std::shared_ptr<void> pages_;  // of scratch files
 };
 
 }  // namespace vdvr::opencl

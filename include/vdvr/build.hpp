@@ -33,7 +33,8 @@ struct BuildResult {
 
 /// Throws ToleranceError when the tolerance is out of reach at the plan's rates, InputError when a journal to
 /// resume is of another scan, plan, device or other options. A resumed build gives the volume and the
-/// certificate of one that was never interrupted, to the bit. A plan that is moved here gives its memory back.
+/// certificate of one that was never interrupted, to the bit. A plan that is moved here gives its memory
+/// back.
 VDVR_API BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                            const Progress& progress = {});
 

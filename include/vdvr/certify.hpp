@@ -41,7 +41,8 @@ VDVR_API Plan make_plan(Device& device, const ProjectionSet& scan, const Toleran
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                              const CertifyOptions& options = {}, const Progress& progress = {});
 
-/// The same, of a plan made before from the same scan and options; one that is moved here gives its memory back.
+/// The same, of a plan made before from the same scan and options; one that is moved here gives its memory
+/// back.
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan,
                              const CertifyOptions& options = {}, const Progress& progress = {});
 

@@ -55,9 +55,11 @@ struct Plan {
   ErrorBudget budget;              ///< foreseen shares at the chosen rates; grid: what is left for it
   std::uint64_t gold_samples = 0;  ///< to be back-projected, per pass
   std::uint64_t memory_bytes = 0;  ///< peak of our allocations foreseen
-  double seconds = 0;              ///< foreseen for build, from a measured back-projection rate
-  double seconds_of_rows = 0;      ///< of those, what grows with the detector's rows and not with the grid's
-  double samples_ratio = 0;        ///< storage foreseen, from a sample of bricks
+  std::uint64_t memory_of_rows = 0,
+                memory_of_cells = 0;  ///< of those, what grows with the rows, with the grid
+  double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
+  double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
+  double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows

@@ -31,12 +31,12 @@ Grid grid_around_axis(const Index3& cells, double spacing) {
 // A build up to its levels, measured once more on the fine gold.
 struct Case {
   Case(const ProjectionSet& scan, const Grid& grid, int rate, double tolerance_of_range,
-       bool anisotropic = false)
+       bool anisotropic = false, std::uint64_t heights_bytes = std::uint64_t{1} << 30)
       : chain(scan),
         state(attacks::device().state()),
         base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, Interpolation::six_taps, {})),
         host(state),
-        gold(state, chain.filtered, chain.sups, settings_of(grid, rate, anisotropic)),
+        gold(state, chain.filtered, chain.sups, settings_of(grid, rate, anisotropic, heights_bytes)),
         unrecorded(gold, nullptr),
         classify(state, unrecorded, bricks, host, {},
                  [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
@@ -62,10 +62,12 @@ struct Case {
         },
         {}, "fine");
   }
-  static GoldSettings settings_of(const Grid& grid, int rate, bool anisotropic = false) {
+  static GoldSettings settings_of(const Grid& grid, int rate, bool anisotropic = false,
+                                  std::uint64_t heights_bytes = std::uint64_t{1} << 30) {
     GoldSettings s{grid, 2, rate, 8, Interpolation::six_taps};
     s.midrange = true;
     s.anisotropic = anisotropic;
+    s.heights_bytes = heights_bytes;
     return s;
   }
   [[nodiscard]] bool stays(std::size_t i) const {
@@ -135,6 +137,26 @@ BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_noise_is_within_the_tolerance) 
   for (const int rate : {4, 8, 16})
     for (const double share : {0.1, 0.15, 0.25})
       check(scan, grid_around_axis({10, 10, 11}, 0.7), rate, share);
+}
+
+// Where heights of all rows are too many for all blocks, a band of them goes through all tests before the
+// next.
+BOOST_AUTO_TEST_CASE(bands_decide_what_all_blocks_together_do) {
+  const ProjectionSet scan = noise_scan(20, 45, 17, 5);
+  const Grid grid = grid_around_axis({6, 6, 40}, 0.7);
+  Case together(scan, grid, 16, 0.15, true), bands(scan, grid, 16, 0.15, true, 1);
+  BOOST_TEST(together.gold.fine().source()->kept.cells_together() == 40);
+  BOOST_TEST(bands.gold.fine().source()->kept.cells_together() == 1);
+  BOOST_TEST((bands.bricks.level == together.bricks.level));
+  BOOST_TEST((bands.bricks.involved == together.bricks.involved));
+  BOOST_TEST((bands.bricks.samples == together.bricks.samples));
+  std::int64_t above = 0;
+  for (std::size_t i = 0; i < together.decided.size(); ++i) {
+    above += together.bricks.level[i] != LevelTriple{0, 0, 0};
+    BOOST_TEST(bands.decided[i].total == together.decided[i].total);
+    BOOST_TEST(bands.decided[i].rate == together.decided[i].rate);
+  }
+  BOOST_TEST(above > 0);
 }
 
 BOOST_AUTO_TEST_CASE(what_coarse_gold_accepts_of_phantoms_is_within_the_tolerance) {

@@ -257,6 +257,35 @@ BOOST_AUTO_TEST_CASE(a_block_computed_alone_is_the_block_in_the_whole) {
   }
 }
 
+// The same bits, however often their pages are let go.
+BOOST_AUTO_TEST_CASE(gold_kept_in_scratch_is_that_kept_in_memory) {
+  if (device().state().info.is_gpu) return;
+  for (const std::int64_t rows : {9, 40}) {
+    const ProjectionSet scan = noise_scan(11, rows, 40, 3);
+    Chain chain(scan);
+    FilteredScan filtered = chain.filtered;
+    filtered.samples =
+        SampleArray(chain.filtered.samples.size(), std::make_shared<Scratch>(".", 1 << 16), "filtered");
+    std::copy(chain.filtered.samples.begin(), chain.filtered.samples.end(), filtered.samples.begin());
+    const Grid grid = grid_in({20, 20, 6}, {1, 1, 1}, {-10, -10, -3});
+    KeptGold in_memory(device().state(), chain.filtered, chain.sups, grid, 1, 8, Interpolation::six_taps);
+    KeptGold in_scratch(device().state(), filtered, chain.sups, grid, 1, 8, Interpolation::six_taps);
+    const std::uint64_t before = filtered.samples.scratch()->peak_bytes();
+    for (const int rate : {2, 8}) {
+      const GoldLattice lattice = in_memory.lattice(grid, rate);
+      const Nodes a = nodes_of(in_memory, lattice, whole(grid, rate, 2)),
+                  b = nodes_of(in_scratch, lattice, whole(grid, rate, 2));
+      std::int64_t different = 0;
+      for (std::int64_t y = a.box.first[1]; y < a.box.first[1] + a.box.nodes[1]; ++y)
+        for (std::int64_t x = a.box.first[0]; x < a.box.first[0] + a.box.nodes[0]; ++x)
+          for (std::int64_t z = a.box.first[2]; z < a.box.first[2] + a.box.nodes[2]; ++z)
+            different += a.at(x, y, z) != b.at(x, y, z);
+      BOOST_TEST(different == 0);
+    }
+    BOOST_TEST(filtered.samples.scratch()->peak_bytes() > before);
+  }
+}
+
 // Tiles are asked for piece by piece; what is there already stays.
 BOOST_AUTO_TEST_CASE(tiles_are_made_once_and_those_beyond_reach_never) {
   const ProjectionSet scan = noise_scan(11, 5, 40, 3);

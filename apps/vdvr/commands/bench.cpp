@@ -137,8 +137,7 @@ std::vector<double> seconds_of_fbp(Device& device, const ProjectionSet& scan, co
   std::vector<double> seconds;
   for (std::size_t i = 0; i <= repetitions; ++i) {
     const auto start = Clock::now();
-    reconstruct(device, scan, grid, options,
-                [](const std::string&, double) { throw_if_stopped(); });
+    reconstruct(device, scan, grid, options, [](const std::string&, double) { throw_if_stopped(); });
     if (i > 0) seconds.push_back(since(start));  // the first builds kernels
   }
   return seconds;
