@@ -40,7 +40,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
 /// roundings what follows multiplies, sums of six products are summed, and what adding their runs rounds off
 /// is summed beside them.
 inline std::int64_t view_run(Interpolation interpolation) {
-  return interpolation == Interpolation::six_taps ? 8 : interpolation == Interpolation::cubic ? 16 : 32;
+  return interpolation == Interpolation::six_taps ? 6 : interpolation == Interpolation::cubic ? 16 : 32;
 }
 
 /// Floats from one column of samples to the next: a multiple of 16, and an odd one, so that neighbours do not
