@@ -64,18 +64,20 @@ std::vector<double> view_sups(opencl::State& state, const opencl::DeviceArray<fl
   return out;
 }
 
+// A term is rounded within its run, the sum at its end, and the m roundings that were kept are summed with m
+// u of themselves. In units of u.
+double compensated_runs(double runs, double roundings) {
+  const double m = std::ceil(runs);
+  return roundings + 2 + 1.01 * m * m * unit_roundoff;
+}
+
 std::vector<double> view_sups(opencl::State& state, const UpsampledSlab& d, int order) {
   return view_sups(state, d.values, d.views, d.columns.count, d.rows, order);
 }
 
 }  // namespace
 
-// A term is rounded within its run, the sum at its end, and the m roundings that were kept are summed with m
-// u of themselves.
-double product_error(std::int64_t n, int run) {
-  const double runs = std::ceil(static_cast<double>(n) / run);
-  return run + 2 + 1.01 * runs * runs * unit_roundoff;
-}
+double product_error(std::int64_t n, int run) { return compensated_runs(static_cast<double>(n) / run, run); }
 
 double lebesgue_constant(std::int64_t n) {
   // Trigonometric interpolation in 2n points: below (2/pi) ln(2n) + 1.5 for every n (Rivlin, Chebyshev
@@ -397,11 +399,10 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   ChainErrors out;
   out.ramp = filter_error_bound(upsampler, scan);
   out.columns = w.gain * column_error(upsampler, g.columns, columns, samples, sups.value);
-  // Six taps: a view's by themselves, in compensated runs of such sums, and their own roundings known; else a rounding for each run, and eight for
-  // weights.
-  const double terms = interpolation == Interpolation::six_taps
-                           ? product_error(6 * g.views(), to_int(std::llround(w.taps + run)))
-                           : w.taps * run + std::ceil(views / run) + 8;
+  // Six taps: a view's by themselves, in compensated runs of such sums, and their own roundings known; else a
+  // rounding for each run, and eight for weights.
+  const double terms = interpolation == Interpolation::six_taps ? compensated_runs(views / run, w.taps + run)
+                                                                : w.taps * run + std::ceil(views / run) + 8;
   out.summation = (unit_roundoff * terms * w.gain + w.rounding) * largest;
   out.interpolation = interpolation_error(g, sups, columns.rate, interpolation);
   // At a wrong position, too, the interpolant is that close to the signal, which moves by its slope

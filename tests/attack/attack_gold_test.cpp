@@ -186,7 +186,7 @@ BOOST_AUTO_TEST_CASE(errors_of_filtered_samples_reach_gold_as_charged) {
 // Kept nodes as they are: between columns and with them, in one view or thousands.
 BOOST_AUTO_TEST_CASE(kept_nodes_of_thousands_of_views_err_by_no_more_than_is_charged) {
   std::map<int, double> rounding_of_90;  // by rate, over S
-  for (const std::int64_t views : {90, 8192}) {
+  for (const std::int64_t views : {90, 24576}) {
     ParallelGeometry g = geometry(views, 2, 8);
     g.center = 3.4;
     double closest = 0;
