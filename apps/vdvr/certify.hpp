@@ -36,8 +36,7 @@ struct Planned {
 /// Reads IN and plans.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
 /// The second half of vdvr::certify. Takes the plan.
-BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted,
-                          const Progress& progress);
+BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress);
 
 /// The journal of an output file: beside it, with this name.
 std::filesystem::path journal_path(const std::filesystem::path& output);
