@@ -212,14 +212,13 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   CloseBoundaries close(bricks, in.plan.settings.comparison.closing);
   std::vector<std::uint8_t> raised;
   for (int round = 0;; ++round) {
-    // A repair compares with the volume before it.
     MixedVolume volume = round > 0 ? close.again(before, raised) : close.first();
     // Where integers round, a raised brick can change more than those it touches.
     const std::vector<std::uint8_t> changed = round > 0 ? changed_bricks(before, volume, close.made())
                                                         : std::vector<std::uint8_t>(pending.size(), 1);
     for (std::size_t i = 0; i < pending.size(); ++i)
       pending[i] = bricks.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
-    before = {};
+    before = {};  // only a repair compares with it
     closed.uncount(std::exchange(closed_bytes, 0));
     closed.count(sample_bytes(volume), "the closed volume");
     closed_bytes = sample_bytes(volume);

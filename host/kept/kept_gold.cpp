@@ -292,7 +292,7 @@ std::vector<double> KeptGold::rows_of(double first, double step, std::int64_t he
 
 std::int64_t KeptGold::cells_together() const {
   const std::int64_t cells = grid_.cells[2];
-  if (few_rows() || scratch()) return cells;
+  if (few_rows()) return cells;
   const auto heights = static_cast<std::int64_t>(heights_bytes_ / (4 * count(side * side)) /
                                                  std::max<std::size_t>(1, all_tiles().size()));
   if (heights >= cells * rates_[2] + 1 + 2 * run_margin) return cells;

@@ -76,7 +76,8 @@ class KeptGold {
   }
 
   /// Cells of the grid along z whose heights, made of all rows, take `heights_bytes` where every column of
-  /// the grid is asked for; all where rows are few, or heights lie in scratch.
+  /// the grid is asked for; all where rows are few. Follows from scan and grid, not from the memory that is
+  /// left: journals count passes.
   [[nodiscard]] std::int64_t cells_together() const;
 
   /// Seconds of all calls of prepare, for the columns of the detector and for the tiles, kept tiles, and how
