@@ -216,6 +216,7 @@ BuildOptions build_options(const Arguments& args) {
   for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
   const bool paper = args.has("paper");
   BuildOptions build;
+  build.scratch = common_options(args).scratch;
   build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
   if (const auto w = args.numbers("window", 2)) {
     if (!((*w)[0] <= (*w)[1])) throw InputError(fmt::format("--window: {} lies above {}", (*w)[0], (*w)[1]));

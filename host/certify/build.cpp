@@ -30,6 +30,9 @@
 namespace vdvr {
 namespace {
 
+// Of scratch, where the device has no limit.
+constexpr std::uint64_t least_resident = std::uint64_t{64} << 20;
+
 class Stopwatch {
  public:
   explicit Stopwatch(std::map<std::string, double>& seconds) : seconds_(seconds) {}
@@ -72,9 +75,21 @@ struct Inputs {
   const std::vector<std::uint8_t>& selected;  // by brick: in the region of interest
   JournalledRates& gold;
   double arithmetic = 0;  // fp32 error bound of any gold sample
+  const Room& room;       // for what is made of the bricks
   const Progress& progress;
   Stopwatch& watch;
 };
+
+Room room_for(const opencl::State& state, const ProjectionSet& scan, const BuildOptions& options) {
+  const std::uint64_t share = state.memory.limit() / 8;
+  if (share == 0 && !options.in_memory_bytes) return {};
+  Room room{scan.data.scratch(), options.in_memory_bytes.value_or(share)};
+  if (!room.scratch)
+    room.scratch =
+        std::make_shared<Scratch>(options.scratch.empty() ? default_scratch_folder() : options.scratch,
+                                  std::max(share, least_resident));
+  return room;
+}
 
 // A closed and packed volume that was measured, node by node, to be within a tolerance.
 struct Measured {
@@ -100,7 +115,8 @@ GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const 
   return settings;
 }
 
-OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const Lattice& lattice) {
+OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const Lattice& lattice,
+                       const Room& room) {
   OpenBricks bricks;
   bricks.grid = plan.grid;
   bricks.granularity = plan.layout.granularity;
@@ -113,6 +129,7 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const L
   const auto count = at(Bricks(plan.grid, plan.layout.granularity).size());
   bricks.level.assign(count, LevelTriple{0, 0, 0});
   bricks.involved.assign(count, 0);
+  bricks.samples = TileStore(room);
   bricks.samples.resize(count);
   return bricks;
 }
@@ -194,9 +211,14 @@ std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks
   return raised;
 }
 
-std::uint64_t sample_bytes(const MixedVolume& volume) {
-  std::uint64_t bytes = volume.base.bytes();
-  for (const auto& [kind, block] : volume.tiles) bytes += block.bytes();
+// Of what lies in memory.
+std::uint64_t memory_bytes(const SampleBlock& block) {
+  const bool in_scratch = block.f32.scratch() || block.u16.scratch() || block.u8.scratch();
+  return in_scratch ? 0 : block.bytes();
+}
+std::uint64_t memory_bytes(const MixedVolume& volume) {
+  std::uint64_t bytes = memory_bytes(volume.base);
+  for (const auto& [kind, block] : volume.tiles) bytes += memory_bytes(block);
   return bytes;
 }
 
@@ -209,7 +231,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   MixedVolume before;
   HostMemory closed(in.state);
   std::uint64_t closed_bytes = 0;
-  CloseBoundaries close(bricks, in.plan.settings.comparison.closing);
+  CloseBoundaries close(bricks, in.plan.settings.comparison.closing, in.room);
   std::vector<std::uint8_t> raised;
   for (int round = 0;; ++round) {
     MixedVolume volume = round > 0 ? close.again(before, raised) : close.first();
@@ -220,10 +242,10 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
       pending[i] = bricks.involved[i] && changed[i] && (round > 0 || volume.level[i] != LevelTriple{0, 0, 0});
     before = {};  // only a repair compares with it
     closed.uncount(std::exchange(closed_bytes, 0));
-    closed.count(sample_bytes(volume), "the closed volume");
-    closed_bytes = sample_bytes(volume);
+    closed.count(memory_bytes(volume), "the closed volume");
+    closed_bytes = memory_bytes(volume);
     in.watch.lap("close");
-    const DeviceField field(in.state, volume);
+    const DeviceField field(in.state, volume, in.room.for_bytes(sample_buffer_bytes(volume)));
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
     in.watch.lap("verify");
     raised = raise_violating(in, test, bricks, tolerance);
@@ -247,7 +269,7 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
                          double tolerance) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
-  OpenBricks bricks = open_bricks(in.plan, base, lattice);
+  OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
   std::optional<ClassifyBricks> test;
   test.emplace(in.state, in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
@@ -390,7 +412,8 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const SamplerProbe probe = probe_filters(device);
   watch.lap("probe");
 
-  const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), progress, watch};
+  const Room room = room_for(state, scan, options);
+  const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), room, progress, watch};
   const double underflow = from_world(sampler_underflow(device.info()), units);
   const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
     return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold, underflow);

@@ -91,7 +91,7 @@ void ClassifyBricks::classify(const DeviceField& base, double tolerance,
   bounds_ = {};
   bricks_.level.assign(bricks_.level.size(), LevelTriple{0, 0, 0});
   bricks_.involved.assign(bricks_.level.size(), 0);
-  for (std::vector<float>& tile : bricks_.samples) tile = {};
+  bricks_.samples.clear();
   measures_.assign(bricks_.level.size(), {});
   along_.assign(bricks_.level.size(), {});
   coarse_slack_.assign(bricks_.level.size(), -1.0f);
@@ -268,21 +268,18 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
   const auto bricks = in.get_vector<std::int64_t>();
   const auto levels = in.get_vector<LevelTriple>();
   const auto samples = in.get_vector<float>();
-  auto next = samples.begin();
+  const float* next = samples.data();
+  const float* const end = next + samples.size();
   const MixedVolume shape = bricks_.shape();
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const std::int64_t size = shape.tile_size(levels.at(i));
-    if (size > samples.end() - next)
-      throw FileError("a journal record lacks samples; start without `resume`");
-    const auto end = next + size;
-    std::vector<float>& tile = bricks_.samples.at(at(bricks[i]));
-    const std::uint64_t more = 4 * static_cast<std::uint64_t>(size), less = 4 * tile.size();
-    host_.count(more, "the tiles before closing");
-    host_.uncount(less);
-    tile_bytes_ += more - less;
-    tile.assign(next, end);
-    next = end;
+    if (size > end - next) throw FileError("a journal record lacks samples; start without `resume`");
+    bricks_.samples.put(at(bricks[i]), std::span(next, next + size));
+    next += size;
   }
+  const std::uint64_t now = bricks_.samples.memory_bytes();
+  host_.count(now - tile_bytes_, "the tiles before closing");
+  tile_bytes_ = now;
   return bricks;
 }
 

@@ -90,7 +90,6 @@ class ClassifyBricks {
   /// By brick; of those refined, with levels per axis.
   [[nodiscard]] const std::vector<AxisErrors>& along() const { return along_; }
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
-  [[nodiscard]] std::uint64_t tile_bytes() const { return tile_bytes_; }
   /// Whether a brick is measured on coarse gold first.
   [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
@@ -136,7 +135,7 @@ class ClassifyBricks {
   std::vector<AxisErrors> along_;
   std::vector<float> coarse_slack_;  // by brick; negative: not known
   Bounds bounds_;
-  std::uint64_t tile_bytes_ = 0;  // of bricks_.samples
+  std::uint64_t tile_bytes_ = 0;  // counted of bricks_.samples
 };
 
 }  // namespace vdvr

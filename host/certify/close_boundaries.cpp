@@ -50,9 +50,10 @@ void copy_tile(const StoredTile& from, std::size_t size, SampleBlock& to, std::s
 
 }  // namespace
 
-CloseBoundaries::CloseBoundaries(const OpenBricks& b, Closing closing)
+CloseBoundaries::CloseBoundaries(const OpenBricks& b, Closing closing, Room room)
     : open_(b),
       closing_(closing),
+      room_(std::move(room)),
       stored_{b, b.level, {}, base_limits(b.base, b.lattice)},
       rim_(b.level.size(), 0) {
   if (closing == Closing::none) return;
@@ -110,8 +111,15 @@ MixedVolume CloseBoundaries::volume(const MixedVolume* before) {
 // The narrowest type of a triple comes first.
 void CloseBoundaries::number_tiles(MixedVolume& v) const {
   std::map<LevelTriple, std::array<std::uint32_t, 3>> counts;
+  std::uint64_t bytes = 0;
+  constexpr std::array<std::uint64_t, 3> bytes_of{sizeof(float), sizeof(std::uint16_t), sizeof(std::uint8_t)};
   for (std::size_t i = 0; i < v.level.size(); ++i)
-    if (v.level[i] != in_base) ++counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])];
+    if (v.level[i] != in_base) {
+      ++counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])];
+      bytes +=
+          bytes_of[static_cast<std::size_t>(type_[i])] * static_cast<std::uint64_t>(v.tile_size(v.level[i]));
+    }
+  const std::shared_ptr<Scratch> scratch = room_.for_bytes(bytes);
   for (auto& [triple, of_type] : counts) {
     TileKind kind(triple);
     std::uint32_t next = 0;
@@ -119,8 +127,8 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
       const std::uint32_t n = std::exchange(of_type[t], next);
       next += n;
       if (n == 0) continue;
-      v.tiles[kind] =
-          empty_block(static_cast<SampleType>(2 - t), n, static_cast<std::uint64_t>(v.tile_size(triple)));
+      v.tiles[kind] = empty_block(static_cast<SampleType>(2 - t), n,
+                                  static_cast<std::uint64_t>(v.tile_size(triple)), scratch);
       ++kind.part;
     }
   }
@@ -131,7 +139,8 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
 std::vector<float> CloseBoundaries::tile_of(std::int64_t brick) const {
   if (closing_ == Closing::coarse) return tile_by_coarse(stored_, brick);
   if (closing_ == Closing::paper) return tile_by_paper(stored_, brick);
-  return open_.samples[at(brick)];
+  const std::span<const float> own = open_.samples[at(brick)];
+  return {own.begin(), own.end()};
 }
 
 void CloseBoundaries::for_each_tile(const std::function<void(std::int64_t)>& visit) const {

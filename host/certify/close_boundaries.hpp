@@ -31,8 +31,8 @@ MixedVolume close_boundaries(const OpenBricks& bricks, Closing closing = Closing
 /// stays as it is. Memory: some 12 bytes a brick.
 class CloseBoundaries {
  public:
-  /// `bricks` is referred to.
-  CloseBoundaries(const OpenBricks& bricks, Closing closing);
+  /// `bricks` is referred to. `room`: for the tiles of a volume.
+  CloseBoundaries(const OpenBricks& bricks, Closing closing, Room room = {});
 
   MixedVolume first();
   /// `before`: what the last call gave. `moved`: bricks whose level or samples changed since.
@@ -62,6 +62,7 @@ class CloseBoundaries {
 
   const OpenBricks& open_;
   Closing closing_;
+  Room room_;
   StoredAs stored_;
   std::vector<SampleType> type_;  // by brick; of those that have tiles
   std::vector<std::int8_t> shift_;

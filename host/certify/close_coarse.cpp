@@ -59,10 +59,11 @@ class Closer {
     const TileView owner(stored_.open, owner_, level);
     Index3 step{};
     for (std::size_t a = 0; a < 3; ++a) step[a] = std::int64_t{1} << (own_.level[a] - lowest_[a]);
+    const bool in_base = level == LevelTriple{0, 0, 0};
     entity_.for_each(own_, step, [&](const Index3& i) {
       const Index3 o = entity_.index_in(owner, own_, i);
-      float v = level == LevelTriple{0, 0, 0} ? base_sample(stored_.open, owner, o)
-                                              : stored_.open.samples[at(owner_)][owner.index(o)];
+      float v =
+          in_base ? base_sample(stored_.open, owner, o) : stored_.open.samples[at(owner_)][owner.index(o)];
       // The base will hold this value for the bricks that take no part.
       if (entity_.has_outsiders() && is_on_base(i))
         v = std::clamp(v, stored_.base_limits.first, stored_.base_limits.second);
@@ -125,7 +126,8 @@ class Closer {
 }  // namespace
 
 std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick) {
-  std::vector<float> tile = stored.open.samples[at(brick)];
+  const std::span<const float> own_samples = stored.open.samples[at(brick)];
+  std::vector<float> tile(own_samples.begin(), own_samples.end());
   const Surroundings around(stored.open, brick);
   const TileView own(stored.open, around.position, stored.level[at(brick)]);
   for_each_part([&](const std::array<int, 3>& side) { Closer(stored, around, own, side, tile); });

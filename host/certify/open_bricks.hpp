@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/certify/tile_store.hpp"
 #include "host/volume/quantise.hpp"
 #include "vdvr/mixed_volume.hpp"
 
@@ -20,11 +21,11 @@ struct OpenBricks {
   Grid grid;
   int granularity = 4;
   int rate = 8;
-  LevelTriple coarsening{};                 ///< as in MixedVolume
-  std::vector<float> base;                  ///< as in MixedVolume, on the lattice
-  std::vector<LevelTriple> level;           ///< [bz][by][bx]; 0 where a brick takes no part
-  std::vector<std::uint8_t> involved;       ///< [bz][by][bx]
-  std::vector<std::vector<float>> samples;  ///< per brick: its tile at its level; empty at level 0
+  LevelTriple coarsening{};            ///< as in MixedVolume
+  std::vector<float> base;             ///< as in MixedVolume, on the lattice
+  std::vector<LevelTriple> level;      ///< [bz][by][bx]; 0 where a brick takes no part
+  std::vector<std::uint8_t> involved;  ///< [bz][by][bx]
+  TileStore samples;                   ///< per brick: its tile at its level; empty at level 0
   Lattice lattice;
   bool sampled = true;  ///< the samples are gold itself, whatever the level
 

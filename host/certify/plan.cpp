@@ -285,6 +285,14 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Before closing, closed, and on the device: build puts what takes more than an eighth of the limit into
+// scratch.
+std::uint64_t memory_of_tiles(std::uint64_t tiles, std::uint64_t limit, bool on_gpu) {
+  const std::uint64_t eighth = limit / 8;
+  if (limit == 0 || tiles <= eighth) return 3 * tiles;
+  return 2 * eighth + (on_gpu ? tiles : 0);
+}
+
 // One plan, step by step. All but the scan, and what is thrown, in `units`.
 class Planner {
  public:
@@ -482,9 +490,11 @@ class Planner {
                         scan = scan_bytes_ + prepared_->filtered.samples.resident_bytes(),
                         held = scan + 2 * base + kept.bytes(), peak = state_.memory.peak();
     plan_.memory_of_rows = kept.bytes() + foreseen.kept_bytes;
-    plan_.memory_of_cells = 3 * (foreseen.tile_bytes + base);
-    plan_.memory_bytes =
-        scan + plan_.memory_of_rows + plan_.memory_of_cells + (peak > held ? peak - held : 0);
+    plan_.memory_of_cells = 3 * base;
+    plan_.tile_bytes = foreseen.tile_bytes;
+    plan_.memory_bytes = scan + plan_.memory_of_rows + plan_.memory_of_cells +
+                         memory_of_tiles(plan_.tile_bytes, state_.memory.limit(), state_.info.is_gpu) +
+                         (peak > held ? peak - held : 0);
   }
 
   Device& device_;
@@ -510,7 +520,7 @@ constexpr std::int64_t most_samples_planned = std::int64_t{8} << 20;
 
 // The plan of a window of rows, for the whole scan.
 Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, const Grid& grid,
-                 bool on_gpu) {
+                 std::uint64_t limit, bool on_gpu) {
   const ParallelGeometry& g = scan.geometry;
   plan.estimated = true;
   plan.prepared = nullptr;
@@ -524,11 +534,14 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   plan.seconds = plan.seconds_of_rows * all_rows + (plan.seconds - plan.seconds_of_rows) * all_cells;
   plan.seconds_of_rows *= all_rows;
   const bool kept_in_scratch = scan.data.scratch() && !on_gpu;
-  plan.memory_bytes -= plan.memory_of_rows + plan.memory_of_cells;
+  const auto of_tiles = [&] { return memory_of_tiles(plan.tile_bytes, limit, on_gpu); };
+  plan.memory_bytes -= plan.memory_of_rows + plan.memory_of_cells + of_tiles();
   plan.memory_of_rows =
       kept_in_scratch ? 0 : static_cast<std::uint64_t>(static_cast<double>(plan.memory_of_rows) * all_rows);
   plan.memory_of_cells = static_cast<std::uint64_t>(static_cast<double>(plan.memory_of_cells) * all_cells);
-  plan.memory_bytes += plan.memory_of_rows + plan.memory_of_cells + 2 * scan.data.resident_bytes();
+  plan.tile_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.tile_bytes) * all_cells);
+  plan.memory_bytes +=
+      plan.memory_of_rows + plan.memory_of_cells + of_tiles() + 2 * scan.data.resident_bytes();
   plan.grid = grid;
   plan.gold_samples = 1;
   for (const std::int64_t cells : grid.cells)
@@ -550,7 +563,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
     if (const auto window = row_window(scan, grid, most_samples_planned))
       return of_all_rows(
           make_plan(device, window->scan, window->grid, field, rates, tolerance, settings, progress), *window,
-          scan, grid, device.info().is_gpu);
+          scan, grid, device.state().memory.limit(), device.info().is_gpu);
   check_rates(rates);
   check_granularity(settings.granularity);
   check_tolerance(tolerance);

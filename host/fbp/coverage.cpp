@@ -12,6 +12,11 @@
 #include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
+namespace {
+
+constexpr std::int64_t sectors = 1024;
+
+}  // namespace
 
 Coverage::Coverage(const ParallelGeometry& g)
     : t_min_((-0.5 - g.center) * g.pitch_u),
@@ -28,6 +33,15 @@ Coverage::Coverage(const ParallelGeometry& g)
     cosine_.push_back(std::cos(theta));
     sine_.push_back(std::sin(theta));
   }
+  for (std::int64_t i = 0; i < sectors; ++i) {
+    const double phi = 2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(sectors),
+                 x = std::cos(phi), y = std::sin(phi);
+    const auto along = [&](std::size_t k) { return std::abs(x * cosine_[k] + y * sine_[k]); };
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < cosine_.size(); ++k)
+      if (along(k) > along(best)) best = k;
+    nearest_.push_back(best);
+  }
 }
 
 double Coverage::margin(double x, double y) const {
@@ -39,6 +53,16 @@ double Coverage::margin(double x, double y) const {
     margin = std::min(margin, std::min(t - t_min_, t_max_ - t));
   }
   return margin + slack_;
+}
+
+double Coverage::margin_above(double x, double y, double floor) const {
+  if (std::hypot(x, y) > inner_) {
+    const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 1;
+    const std::size_t k = nearest_[static_cast<std::size_t>(turn * sectors) % sectors];
+    const double t = x * cosine_[k] + y * sine_[k], far = std::min(t - t_min_, t_max_ - t) + slack_;
+    if (far < floor) return far;
+  }
+  return margin(x, y);
 }
 
 double Coverage::margin_z(double z) const { return half_height_ - std::abs(z) + slack_z_; }

@@ -17,6 +17,9 @@ class Coverage {
 
   /// Distance-like margin across z: >= 0 inside; outside, minus a lower bound of the distance to the region.
   [[nodiscard]] double margin(double x, double y) const;
+  /// The same where it is at least `floor`; where not, something below `floor`. Cost: far outside, that of
+  /// one view, where margin() looks at all.
+  [[nodiscard]] double margin_above(double x, double y, double floor) const;
   /// The same along z.
   [[nodiscard]] double margin_z(double z) const;
   [[nodiscard]] double inner_radius() const { return inner_; }
@@ -24,6 +27,7 @@ class Coverage {
 
  private:
   std::vector<double> cosine_, sine_;
+  std::vector<std::size_t> nearest_;  // by sectors of directions: the view that looks along the middle best
   double t_min_, t_max_, inner_, half_height_, slack_, slack_z_;
 };
 

@@ -53,9 +53,8 @@ double cosine_sum(const double* a, std::int64_t n, double x) {
 // n zeros, in memory or in scratch.
 std::shared_ptr<double[]> zeros(std::size_t n, const std::shared_ptr<Scratch>& scratch) {
   if (!scratch) return std::make_shared<double[]>(n);
-  const std::span<float> mapped = scratch->map(2 * n, "the cosine coefficients");
-  void* pages = mapped.data();
-  return {static_cast<double*>(pages), [scratch, mapped](double*) { scratch->unmap(mapped); }};
+  return {scratch->map<double>(n, "the cosine coefficients").data(),
+          [scratch](double* first) { scratch->unmap(first); }};
 }
 
 }  // namespace

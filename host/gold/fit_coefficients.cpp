@@ -203,8 +203,9 @@ void LatticeFit::fit_at_twice(const opencl::DeviceArray<float>& gold,
   grow(state_, here_, columns * stride, "samples before a step");
   grow(state_, there_, columns * stride, "samples after a step");
   const cl_int along = to_int(static_cast<std::int64_t>(stride));
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_int, cl_float> targets(
-      state_, "gold/fit_at_twice", "take_targets", defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_int,
+                 cl_float>
+      targets(state_, "gold/fit_at_twice", "take_targets", defines);
   opencl::Kernel<cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice, cl_int> take(
       state_, "gold/fit_at_twice", "take_samples", defines),
       give(state_, "gold/fit_at_twice", "give_samples", defines);
@@ -212,13 +213,13 @@ void LatticeFit::fit_at_twice(const opencl::DeviceArray<float>& gold,
                  cl_int, cl_int, cl_float>
       fit_step(state_, "gold/fit_at_twice", "fit_step", defines);
   const opencl::Range samples{{count(l.cz), count(l.cx), rows}, {16, 4, 1}};
-  targets({{count(l.cz), wide, deep}, {16, 4, 1}}, targets_.buffer(), gold.buffer(), margin.buffer(), blocks,
-          l, along, curvature);
+  const std::uint64_t vectors = (count(l.cz) + count(lanes) - 1) / count(lanes);
+  targets({{vectors, wide, deep}, {1, 16, 1}}, targets_.buffer(), gold.buffer(), margin.buffer(),
+          last_.buffer(), blocks, l, along, curvature);
   take(samples, here_.buffer(), gold.buffer(), blocks, l, along);
   for (int step = 0; step < steps; ++step) {
-    fit_step({{(count(l.cz) + count(lanes) - 1) / count(lanes), count(l.cx), rows}, {1, 4, 4}},
-             there_.buffer(), here_.buffer(), targets_.buffer(), margin.buffer(), last_.buffer(), blocks, l,
-             along, step, share);
+    fit_step({{vectors, count(l.cx), rows}, {1, 4, 4}}, there_.buffer(), here_.buffer(), targets_.buffer(),
+             margin.buffer(), last_.buffer(), blocks, l, along, step, share);
     std::swap(here_, there_);
   }
   give(samples, level_.samples.buffer(), here_.buffer(), blocks, l, along);

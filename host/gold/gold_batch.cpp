@@ -262,36 +262,42 @@ struct GoldBatch::Candidate {
   TripleSearch::Brick search;
 };
 
-// Round by round: every brick names its next level, and bricks that name the same are tested together.
+// Every brick names its next level, and all that name the cheapest of these are tested together. What a brick
+// names next is seldom cheaper: most levels are fitted once.
 void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search, float tolerance) {
-  while (!candidates.empty()) {
-    std::map<LevelTriple, std::vector<Candidate>> by_level;
-    for (Candidate& c : candidates)
-      if (const auto level = search.next(c.search, tolerance)) by_level[*level].push_back(std::move(c));
-    candidates.clear();
-    for (auto& [level, group] : by_level) {
-      std::vector<std::int64_t> bricks, passed;
-      for (const Candidate& c : group) bricks.push_back(c.result->base.brick);
-      const std::vector<float> errors = errors_at(level, bricks);
-      std::vector<BrickClass*> results;
-      for (std::size_t i = 0; i < group.size(); ++i) {
-        if (!(errors[i] <= tolerance)) continue;
-        passed.push_back(bricks[i]);
-        results.push_back(group[i].result);
-      }
-      give_tiles(results, copy_tiles(level, passed, &fit_.last()));
-      for (std::size_t i = 0; i < group.size(); ++i) {
-        BrickClass& result = *group[i].result;
-        const float total =
-            errors[i] + rounding_share * static_cast<float>(rounding_of(result.tile, settings_.lattice));
-        if (total <= tolerance) {
-          result.level = level;
-          result.passes = true;
-        } else {
-          result.tile.clear();
-          search.fail(group[i].search, level, total);
-          candidates.push_back(std::move(group[i]));
-        }
+  std::map<std::size_t, std::pair<LevelTriple, std::vector<Candidate>>> by_rank;
+  const auto ask = [&](Candidate&& c) {
+    if (const auto level = search.next(c.search, tolerance)) {
+      auto& [named, group] = by_rank[search.rank(*level)];
+      named = *level;
+      group.push_back(std::move(c));
+    }
+  };
+  for (Candidate& c : candidates) ask(std::move(c));
+  while (!by_rank.empty()) {
+    auto [level, group] = std::move(by_rank.begin()->second);
+    by_rank.erase(by_rank.begin());
+    std::vector<std::int64_t> bricks, passed;
+    for (const Candidate& c : group) bricks.push_back(c.result->base.brick);
+    const std::vector<float> errors = errors_at(level, bricks);
+    std::vector<BrickClass*> results;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      if (!(errors[i] <= tolerance)) continue;
+      passed.push_back(bricks[i]);
+      results.push_back(group[i].result);
+    }
+    give_tiles(results, copy_tiles(level, passed, &fit_.last()));
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      BrickClass& result = *group[i].result;
+      const float total =
+          errors[i] + rounding_share * static_cast<float>(rounding_of(result.tile, settings_.lattice));
+      if (total <= tolerance) {
+        result.level = level;
+        result.passes = true;
+      } else {
+        result.tile.clear();
+        search.fail(group[i].search, level, total);
+        ask(std::move(group[i]));
       }
     }
   }

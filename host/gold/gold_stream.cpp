@@ -208,6 +208,9 @@ std::vector<float> GoldStream::margins(const std::vector<std::array<std::int64_t
   const Grid& grid = settings_.grid;
   const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
   std::vector<float> out(first_brick.size() * at(nx * ny));
+  // Nobody asks for less than what is kept, or than a cell's diagonal.
+  const double floor =
+      -2 * std::max({settings_.kept(), kept_margin(grid, 1), std::hypot(grid.spacing[0], grid.spacing[1])});
   const auto is_inside = [&](std::int64_t node, std::size_t a) {
     return node >= 0 && node <= grid.cells[a] * settings_.rate;
   };
@@ -219,9 +222,10 @@ std::vector<float> GoldStream::margins(const std::vector<std::array<std::int64_t
     const std::int64_t y = first[1] * side - halo_ + row % ny;
     for (std::int64_t i = 0; i < nx; ++i) {
       const std::int64_t x = first[0] * side - halo_ + i;
-      out[at(row * nx + i)] = is_inside(x, 0) && is_inside(y, 1)
-                                  ? static_cast<float>(coverage_.margin(place(x, 0), place(y, 1)))
-                                  : beyond_grid;
+      out[at(row * nx + i)] =
+          is_inside(x, 0) && is_inside(y, 1)
+              ? static_cast<float>(coverage_.margin_above(place(x, 0), place(y, 1), floor))
+              : beyond_grid;
     }
   });
   return out;

@@ -33,27 +33,31 @@ constexpr double difference_norm = 16;
 BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
                                const FieldSups& sups, const Grid& grid, int granularity)
     : state_(state), kept_(kept), coverage_(scan.geometry), grid_(grid), granularity_(granularity) {
+  // A quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times as large. But
+  // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
+  if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};
+  for (std::size_t a = 0; a < 3; ++a) rates_[a] = kept.rates()[a] * nodes_.phases[a];
   const ParallelGeometry& g = scan.geometry;
   bricks_ = Bricks(grid, granularity).along();
   Vec3 spacing{};
   std::array<RemainderNorms, 3> norms;
   Index3 stencil{};
   for (std::size_t a = 0; a < 3; ++a) {
-    spacing[a] = grid.spacing[a] / static_cast<double>(kept.rates()[a]);
+    spacing[a] = grid.spacing[a] / static_cast<double>(rates_[a]);
     const double pitch = a == 2 ? g.pitch_v : g.pitch_u;
     norms[a] = a == 1 && spacing[1] == spacing[0]
                    ? norms[0]
                    : remainder_norms(std::min(pi / 2, pi * spacing[a] / pitch));
     // The stencil of a point one step of gold, at 2x or finer, outside the brick.
-    const std::int64_t side = granularity * kept.rates()[a];
-    stencil[a] = norms[a].taps / 2 + std::max<std::int64_t>(1, kept.rates()[a] / 2);
+    const std::int64_t side = granularity * rates_[a];
+    stencil[a] = norms[a].taps / 2 + std::max<std::int64_t>(1, rates_[a] / 2);
     rings_[a] = (stencil[a] + side - 1) / side;
   }
   const Index3 all{bricks_[0] + 2 * rings_[0], bricks_[1] + 2 * rings_[1], bricks_[2] + 2 * rings_[2]};
   maxima_.resize(at(all[0] * all[1] * all[2]));
   looked_at_.resize(maxima_.size());
 
-  const GoldErrors errors = kept.errors({});
+  const GoldErrors errors = kept.errors(nodes_);
   const double node = errors.interpolation + errors.rounding;
   const double slack = difference_norm * node + difference_rounding * unit_roundoff * sups.value;
   const std::array<std::array<std::size_t, 3>, 6> axes{
@@ -110,7 +114,7 @@ void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Pr
         blocks.emplace_back(first, size);
         boxes.push_back(box_of(first, size));
       }
-  kept_.prepare({}, boxes, progress);
+  kept_.prepare(nodes_, boxes, progress);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     look_at(blocks[i].first, blocks[i].second);
     report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
@@ -120,7 +124,7 @@ void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Pr
 GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const {
   GoldBox box;
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::int64_t side = granularity_ * kept_.rates()[a];
+    const std::int64_t side = granularity_ * rates_[a];
     box.first[a] = first[a] * side - reach;
     box.nodes[a] = bricks[a] * side + 1 + 2 * reach;
   }
@@ -131,23 +135,24 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
   const GoldBox box = box_of(first, bricks);
   // Room for eight lanes that begin at the last node of the last brick.
   const std::int64_t stride = column_stride(box.nodes[2] + 8);
-  opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "kept gold of bricks");
+  opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "gold of bricks");
   gold.fill(0.0f);
-  kept_.fill({}, box, gold, 0, stride);
+  kept_.fill(nodes_, box, gold, 0, stride);
   std::vector<float> margins;
   for (std::int64_t y = 0; y < box.nodes[1]; ++y)
     for (std::int64_t x = 0; x < box.nodes[0]; ++x)
       margins.push_back(static_cast<float>(
-          coverage_.margin(grid_.origin[0] + static_cast<double>(box.first[0] + x) * grid_.spacing[0] /
-                                                 static_cast<double>(kept_.rates()[0]),
-                           grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
-                                                 static_cast<double>(kept_.rates()[1]))));
+          coverage_.margin_above(grid_.origin[0] + static_cast<double>(box.first[0] + x) * grid_.spacing[0] /
+                                                       static_cast<double>(rates_[0]),
+                                 grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
+                                                       static_cast<double>(rates_[1]),
+                                 2 * lowest_)));
   const opencl::DeviceArray<float> margin(state_, std::span<const float>(margins), "coverage margins");
   const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
                                        "fourth differences");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(
       state_, "kept/fourth_differences", "fourth_differences");
-  const auto side = [&](std::size_t a) { return to_int(granularity_ * kept_.rates()[a]); };
+  const auto side = [&](std::size_t a) { return to_int(granularity_ * rates_[a]); };
   kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
          margin.buffer(),
          VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
@@ -169,9 +174,9 @@ float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
     for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
       for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x)
         for (std::size_t d = 0; d < 6; ++d) largest[d] = std::max(largest[d], maxima_[slot({x, y, z})][d]);
-  std::array<double, 3> square{};  // of gold's spacing over that of kept nodes
+  std::array<double, 3> square{};  // of gold's spacing over that of the nodes
   for (std::size_t a = 0; a < 3; ++a)
-    square[a] = std::pow(static_cast<double>(lattice.step[a]) / lattice.phases[a], 2);
+    square[a] = std::pow(static_cast<double>(lattice.step[a]) * nodes_.phases[a] / lattice.phases[a], 2);
   const auto sup = [&](std::size_t d) {
     return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) +
            static_cast<double>(addend_[d]);

@@ -1,5 +1,5 @@
-// What T leaves out, brick by brick, from fourth differences of kept gold (docs/error-bounds.md, section 5).
-// Called by gold_stream.cpp.
+// What T leaves out, brick by brick, from fourth differences of gold at twice the rate of kept nodes
+// (docs/error-bounds.md, section 5). Called by gold_stream.cpp.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ class BrickRemainder {
                  const Grid& grid, int granularity);
 
   /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as
-  /// nobody has. Cost: kept gold once more along z, and six differences a node.
+  /// nobody has. Cost: gold at twice the rate of kept nodes, and six differences a node.
   void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
 
   /// Of cells of gold on `lattice` in a brick that was required.
@@ -38,6 +38,8 @@ class BrickRemainder {
   Coverage coverage_;
   Grid grid_;
   int granularity_;
+  GoldLattice nodes_;                    // at which differences are taken
+  Index3 rates_{};                       // nodes to a cell
   Index3 bricks_{}, rings_{};            // of the grid, and of bricks around it
   std::vector<Maxima> maxima_;           // with the rings
   std::vector<std::uint8_t> looked_at_;  // alike

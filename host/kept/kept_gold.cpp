@@ -266,8 +266,8 @@ std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& bl
     for (std::int64_t y = 0; y < side; ++y) {
       std::array<std::int32_t, 2> row{to_int(side), -1};
       for (std::int64_t x = 0; x < side; ++x)
-        if (coverage_.margin(x0 + static_cast<double>(x) * spacing_[0],
-                             y0 + static_cast<double>(y) * spacing_[1]) >= -reach_) {
+        if (coverage_.margin_above(x0 + static_cast<double>(x) * spacing_[0],
+                                   y0 + static_cast<double>(y) * spacing_[1], -reach_) >= -reach_) {
           row[0] = std::min(row[0], to_int(x));
           row[1] = to_int(x);
         }

@@ -53,6 +53,8 @@ class KeptGold {
 
   /// Kept nodes to a cell of the grid, by axis: powers of two, so that their spacing is at most half a pixel.
   [[nodiscard]] const Index3& rates() const { return rates_; }
+  /// In u.
+  [[nodiscard]] Interpolation interpolation() const { return interpolation_; }
   /// Of gold at `rate` of a grid with the same origin whose cells are powers of two of this one's. Throws
   /// std::logic_error where they are not.
   [[nodiscard]] GoldLattice lattice(const Grid& grid, int rate) const;

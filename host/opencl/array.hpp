@@ -7,7 +7,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -45,11 +44,10 @@ class DeviceArray {
       *this = DeviceArray(state, count, what);
       return;
     }
-    static_assert(std::is_same_v<T, float>);
     count_ = count;
     what_ = what;
-    const std::span<float> mapped = scratch->map(static_cast<std::size_t>(count), what);
-    pages_ = {mapped.data(), [scratch, mapped](void*) { scratch->unmap(mapped); }};
+    const std::span<T> mapped = scratch->map<T>(static_cast<std::size_t>(count), what);
+    pages_ = {mapped.data(), [scratch](void* first) { scratch->unmap(first); }};
     state_ = &state;
     guard("map", [&] {
       buffer_ =

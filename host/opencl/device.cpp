@@ -69,6 +69,11 @@ std::uint64_t MemoryAccount::left() const {
   return room();
 }
 
+std::uint64_t MemoryAccount::limit() const {
+  const std::lock_guard guard(lock_);
+  return limit_;
+}
+
 cl::Buffer BufferPool::take(std::uint64_t bytes) {
   const auto found = buffers_.find(bytes);
   if (found == buffers_.end()) return {};

@@ -26,6 +26,8 @@ class MemoryAccount {
   void give(std::uint64_t bytes) noexcept;
   [[nodiscard]] std::uint64_t peak() const;
   [[nodiscard]] std::uint64_t left() const;
+  /// 0: none.
+  [[nodiscard]] std::uint64_t limit() const;
 
  private:
   [[nodiscard]] std::uint64_t room() const { return limit_ > used_ ? limit_ - used_ : 0; }

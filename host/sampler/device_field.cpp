@@ -14,11 +14,12 @@ std::uint64_t highest_place(const MixedVolume& v) {
   return sample_buffer_bytes(v) / smallest;
 }
 
-DeviceField::DeviceField(opencl::State& state, const MixedVolume& v)
-    : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v))) {}
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const std::shared_ptr<Scratch>& scratch)
+    : DeviceField(state, v, PackedRecords(v, tile_offsets(v), record_kind(v)), scratch) {}
 
-DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records)
-    : samples(state, sample_buffer_bytes(v), "certified samples"),
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records,
+                         const std::shared_ptr<Scratch>& scratch)
+    : samples(state, state.info.is_gpu ? nullptr : scratch, sample_buffer_bytes(v), "certified samples"),
       bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
       grid(sampler_grid(v)),
       defines(field_defines(v, records.kind())),

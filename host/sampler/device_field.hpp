@@ -3,6 +3,8 @@
 // mixed_sampler.h.
 #pragma once
 
+#include <memory>
+
 #include "host/opencl/array.hpp"
 #include "host/volume/brick_layout.hpp"
 
@@ -16,8 +18,11 @@ opencl::Defines field_defines(const MixedVolume& volume, RecordKind records);
 std::uint64_t highest_place(const MixedVolume& volume);
 
 struct DeviceField {
-  DeviceField(opencl::State& state, const MixedVolume& volume);
-  DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records);
+  /// In `scratch`, where that is given and the device computes in the host's memory.
+  DeviceField(opencl::State& state, const MixedVolume& volume,
+              const std::shared_ptr<Scratch>& scratch = nullptr);
+  DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records,
+              const std::shared_ptr<Scratch>& scratch = nullptr);
   opencl::DeviceArray<std::uint8_t> samples;  ///< host/volume/brick_layout.hpp
   opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
   VdvrGrid grid;

@@ -5,53 +5,68 @@
 
 namespace vdvr {
 
-SampleArray::SampleArray(std::size_t n, std::shared_ptr<Scratch> scratch, const std::string& what)
+template <class T>
+Samples<T>::Samples(std::size_t n, std::shared_ptr<Scratch> scratch, const std::string& what)
     : scratch_(std::move(scratch)), size_(n) {
   if (scratch_) {
-    data_ = scratch_->map(n, what).data();
+    data_ = scratch_->map<T>(n, what).data();
     return;
   }
   memory_.resize(n);
   data_ = memory_.data();
 }
 
-SampleArray::SampleArray(std::vector<float> values)
+template <class T>
+Samples<T>::Samples(std::vector<T> values)
     : memory_(std::move(values)), data_(memory_.data()), size_(memory_.size()) {}
 
-SampleArray::SampleArray(const SampleArray& other) : SampleArray(other.size_, other.scratch_, "a copy") {
+template <class T>
+Samples<T>::Samples(const Samples& other) : Samples(other.size_, other.scratch_, "a copy") {
   std::copy(other.begin(), other.end(), begin());
 }
 
-SampleArray::SampleArray(SampleArray&& other) noexcept { swap(other); }
+template <class T>
+Samples<T>::Samples(Samples&& other) noexcept {
+  swap(other);
+}
 
-SampleArray& SampleArray::operator=(SampleArray other) noexcept {
+template <class T>
+Samples<T>& Samples<T>::operator=(Samples other) noexcept {
   swap(other);
   return *this;
 }
 
-SampleArray::~SampleArray() {
-  if (scratch_) scratch_->unmap({data_, size_});
+template <class T>
+Samples<T>::~Samples() {
+  if (scratch_) scratch_->unmap(data_);
 }
 
-void SampleArray::swap(SampleArray& other) noexcept {
+template <class T>
+void Samples<T>::swap(Samples& other) noexcept {
   memory_.swap(other.memory_);  // keeps the places of both
   scratch_.swap(other.scratch_);
   std::swap(data_, other.data_);
   std::swap(size_, other.size_);
 }
 
-void SampleArray::resize(std::size_t n) {
+template <class T>
+void Samples<T>::resize(std::size_t n) {
   if (scratch_) {
-    *this = SampleArray(std::vector<float>(begin(), begin() + std::min(n, size_)));
+    *this = Samples(std::vector<T>(begin(), begin() + std::min(n, size_)));
   }
   memory_.resize(n);
   data_ = memory_.data();
   size_ = n;
 }
 
-std::uint64_t SampleArray::resident_bytes() const {
-  const std::uint64_t all = sizeof(float) * static_cast<std::uint64_t>(size_);
+template <class T>
+std::uint64_t Samples<T>::resident_bytes() const {
+  const std::uint64_t all = sizeof(T) * static_cast<std::uint64_t>(size_);
   return scratch_ ? std::min(all, scratch_->resident_bytes()) : all;
 }
+
+template class Samples<float>;
+template class Samples<std::uint16_t>;
+template class Samples<std::uint8_t>;
 
 }  // namespace vdvr

@@ -119,9 +119,8 @@ class Scratch::Keeper {
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  std::span<float> map(std::size_t n, const std::string& what) {
-    if (n == 0) return {};
-    const std::uint64_t bytes = std::uint64_t{n} * sizeof(float);
+  void* map(std::uint64_t bytes, const std::string& what) {
+    if (bytes == 0) return nullptr;
     std::string name = (folder_ / ".vdvr-scratch.XXXXXX").string();
     const File file(::mkostemp(name.data(), O_CLOEXEC));
     if (file.fd() < 0) refuse(folder_, what, std::strerror(errno));
@@ -136,14 +135,14 @@ class Scratch::Keeper {
     peak_ = std::max(peak_, sum_);
     if (!thread_.joinable()) thread_ = std::thread([this] { keep(); });
     wake_.notify_all();
-    return {static_cast<float*>(at), n};
+    return at;
   }
 
-  void unmap(void* at) noexcept {
+  void unmap(const void* at) noexcept {
     const std::lock_guard guard(lock_);
-    const auto found = mapped_.find(at);
+    const auto found = mapped_.find(const_cast<void*>(at));  // NOLINT: a key, nothing is written
     if (found == mapped_.end()) return;
-    ::munmap(at, found->second);
+    ::munmap(found->first, found->second);
     sum_ -= found->second;
     mapped_.erase(found);
   }
@@ -190,8 +189,8 @@ Scratch::Scratch(fs::path folder, std::uint64_t resident_bytes)
     : keeper_(std::make_unique<Keeper>(std::move(folder), resident_bytes)) {}
 Scratch::~Scratch() = default;
 
-std::span<float> Scratch::map(std::size_t n, const std::string& what) { return keeper_->map(n, what); }
-void Scratch::unmap(std::span<float> values) noexcept { keeper_->unmap(values.data()); }
+void* Scratch::map_bytes(std::uint64_t bytes, const std::string& what) { return keeper_->map(bytes, what); }
+void Scratch::unmap(const void* first) noexcept { keeper_->unmap(first); }
 std::uint64_t Scratch::resident_bytes() const { return keeper_->resident(); }
 std::uint64_t Scratch::peak_bytes() const { return keeper_->peak(); }
 

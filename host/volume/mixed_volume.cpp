@@ -18,7 +18,7 @@ namespace {
 constexpr LevelTriple in_base{0, 0, 0};
 
 template <class T>
-void decode(const std::vector<T>& stored, const SampleBlock& b, double step, std::vector<float>& out) {
+void decode(const Samples<T>& stored, const SampleBlock& b, double step, std::vector<float>& out) {
   const std::size_t per_tile = b.offset.empty() ? 1 : stored.size() / b.offset.size();
   for (std::size_t i = 0; i < stored.size(); ++i) {
     const std::size_t tile = i / per_tile;
@@ -34,7 +34,7 @@ const char* text_of(SampleType type) {
 }
 
 std::vector<float> decoded(const SampleBlock& b, double step) {
-  if (b.type == SampleType::f32) return b.f32;
+  if (b.type == SampleType::f32) return {b.f32.begin(), b.f32.end()};
   std::vector<float> out;
   out.reserve(b.size());
   if (b.type == SampleType::u16) decode(b.u16, b, step, out);

@@ -88,15 +88,17 @@ double rounding_of(std::span<const float> tile, const Lattice& lattice) {
   return 0;
 }
 
-SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size) {
+SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size,
+                        const std::shared_ptr<Scratch>& scratch) {
   SampleBlock b;
   b.type = type;
+  const auto make = [&](auto& samples) { samples = {tiles * tile_size, scratch, "the closed volume"}; };
   if (type == SampleType::f32) {
-    b.f32.resize(tiles * tile_size);
+    make(b.f32);
     return b;
   }
-  if (type == SampleType::u16) b.u16.resize(tiles * tile_size);
-  else b.u8.resize(tiles * tile_size);
+  if (type == SampleType::u16) make(b.u16);
+  else make(b.u8);
   b.offset.resize(tiles);
   b.shift.resize(tiles);
   return b;

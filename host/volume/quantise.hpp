@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -53,8 +54,9 @@ std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, Sam
 /// What rounding to its own step may move a sample of such a tile; 0 where it is stored in float32.
 double rounding_of(std::span<const float> tile, const Lattice& lattice);
 
-/// A block of `tiles` tiles of `tile_size` samples each, to be filled by pack().
-SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size);
+/// A block of `tiles` tiles of `tile_size` samples each, to be filled by pack(); in memory without `scratch`.
+SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile_size,
+                        const std::shared_ptr<Scratch>& scratch = nullptr);
 /// Stores one tile; rounds its samples to its own step. Integers: they fit, by fitting_shift.
 void pack(std::span<const float> samples, const Lattice& lattice, int shift, std::uint64_t tile,
           SampleBlock& block);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <span>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -123,7 +124,7 @@ std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKi
 
 namespace {
 
-std::optional<Problem> sample_problem(const std::string& where, const std::vector<float>& samples) {
+std::optional<Problem> sample_problem(const std::string& where, std::span<const float> samples) {
   // An exponent of all ones; on bits, so that it vectorises and no compiler flag can assume it away.
   const auto is_bad = [](float s) { return (std::bit_cast<std::uint32_t>(s) & 0x7f800000u) == 0x7f800000u; };
   std::uint32_t bad = 0;
@@ -136,7 +137,7 @@ std::optional<Problem> sample_problem(const std::string& where, const std::vecto
 
 template <class T>
 std::optional<Problem> code_problem(const std::string& where, const SampleBlock& b,
-                                    const std::vector<T>& stored) {
+                                    const Samples<T>& stored) {
   const std::size_t tiles = b.offset.size(), per_tile = tiles == 0 ? 0 : stored.size() / tiles;
   for (std::size_t t = 0; t < tiles; ++t) {
     const int shift = b.shift[t];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +20,10 @@ struct BuildOptions {
                                              ///< only; what that does to the grid, certify.hpp says
   std::optional<std::pair<double, double>> window;  ///< test only gold cells whose range meets [lo, hi]
   StorageChoice storage = StorageChoice::automatic;
+  /// What may lie in memory of the tiles before closing, and of a closed volume; what takes more lies in
+  /// scratch, beside the scan if that does. None: an eighth of the device's limit; all where it has none.
+  std::optional<std::uint64_t> in_memory_bytes{};
+  std::filesystem::path scratch;  ///< folder of scratch; empty: the default (scratch.hpp)
   /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()
   /// calls begin() and leaves it to the caller to remove() it once the result is stored.
   Journal* journal = nullptr;

@@ -16,6 +16,7 @@
 
 #include "vdvr/export.hpp"
 #include "vdvr/grid.hpp"
+#include "vdvr/sample_array.hpp"
 
 namespace vdvr {
 
@@ -28,14 +29,14 @@ VDVR_API const char* text_of(SampleType type);
 /// Which of them base and tiles take.
 enum class StorageChoice { automatic, f32, u16, u8 };
 
-/// Stored samples of equal tiles (the base volume is one tile) in the vector that `type` names; the others
-/// are empty. An integer stands for step * (offset + stored * 2^shift), offset and shift those of its tile:
+/// Stored samples of equal tiles (the base volume is one tile) in the array that `type` names; the others are
+/// empty. An integer stands for step * (offset + stored * 2^shift), offset and shift those of its tile:
 /// |offset + stored * 2^shift| < 2^24 and step is a power of two, so that every sample is exact in fp32.
 struct SampleBlock {
   SampleType type = SampleType::f32;
-  std::vector<float> f32;
-  std::vector<std::uint16_t> u16;
-  std::vector<std::uint8_t> u8;
+  Samples<float> f32;
+  Samples<std::uint16_t> u16;
+  Samples<std::uint8_t> u8;
   std::vector<std::int32_t> offset;  ///< per tile, a multiple of 2^shift; integers only
   std::vector<std::uint8_t> shift;   ///< per tile, at most 24; integers only
 

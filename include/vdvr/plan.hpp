@@ -57,6 +57,7 @@ struct Plan {
   std::uint64_t memory_bytes = 0;  ///< peak of our allocations foreseen
   std::uint64_t memory_of_rows = 0,
                 memory_of_cells = 0;  ///< of those, what grows with the rows, with the grid
+  std::uint64_t tile_bytes = 0;       ///< of tiles before closing, wherever they lie
   double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
   double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
   double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks

@@ -1,11 +1,14 @@
 // Samples in memory, or in a scratch file where they do not fit: the same to whoever reads them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <iterator>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -14,63 +17,76 @@
 
 namespace vdvr {
 
-/// A contiguous array of float: std::span takes it. A copy lies where its original does.
-class VDVR_API SampleArray {
+/// A contiguous array of float, std::uint16_t or std::uint8_t: std::span takes it. A copy lies where its
+/// original does.
+template <class T>
+class VDVR_API Samples {
  public:
-  SampleArray() = default;
+  using value_type = T;
+  using const_iterator = const T*;
+
+  Samples() = default;
   /// n zeros; in memory without `scratch`. Throws ResourceError naming `what`.
-  SampleArray(std::size_t n, std::shared_ptr<Scratch> scratch, const std::string& what);
-  SampleArray(std::vector<float> values);  // NOLINT(google-explicit-constructor): the same in memory
-  SampleArray(std::initializer_list<float> values) : SampleArray(std::vector<float>(values)) {}
-  SampleArray(const SampleArray& other);
-  SampleArray(SampleArray&& other) noexcept;
-  SampleArray& operator=(SampleArray other) noexcept;
-  ~SampleArray();
+  Samples(std::size_t n, std::shared_ptr<Scratch> scratch, const std::string& what);
+  Samples(std::vector<T> values);  // NOLINT(google-explicit-constructor): the same in memory
+  Samples(std::initializer_list<T> values) : Samples(std::vector<T>(values)) {}
+  Samples(const Samples& other);
+  Samples(Samples&& other) noexcept;
+  Samples& operator=(Samples other) noexcept;
+  ~Samples();
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
-  [[nodiscard]] float* data() { return data_; }
-  [[nodiscard]] const float* data() const { return data_; }
-  [[nodiscard]] float* begin() { return data_; }
-  [[nodiscard]] float* end() { return data_ + size_; }
-  [[nodiscard]] const float* begin() const { return data_; }
-  [[nodiscard]] const float* end() const { return data_ + size_; }
-  [[nodiscard]] float& operator[](std::size_t i) { return data_[i]; }
-  [[nodiscard]] const float& operator[](std::size_t i) const { return data_[i]; }
-  [[nodiscard]] float& front() { return data_[0]; }
-  [[nodiscard]] float& back() { return data_[size_ - 1]; }
+  [[nodiscard]] T* data() { return data_; }
+  [[nodiscard]] const T* data() const { return data_; }
+  [[nodiscard]] T* begin() { return data_; }
+  [[nodiscard]] T* end() { return data_ + size_; }
+  [[nodiscard]] const T* begin() const { return data_; }
+  [[nodiscard]] const T* end() const { return data_ + size_; }
+  [[nodiscard]] T& operator[](std::size_t i) { return data_[i]; }
+  [[nodiscard]] const T& operator[](std::size_t i) const { return data_[i]; }
+  [[nodiscard]] const T& at(std::size_t i) const {
+    if (i >= size_) throw std::out_of_range("Samples::at");
+    return data_[i];
+  }
+  [[nodiscard]] T& front() { return data_[0]; }
+  [[nodiscard]] const T& front() const { return data_[0]; }
+  [[nodiscard]] T& back() { return data_[size_ - 1]; }
+  [[nodiscard]] const T& back() const { return data_[size_ - 1]; }
 
   /// In memory from here on.
   void resize(std::size_t n);
-  void assign(std::size_t n, float value) { *this = SampleArray(std::vector<float>(n, value)); }
-  template <class Iterator>
+  void assign(std::size_t n, T value) { *this = Samples(std::vector<T>(n, value)); }
+  template <std::input_iterator Iterator>
   void assign(Iterator first, Iterator last) {
-    *this = SampleArray(std::vector<float>(first, last));
+    *this = Samples(std::vector<T>(first, last));
   }
-  void push_back(float value) {
+  void clear() { resize(0); }
+  void push_back(T value) {
     resize(size_ + 1);
     back() = value;
   }
+  void pop_back() { resize(size_ - 1); }
 
   /// Where it lies, for another as large; none in memory.
   [[nodiscard]] const std::shared_ptr<Scratch>& scratch() const { return scratch_; }
   /// Memory that it takes: all, or what its scratch files share.
   [[nodiscard]] std::uint64_t resident_bytes() const;
 
- private:
-  void swap(SampleArray& other) noexcept;
+  friend bool operator==(const Samples& a, const Samples& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  }
 
-  std::vector<float> memory_;
+ private:
+  void swap(Samples& other) noexcept;
+
+  std::vector<T> memory_;
   std::shared_ptr<Scratch> scratch_;
-  float* data_ = nullptr;
+  T* data_ = nullptr;
   std::size_t size_ = 0;
 };
 
-inline bool operator==(const SampleArray& a, const SampleArray& b) {
-  if (a.size() != b.size()) return false;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    if (!(a[i] == b[i])) return false;
-  return true;
-}
+/// What a scan has.
+using SampleArray = Samples<float>;
 
 }  // namespace vdvr

@@ -28,16 +28,32 @@ class VDVR_API Scratch {
 
   /// n zeros on the disk, which is asked for all the room at once. Throws ResourceError naming the folder,
   /// `what`, and what is free where it does not suffice or is none of a disk.
-  std::span<float> map(std::size_t n, const std::string& what);
-  void unmap(std::span<float> values) noexcept;
+  template <class T>
+  std::span<T> map(std::size_t n, const std::string& what) {
+    return {static_cast<T*>(map_bytes(std::uint64_t{n} * sizeof(T), what)), n};
+  }
+  /// What map() gave.
+  void unmap(const void* first) noexcept;
 
   [[nodiscard]] std::uint64_t resident_bytes() const;
   /// Of all files at once, the most so far.
   [[nodiscard]] std::uint64_t peak_bytes() const;
 
  private:
+  void* map_bytes(std::uint64_t bytes, const std::string& what);
+
   class Keeper;
   std::unique_ptr<Keeper> keeper_;
+};
+
+/// Where a stage puts arrays that it passes over in order: in memory while they are small, else in scratch.
+struct Room {
+  std::shared_ptr<Scratch> scratch;   ///< none: in memory, whatever their size
+  std::uint64_t in_memory_bytes = 0;  ///< what may lie in memory of an array
+
+  [[nodiscard]] std::shared_ptr<Scratch> for_bytes(std::uint64_t bytes) const {
+    return bytes <= in_memory_bytes ? nullptr : scratch;
+  }
 };
 
 /// Where scratch files go when nobody says: TMPDIR, else /var/tmp, which is meant for what /tmp may be too

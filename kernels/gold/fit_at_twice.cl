@@ -28,33 +28,66 @@
 #define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
 #endif
 
-// Gold less `curvature` of its second differences, of one node of a column. The halo's outermost columns have
-// none across; they lie outside what is asked for.
-inline float target_of(__global const float* centre, int has_across, int to_x, int to_y, float curvature) {
-  const float f = centre[0];
-  if (!has_across) return f;
-  const float around = centre[-1] + centre[1] + centre[-to_x] + centre[to_x] + centre[-to_y] + centre[to_y];
-  return f - curvature * (around - 6.0f * f);
+// Two registers' worth of nodes that follow one another, and the halves of every second.
+#if VDVR_LANES == 1
+#define PAIRS float2
+#define READ_PAIRS(p) vload2(0, p)
+#define FIRST(v) (v).s0
+#define SECOND(v) (v).s1
+#elif VDVR_LANES == 4
+#define PAIRS float8
+#define READ_PAIRS(p) vload8(0, p)
+#define FIRST(v) (v).even
+#define SECOND(v) (v).odd
+#else
+#define PAIRS float16
+#define READ_PAIRS(p) vload16(0, p)
+#define FIRST(v) (v).even
+#define SECOND(v) (v).odd
+#endif
+
+// Whether a step reads the targets of a column of nodes: one beside a sample's that is fitted.
+inline bool is_fitted_to(__global const int* last, int block, int gx, int gy, VdvrGoldBlocks g,
+                         VdvrLattice l) {
+  const int from_x = gx - g.halo + 2 * l.reach_x, from_y = gy - g.halo + 2 * l.reach_y;
+  for (int y = max(from_y / 2, 0); y <= min((from_y + 1) / 2, l.cy - 1); ++y)
+    for (int x = max(from_x / 2, 0); x <= min((from_x + 1) / 2, l.cx - 1); ++x)
+      if (last[((size_t)block * l.cy + y) * l.cx + x] >= 0) return true;
+  return false;
 }
 
-// One work-item does one sample's node and the one below it.
+// Gold less `curvature` of its second differences: of VDVR_LANES samples' nodes of a column, and of the nodes
+// below them. What has no differences, at the rims of the halo, is gold, or whatever lies beside it: nobody
+// asks for those.
 __kernel void take_targets(__global float* targets, __global const float* gold, __global const float* margin,
-                           VdvrGoldBlocks g, VdvrLattice l, int stride, float curvature) {
-  const int k = (int)get_global_id(0), gx = (int)get_global_id(1);
+                           __global const int* last, VdvrGoldBlocks g, VdvrLattice l, int stride,
+                           float curvature) {
+  const int k = (int)get_global_id(0) * VDVR_LANES, gx = (int)get_global_id(1);
   const int row = g.nx + 2 * g.halo, deep = g.ny + 2 * g.halo;
   const int block = (int)get_global_id(2) / deep, gy = (int)get_global_id(2) - block * deep;
   if (k >= l.cz || gx >= row || block >= g.blocks) return;
   const size_t column = ((size_t)block * deep + gy) * row + gx;
   const int of_sample = 2 * (k - l.reach_z);
-  if (margin[column] < g.lowest || of_sample < g.z_first || of_sample - 1 > g.z_last) return;
-  const int has_across = gx > 0 && gy > 0 && gx + 1 < row && gy + 1 < deep;
-  const int to_y = row * g.gold_stride, node = of_sample + g.halo;
-  __global const float* c = gold + column * g.gold_stride + node;
+  if (margin[column] < g.lowest || of_sample + 2 * VDVR_LANES <= g.z_first || of_sample - 1 > g.z_last ||
+      !is_fitted_to(last, block, gx, gy, g, l))
+    return;
   __global float* to = targets + column * 2 * stride + k + 1;
-  // The ends of a column have no second differences along it; nobody asks for theirs.
-  const int first = node > 0 ? node : 1, below = node - 1 > 0 ? node - 1 : 1;
-  to[0] = target_of(c + (first - node), has_across, g.gold_stride, to_y, curvature);
-  to[stride] = target_of(c + (below - node), has_across, g.gold_stride, to_y, curvature);
+  // The node below the first sample.
+  __global const float* c = gold + column * g.gold_stride + of_sample + g.halo - 1;
+  if (gx == 0 || gy == 0 || gx + 1 == row || gy + 1 == deep) {
+    for (int i = 0; i < VDVR_LANES && k + i < l.cz; ++i) {
+      to[i] = c[2 * i + 1];
+      to[stride + i] = c[2 * i + 1];
+    }
+    return;
+  }
+  const int to_y = row * g.gold_stride;
+  const PAIRS f = READ_PAIRS(c),
+              around = READ_PAIRS(c - 1) + READ_PAIRS(c + 1) + READ_PAIRS(c - g.gold_stride) +
+                       READ_PAIRS(c + g.gold_stride) + READ_PAIRS(c - to_y) + READ_PAIRS(c + to_y),
+              target = f - curvature * (around - 6.0f * f);
+  WRITE(SECOND(target), to);
+  WRITE(FIRST(target), to + stride);
 }
 
 // The lattice as gold has it.

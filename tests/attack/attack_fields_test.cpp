@@ -38,7 +38,7 @@ BOOST_AUTO_TEST_CASE(buffer_sampler_stays_within_its_term) {
       // A comb has the largest slope there is, everywhere; constants have none, so that only interpolation
       // rounds.
       const bool constant = kind == std::string("constant");
-      const auto comb = [&](std::vector<float>& s) {
+      const auto comb = [&](Samples<float>& s) {
         for (std::size_t i = 0; i < s.size(); ++i) s[i] = constant ? 1.9999999f : i % 2 == 0 ? 1.0f : -1.0f;
       };
       if (kind != std::string("random")) {

@@ -483,6 +483,21 @@ BOOST_AUTO_TEST_CASE(small_memory_gives_a_certificate_that_holds) {
   BOOST_TEST(contents.size() == 1u);
 }
 
+BOOST_AUTO_TEST_CASE(tiles_in_scratch_make_the_volume_of_those_in_memory) {
+  const ProjectionSet scan = simulated(marschner_lobb(32 / std::sqrt(2.0)), 65, 65, 74);
+  Wanted wanted{grid_of(scan, {32, 32, 32}, 0.70710678), 0.01};
+  const Built in_memory = build_of(scan, wanted);
+  wanted.options.in_memory_bytes = 0;
+  wanted.options.scratch = ".";
+  const Built in_scratch = build_of(scan, wanted);
+  const MixedVolume& v = in_scratch.result.volume;
+  BOOST_TEST(!v.tiles.empty());
+  for (const auto& [kind, block] : v.tiles)
+    BOOST_TEST((block.f32.scratch() || block.u16.scratch() || block.u8.scratch()));
+  BOOST_TEST(in_scratch.result.certificate.measured_total == in_memory.result.certificate.measured_total);
+  BOOST_TEST(content_sha256(v) == content_sha256(in_memory.result.volume));
+}
+
 BOOST_AUTO_TEST_CASE(sphere_is_certified) {
   const ProjectionSet scan = simulated(sphere(10, 1), 33, 33, 60);
   check_all(scan, {grid_of(scan, {16, 16, 16}, 1.0, Vec3{-2, -2, -2}), 0.03}, 8);

@@ -233,7 +233,7 @@ bool is_proposed(const Case& c, std::size_t i) {
 }
 
 BOOST_AUTO_TEST_CASE(what_coarse_gold_proposes_is_measured_on_fine_gold_and_mostly_right) {
-  Case c(noise_scan(20, 14, 17, 5), grid_around_axis({10, 10, 11}, 1.0), 8, 0.15, true);
+  Case c(noise_scan(20, 14, 17, 5), grid_around_axis({10, 10, 11}, 1.0), 8, 0.08, true);
   std::vector<std::uint8_t> proposed(c.bricks.level.size(), 0);
   for (std::size_t i = 0; i < proposed.size(); ++i)
     proposed[i] = c.bricks.level[i] != LevelTriple{0, 0, 0} && is_proposed(c, i);

@@ -70,7 +70,7 @@ OpenBricks random_bricks(const Case& c) {
     const LevelTriple l = involved ? c.triples[pick(random)] : LevelTriple{0, 0, 0};
     b.involved.push_back(involved ? 1 : 0);
     b.level.push_back(l);
-    b.samples.emplace_back();
+    b.samples.resize(b.level.size());
     if (l == LevelTriple{0, 0, 0}) continue;
     const Index3 p{i % bricks[0], i / bricks[0] % bricks[1], i / bricks[0] / bricks[1]};
     const auto side = shape.tile_shape(l);
@@ -79,10 +79,12 @@ OpenBricks random_bricks(const Case& c) {
     const auto node = [&](std::size_t a, std::int64_t s) {
       return std::min(p[a] * c.granularity * c.rate + s * (apart[a] >> l[2 - a]), c.cells[a] * c.rate);
     };
+    std::vector<float> tile;
     for (std::int64_t z = 0; z < side[0]; ++z)
       for (std::int64_t y = 0; y < side[1]; ++y)
         for (std::int64_t x = 0; x < side[2]; ++x)
-          b.samples.back().push_back(own * gold_at({node(0, x), node(1, y), node(2, z)}, c.rate) + beside);
+          tile.push_back(own * gold_at({node(0, x), node(1, y), node(2, z)}, c.rate) + beside);
+    b.samples.put(b.level.size() - 1, tile);
   }
   return b;
 }
@@ -355,7 +357,7 @@ BOOST_AUTO_TEST_CASE(the_paper_feeds_the_low_side_with_gold_on_shared_parts_and_
   OpenBricks open = random_bricks({{6, 2, 2}, 2, 4, {{2, 2, 2}}, 1.0, 9});
   for (const std::size_t low : {0u, 1u}) {  // levels 0, 0, 2 along x
     open.level[low] = {0, 0, 0};
-    open.samples[low].clear();
+    open.samples.drop(low);
   }
   const MixedVolume v = close_boundaries(open, Closing::paper);
   BOOST_TEST((v.level == std::vector<LevelTriple>{{0, 0, 0}, {2, 2, 2}, {2, 2, 2}}));
@@ -426,7 +428,7 @@ std::vector<std::uint8_t> take_some(OpenBricks& open, const OpenBricks& from, st
   for (std::size_t i = place; i < moved.size(); i += 17) {
     if (!open.involved[i] || from.level[i] == LevelTriple{0, 0, 0}) continue;
     open.level[i] = from.level[i];
-    open.samples[i] = from.samples[i];
+    open.samples.put(i, from.samples[i]);
     moved[i] = 1;
   }
   return moved;
@@ -497,6 +499,49 @@ BOOST_AUTO_TEST_CASE(samples_inside_a_brick_stay_gold_and_planes_beyond_the_grid
   }
 }
 
+BOOST_AUTO_TEST_CASE(tiles_keep_their_samples_wherever_they_lie) {
+  const auto scratch = std::make_shared<Scratch>(".", 1 << 16);
+  // Parts of 2^16 samples and more: the second begins within these tiles, the third takes one alone.
+  for (const std::uint64_t in_memory : {std::uint64_t{0}, std::uint64_t{1} << 19, UINT64_MAX}) {
+    TileStore store(Room{scratch, in_memory});
+    std::vector<std::vector<float>> expected(40);
+    store.resize(expected.size());
+    std::mt19937 random(7);
+    for (int round = 0; round < 3; ++round)
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        if (random() % 4 == 0) continue;
+        expected[i].resize(i == 17 ? 300000 : random() % 5000);
+        for (float& s : expected[i]) s = static_cast<float>(random());
+        store.put(i, expected[i]);
+      }
+    store.drop(3);
+    expected[3].clear();
+    const TileStore copy = store;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      BOOST_TEST(std::ranges::equal(std::as_const(store)[i], expected[i]));
+      BOOST_TEST(std::ranges::equal(copy[i], expected[i]));
+    }
+    BOOST_TEST((store.memory_bytes() > 0) == (in_memory > 0));
+    BOOST_TEST(store.memory_bytes() <= std::max(in_memory, std::uint64_t{0}));
+    store.clear();
+    BOOST_TEST(store.memory_bytes() == 0u);
+    BOOST_TEST(store[17].empty());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(bricks_close_alike_wherever_their_tiles_lie) {
+  OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, .9, 4});
+  const MixedVolume in_memory = close_boundaries(open);
+  const Room room{std::make_shared<Scratch>(".", 1 << 16), 0};
+  TileStore store(room);
+  store.resize(open.samples.size());
+  for (std::size_t i = 0; i < store.size(); ++i) store.put(i, std::as_const(open).samples[i]);
+  open.samples = std::move(store);
+  const MixedVolume in_scratch = CloseBoundaries(open, Closing::coarse, room).first();
+  BOOST_TEST(same(in_scratch, in_memory));
+  BOOST_TEST((in_scratch.tiles.begin()->second.f32.scratch() == room.scratch));
+}
+
 BOOST_AUTO_TEST_CASE(neighbours_that_take_no_part_lower_nothing) {
   OpenBricks open = random_bricks({{6, 6, 6}, 2, 4, {{2, 2, 2}}, 1.0, 8});
   constexpr std::size_t middle = 13;  // of 3 x 3 x 3
@@ -504,7 +549,7 @@ BOOST_AUTO_TEST_CASE(neighbours_that_take_no_part_lower_nothing) {
     if (i == middle) continue;
     open.involved[i] = 0;
     open.level[i] = {0, 0, 0};
-    open.samples[i].clear();
+    open.samples.drop(i);
   }
   const MixedVolume v = close_boundaries(open);
   const auto& tile = v.tiles.at({2, 2, 2}).f32;
@@ -521,7 +566,7 @@ BOOST_AUTO_TEST_CASE(neighbours_that_take_no_part_lower_nothing) {
 BOOST_AUTO_TEST_CASE(a_coarse_neighbour_decides_the_shared_face) {
   OpenBricks open = random_bricks({{4, 2, 2}, 2, 4, {{2, 2, 2}}, 1.0, 9});
   open.level[0] = {0, 0, 0};
-  open.samples[0].clear();
+  open.samples.drop(0);
   const MixedVolume v = close_boundaries(open);
   for (std::int64_t z = 0; z <= 8; ++z)
     for (std::int64_t y = 0; y <= 8; ++y) {

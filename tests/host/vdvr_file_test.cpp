@@ -401,8 +401,10 @@ BOOST_AUTO_TEST_CASE(tiles_of_the_wrong_shape_number_or_name_are_refused) {
 BOOST_AUTO_TEST_CASE(samples_that_are_not_finite_are_refused_with_their_place) {
   MixedVolume v = small_volume();
   v.base.f32[77] = std::numeric_limits<float>::quiet_NaN();
-  BOOST_TEST(says(refusal_after(overwrite("/base", H5T_NATIVE_FLOAT, v.base.f32)), {"/base", "sample 77"}));
-  auto tiles = v.tiles.at({0, 2, 1}).f32;
+  const auto vector_of = [](const Samples<float>& s) { return std::vector<float>(s.begin(), s.end()); };
+  BOOST_TEST(says(refusal_after(overwrite("/base", H5T_NATIVE_FLOAT, vector_of(v.base.f32))),
+                  {"/base", "sample 77"}));
+  auto tiles = vector_of(v.tiles.at({0, 2, 1}).f32);
   tiles[5] = -std::numeric_limits<float>::infinity();
   BOOST_TEST(
       says(refusal_after(overwrite("/tiles/021", H5T_NATIVE_FLOAT, tiles)), {"/tiles/021", "sample 5"}));

@@ -72,7 +72,7 @@ inline MixedVolume mixed(const Grid& grid, int granularity, const LevelOf& level
         auto& tiles = m.tiles[level].f32;
         m.tile[i] = static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles.size()) / m.tile_size(level));
         const auto tile = tile_of(m, {x, y, z}, level, f);
-        tiles.insert(tiles.end(), tile.begin(), tile.end());
+        for (const float sample : tile) tiles.push_back(sample);
         for (std::size_t a = 0; a < 3; ++a)
           if (level[a] > coarsening[a]) m.rate = std::max(m.rate, 1 << (level[a] - coarsening[a]));
       }

@@ -139,7 +139,7 @@ inline MixedVolume in_types_by_tile(const MixedVolume& v, const std::vector<Samp
       for (std::size_t tile = t; tile < count; tile += types.size()) {
         const auto from = block.f32.begin() + static_cast<std::ptrdiff_t>(tile * size);
         auto& to = one.tiles[kind].f32;
-        to.insert(to.end(), from, from + static_cast<std::ptrdiff_t>(size));
+        for (std::size_t i = 0; i < size; ++i) to.push_back(from[i]);
         number[tile] = next++;
       }
       if (one.tiles.empty()) continue;

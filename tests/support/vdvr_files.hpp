@@ -50,9 +50,10 @@ inline void put(const fs::path& path, const std::string& bytes) {
 }
 
 /// Compares bits, so that -0 and 0 differ.
-template <class T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+template <class Array>
+bool same_bits(const Array& a, const Array& b) {
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(*a.data())) == 0);
 }
 
 inline bool same_block(const SampleBlock& a, const SampleBlock& b) {
