@@ -1,14 +1,16 @@
-// A scan: parallel-beam projections with their geometry (docs/geometry.md).
+// A scan: projections with their geometry (docs/geometry.md). Parallel beam:
 //
 // Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column
 // `center`. u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "vdvr/cone_geometry.hpp"
+#include "vdvr/export.hpp"
 #include "vdvr/sample_array.hpp"
 
 namespace vdvr {
@@ -25,9 +27,6 @@ struct ParallelGeometry {
   [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
 };
 
-/// Cone beam joins here.
-using Geometry = std::variant<ParallelGeometry>;
-
 /// What reading and pre-processing did, reported to the user and stored with the certificate.
 struct InputReport {
   std::string name;                ///< file or folder name as given, without its directory
@@ -42,11 +41,20 @@ struct InputReport {
 
 /// Line integrals, float data[view][row v][column u].
 struct ProjectionSet {
+  /// The detector, and where rays are parallel all there is to say. Of a cone-beam scan its limit for a
+  /// source infinitely far away: pitches at the axis, and angles and centre of the matrices.
   ParallelGeometry geometry;
+  std::optional<ConeGeometry> cone;  ///< none: rays are parallel
   SampleArray data;
   InputReport report;
 
   [[nodiscard]] std::int64_t size() const { return geometry.views() * geometry.rows * geometry.columns; }
 };
+
+/// What `geometry` of a cone-beam scan is.
+VDVR_API ParallelGeometry parallel_limit(const ConeGeometry& cone, std::int64_t columns, std::int64_t rows,
+                                         const std::string& unit);
+/// Throws InputError, which names what is wanted, for a cone-beam scan.
+VDVR_API void require_parallel(const ProjectionSet& scan, const std::string& what);
 
 }  // namespace vdvr
