@@ -73,7 +73,7 @@ int volume_info(const std::filesystem::path& path, const CommonOptions& common) 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
-  const Grid grid = make_grid(scan.geometry, {});
+  const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
   const Json json = {{"file", path.string()},
