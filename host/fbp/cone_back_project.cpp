@@ -18,7 +18,7 @@ static_assert(sizeof(VdvrConeView) == 64);
 namespace {
 
 constexpr std::int64_t longest_vector = 16;
-// Rows that a vector may lie between, beyond which single lanes are faster.
+// Pixels that a vector may lie between, beyond which single lanes are faster.
 constexpr int most_spans = 10;
 constexpr int views_together = 8;
 
@@ -36,8 +36,8 @@ TableShape shape_of(const FilteredScan& scan, int rate, const ConeMargins& margi
   const ParallelGeometry& g = scan.geometry;
   TableShape s{upsampled_columns(g.columns, rate, static_cast<double>(margins.columns)),
                (g.rows - 1 + 2 * margins.rows) * rate + 1, 0};
-  // Vectors read past the last row.
-  s.row_stride = column_stride(s.rows + longest_vector);
+  // Of each phase; vectors read past the last row.
+  s.row_stride = rate * column_stride((s.rows + rate - 1) / rate + longest_vector);
   return s;
 }
 
@@ -71,9 +71,8 @@ void copy_upsampled(opencl::State& state, Upsampler& upsampler, const UpsampledC
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> kernel(state, "fbp/join_rows",
                                                                                 "join_rows");
   const auto all = table.views * table.columns;
-  kernel({{count(table.row_stride / 16), count(all), 1}, {1, 16, 1}}, table.values.buffer(),
-         slab.values.buffer(), to_int(all), to_int(table.rows), to_int(table.row_stride),
-         to_int(slab.rows_padded));
+  kernel({{count(table.row_stride), count(all), 1}, {64, 1, 1}}, table.values.buffer(), slab.values.buffer(),
+         to_int(all), to_int(table.rows), to_int(table.rate), to_int(table.row_stride / table.rate));
   opencl::finish(state, "upsampled rows");  // before the slab goes
 }
 
@@ -108,7 +107,7 @@ bool is_upright(const ViewMatrix& m) {
 
 // What the lanes of a vector see of a view, at most.
 struct Spread {
-  double rows = 0, columns = 0;  // from the first lane to the last, beyond a row a lane
+  double rows = 0, columns = 0;  // from the first lane to the last, beyond a pixel a lane
   double bend = 0;               // of a run of rows between its ends
   bool upright = true;
 };
@@ -155,7 +154,7 @@ Spread spread_of(const FilteredScan& scan, const ConeTable& table, const ConeBan
     const double fastest = rows / least + sheared * reach,
                  slowest = rows / std::max(range.most, least) - sheared * reach;
     out.upright = out.upright && upright;
-    out.rows = std::max(out.rows, lanes * std::max(fastest - 1, 1 - slowest));
+    out.rows = std::max(out.rows, lanes * std::max(fastest - table.rate, table.rate - slowest));
     out.columns =
         std::max(out.columns, lanes * (std::abs(m[0][2]) * h * table.rate / least + sheared * reach));
     out.bend = std::max(out.bend, lanes * lanes / 4 * std::abs(m[2][2]) * h / least * fastest);
@@ -212,7 +211,8 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
           view_about(scan.views[at(table.first_view + k)], table, *band.grid, place);
   });
   const Spread spread = spread_of(scan, table, band);
-  if (spread.rows + 2 > most_spans || spread.columns + 2 > most_spans || spread.bend >= 1) lanes = 1;
+  const double widest = most_spans * table.rate;
+  if (spread.rows + 2 > widest || spread.columns + 2 > widest || spread.bend >= 1) lanes = 1;
   const auto spans = [&](double beyond, std::int64_t most) {
     const double wide = lanes == 1 ? 1 : beyond + (spread.upright ? 2 : 4);
     return to_int(std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(wide)), 1, most));
@@ -225,12 +225,14 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
                                                     "views about blocks");
   const opencl::DeviceArray<cl_int2> ranges(state, std::span<const cl_int2>(wanted), "wanted planes");
   const bool wide = lanes > 1;
-  const int tile = wide ? 4 : 1;
+  const int tile = wide ? 4 : 1, vectors_each = wide && band.nz > lanes ? 4 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrConeBand> kernel(
       state, "fbp/cone_back_project", "cone_back_project",
       {{"VDVR_LANES", std::to_string(lanes)},
+       {"VDVR_RATE", std::to_string(table.rate)},
        {"VDVR_UPRIGHT", spread.upright ? "1" : "0"},
        {"VDVR_RUN", std::to_string(views_together)},
+       {"VDVR_VECTORS", std::to_string(vectors_each)},
        {"VDVR_TILE_X", std::to_string(tile)},
        {"VDVR_TILE_Y", std::to_string(tile)}});
   const VdvrConeBand shape{.views = to_int(table.views),
@@ -245,7 +247,8 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
                            .adds = band.adds ? 1 : 0,
                            .spans_v = spans(spread.rows, table.rows - 1),
                            .spans_u = spans(spread.columns, table.columns - 1)};
-  const std::uint64_t vectors = count((band.nz + lanes - 1) / lanes);
+  const std::int64_t carried = lanes * vectors_each;
+  const std::uint64_t vectors = count((band.nz + carried - 1) / carried);
   const auto tiles = [&](std::int64_t n) { return count((n + tile - 1) / tile); };
   kernel({{vectors, tiles(nx), tiles(band.ny)},
           wide ? std::array<std::uint64_t, 3>{1, 1, 1} : std::array<std::uint64_t, 3>{16, 4, 1}},

@@ -10,8 +10,8 @@
 
 namespace vdvr {
 
-/// float values[view][column][row]: filtered views, `rate` columns and rows to a pixel, with columns and rows
-/// of the mirror extension around them.
+/// float values[view][column][row % rate][row / rate]: filtered views, `rate` columns and rows to a pixel,
+/// with columns and rows of the mirror extension around them.
 struct ConeTable {
   opencl::DeviceArray<float> values;
   int rate = 1;

@@ -57,8 +57,15 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
   out.geometry.pitch_v = std::ldexp(out.geometry.pitch_v, -units.along);
   out.limited_angle = weights.limited_angle();
   std::vector<double> of_view;
+  std::vector<bool> flipped;
   for (std::size_t k = 0; k < cone.views.size(); ++k) {
-    out.views.push_back(from_world(padded(cone.views[k], weights), units));
+    ViewMatrix matrix = padded(cone.views[k], weights);
+    // Vectors of z read rows that grow with z.
+    flipped.push_back(weights.view(k).along_v[2] < 0);
+    if (flipped.back())
+      for (std::size_t j = 0; j < 4; ++j)
+        matrix[1][j] = static_cast<double>(detector.rows - 1) * matrix[2][j] - matrix[1][j];
+    out.views.push_back(from_world(matrix, units));
     // The ramp's is 1 over the pitch; line integrals and pitches are those of computation.
     of_view.push_back(std::ldexp(weights.of_view(k) / weights.view(k).pitch_u, units.across - units.line));
   }
@@ -86,8 +93,10 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
       std::vector<double> view(at(size));
       weights.apply(at(first + k), std::span<const float>(scan.data).subspan(at((first + k) * own), at(own)),
                     view);
-      std::transform(view.begin(), view.end(), weighed.begin() + k * size,
-                     [](double p) { return static_cast<float>(p); });
+      for (std::int64_t v = 0; v < g.rows; ++v)
+        std::transform(view.begin() + v * g.columns, view.begin() + (v + 1) * g.columns,
+                       weighed.begin() + k * size + (flipped[at(first + k)] ? g.rows - 1 - v : v) * g.columns,
+                       [](double p) { return static_cast<float>(p); });
     });
     const std::span<float> target = std::span<float>(out.samples).subspan(at(first * size), at(n * size));
     (*filter)(weighed, std::span<const double>(of_view).subspan(at(first), at(n)), target, {});

@@ -1,14 +1,11 @@
-// Rows of upsampled columns in one run each: float in[row / 16][line][16] to float out[line][row_stride],
-// where a line is a column of a view. Rows from `rows` on are zeros. Called by
-// host/fbp/cone_back_project.cpp.
-__kernel void join_rows(__global float* out, __global const float* in, int lines, int rows, int row_stride,
-                        int rows_padded) {
-  const int chunk = (int)get_global_id(0), line = (int)get_global_id(1);
-  if (chunk * 16 >= row_stride || line >= lines) return;
-  __global float* to = out + (size_t)line * row_stride + chunk * 16;
-  __global const float* from = in + ((size_t)chunk * lines + line) * 16;
-  for (int i = 0; i < 16; ++i) {
-    const int row = chunk * 16 + i;
-    to[i] = row < rows && row < rows_padded ? from[i] : 0.0f;
-  }
+// Rows of upsampled columns as back-projection reads them: float in[row / 16][line][16] to float
+// out[line][row % rate][row / rate], where a line is a column of a view, and phases of rows are
+// `phase_stride` apart. What lies beyond the last row is 0. Called by host/fbp/cone_back_project.cpp.
+__kernel void join_rows(__global float* out, __global const float* in, int lines, int rows, int rate,
+                        int phase_stride) {
+  const int i = (int)get_global_id(0), line = (int)get_global_id(1);
+  if (i >= rate * phase_stride || line >= lines) return;
+  const int row = i % phase_stride * rate + i / phase_stride;
+  out[(size_t)line * rate * phase_stride + i] =
+      row < rows ? in[((size_t)(row / 16) * lines + line) * 16 + row % 16] : 0.0f;
 }

@@ -9,7 +9,7 @@
 // 48 bytes.
 typedef struct {
   int views, columns, rows;  // of the table; rows without those that only vectors read
-  int row_stride;            // floats from one column of the table to the next
+  int row_stride;            // floats from one column of the table to the next, a multiple of the rate
   int nx, ny, nz;            // samples of the band
   int out_stride;            // floats from one column of samples to the next
   int blocks_x;              // blocks along x
