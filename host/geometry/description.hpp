@@ -26,6 +26,10 @@ class Description {
   [[nodiscard]] std::filesystem::path folder() const { return file_.parent_path(); }
 
   [[nodiscard]] bool is_list(const std::string& key) const { return json_.at(key).is_array(); }
+  /// A list whose first entry is one.
+  [[nodiscard]] bool is_table(const std::string& key) const {
+    return is_list(key) && !json_.at(key).empty() && json_.at(key)[0].is_array();
+  }
   [[nodiscard]] std::string text(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key) const;
   [[nodiscard]] double number_or(const std::string& key, double fallback) const;

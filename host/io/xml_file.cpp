@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t largest_file = 64u << 20;
 constexpr int deepest = 16;
+constexpr int most_elements = 1 << 19;  // some 40,000 views of RTK's
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 bool starts_name(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
@@ -108,6 +109,7 @@ class Reader {
   XmlElement element(int depth) {
     if (depth > deepest) fail(fmt::format("elements lie deeper than {}", deepest));
     if (!take("<")) fail("an element is missing: not XML, or truncated");
+    if (++elements_ > most_elements) fail(fmt::format("more than {} elements", most_elements));
     XmlElement out;
     out.name = name();
     out.line = line();
@@ -140,6 +142,7 @@ class Reader {
   fs::path path_;
   std::string_view text_;
   std::size_t at_ = 0;
+  int elements_ = 0;
   mutable std::size_t counted_ = 0;
   mutable int line_ = 1;
 };

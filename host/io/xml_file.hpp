@@ -19,7 +19,7 @@ struct XmlElement {
 };
 
 /// The root element. Throws FileError, which names the line: not well-formed, beyond the dialect, larger than
-/// 64 MiB, deeper than 16 elements.
+/// 64 MiB, deeper than 16 elements, more than 2^19 of them.
 XmlElement read_xml(const std::filesystem::path& path);
 
 }  // namespace vdvr::io

@@ -226,11 +226,12 @@ std::string name_of(const fs::path& path, bool folder) {
   return whole.filename().string();
 }
 
-void require_on_detector(const fs::path& path, const ParallelGeometry& g, const ScanOptions& options) {
-  const double last = static_cast<double>(g.columns) - 0.5;
-  if (!(g.center >= -0.5 && g.center <= last)) {
-    const std::string text = fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}",
-                                         path.string(), g.center, last);
+void require_on_detector(const fs::path& path, double center, std::int64_t columns,
+                         const ScanOptions& options) {
+  const double last = static_cast<double>(columns) - 0.5;
+  if (!(center >= -0.5 && center <= last)) {
+    const std::string text =
+        fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}", path.string(), center, last);
     if (options.center) throw InputError(text);
     throw FileError(text);
   }
@@ -260,7 +261,7 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
         "`center` where it is elsewhere",
         g.center));
   }
-  require_on_detector(path, g, options);
+  require_on_detector(path, g.center, g.columns, options);
 }
 
 // --- cone beam ---
@@ -297,13 +298,14 @@ void set_cone(const fs::path& path, const io::RawScan& raw, const ScanOptions& o
   r.source_to_detector = raw.cone->geometry.source_to_detector;
   r.center_source = options.center ? "option" : raw.center ? "file" : raw.cone->geometry.center_source;
   if (const auto wanted = options.center ? options.center : raw.center) {
+    require_on_detector(path, *wanted, raw.columns, options);
     move_axis(cone, *wanted);
     r.notes.push_back(fmt::format("all views were moved so that the axis is at column {:g}, as {} says",
                                   *wanted, options.center ? "`center`" : "scan.json's 'center'"));
   }
   cone.redundancy = raw.cone->redundancy.value_or(natural_redundancy(cone, raw.columns));
   scan.geometry = parallel_limit(cone, raw.columns, raw.rows, raw.unit);
-  require_on_detector(path, scan.geometry, options);
+  require_on_detector(path, scan.geometry.center, raw.columns, options);
   require_no_displaced_short_scan(path, cone, scan.geometry);
   const SourceArc arc = source_arc(cone);
   r.notes.push_back(

@@ -8,6 +8,7 @@
 #include "host/geometry/matrix_geometry.hpp"
 #include "host/geometry/nikon_geometry.hpp"
 #include "host/geometry/rtk_geometry.hpp"
+#include "host/geometry/tigre_geometry.hpp"
 #include "host/io/raster_file.hpp"
 #include "host/scan/raster_scan.hpp"
 #include "vdvr/error.hpp"
@@ -74,7 +75,8 @@ ConeViews read_geometry(const Description& about, const std::string& kind, RawSc
   if (kind == "matrices") return matrix_geometry(path, stack);
   if (kind == "rtk_geometry") return rtk_geometry(path, placed_stack(about), stack);
   if (kind == "nikon") return nikon_geometry(read_nikon(path), stack);
-  return astra_geometry(path, stack);
+  if (kind == "astra") return astra_geometry(path, stack);
+  return tigre_geometry(path, stack);
 }
 
 // Lengths of a geometry are in the unit that scan.json names, else that of its format or of the projections.

@@ -13,8 +13,8 @@
 namespace vdvr::io {
 
 /// Each is a member whose value is a file, but for `geometry`, which is an object.
-inline constexpr std::array<const char*, 5> cone_kinds{"geometry", "matrices", "rtk_geometry", "nikon",
-                                                       "astra"};
+inline constexpr std::array<const char*, 6> cone_kinds{"geometry", "matrices", "rtk_geometry",
+                                                       "nikon",    "astra",    "tigre"};
 
 /// The kind that a scan.json has; nothing for parallel beam. Throws FileError where it has two.
 std::optional<std::string> cone_kind(const Description& about);

@@ -327,9 +327,9 @@ BOOST_AUTO_TEST_CASE(rtk_parameters_hold_until_they_are_given_again_as_in_rtk) {
   const Scan scan;
   static_cast<void>(scan.folder.file("g.xml", rtk_text(scan.setup)));
   const ProjectionSet once = scan.read({{"rtk_geometry", "g.xml"}});
-  static_cast<void>(scan.folder.file(
-      "g.xml", rtk_text(scan.setup, "<CollimationUInf>1e308</CollimationUInf>\n",
-                        "<InPlaneAngle>2</InPlaneAngle><!-- again -->")));
+  static_cast<void>(
+      scan.folder.file("g.xml", rtk_text(scan.setup, "<CollimationUInf>1e308</CollimationUInf>\n",
+                                         "<InPlaneAngle>2</InPlaneAngle><!-- again -->")));
   BOOST_TEST(largest_difference(once, scan.read({{"rtk_geometry", "g.xml"}})) == 0);
 }
 
@@ -566,6 +566,58 @@ BOOST_AUTO_TEST_CASE(astra_files_of_another_detector_or_type_are_refused) {
   BOOST_TEST(has(with({{"Vectors", behind}}), "view 4"));
 }
 
+// TIGRE's own lines: source and detector turned by the angle, then moved by COR along the turned y.
+BOOST_AUTO_TEST_CASE(tigre_geometry_sees_points_where_tigres_rays_hit) {
+  const Scan scan;
+  std::vector<double> angles = scan.setup.angles();
+  for (double& angle : angles) angle *= radians;
+  const double sid = 100, sdd = 150, side_u = 0.4, side_v = 0.5, off_u = 0.3, off_v = -0.2, shift = 0.15;
+  const json good{{"mode", "cone"},
+                  {"DSD", sdd},
+                  {"DSO", sid},
+                  {"nDetector", {rows, columns}},
+                  {"dDetector", {side_v, side_u}},
+                  {"offDetector", {off_v, off_u}},
+                  {"COR", shift},
+                  {"angles", angles}};
+  const auto with = [&](const json& change) {
+    json tigre = good;
+    tigre.update(change);
+    static_cast<void>(scan.folder.file("t.json", tigre.dump()));
+    return scan.refused({{"tigre", "t.json"}});
+  };
+  BOOST_TEST(with(json::object()) == "accepted");
+  const ProjectionSet plain = read_scan(scan.folder.path());
+  const double c = std::cos(angles[7]), s = std::sin(angles[7]), column = 6, row = 1, part = 0.6;
+  const auto turned = [&](double x, double y, double z) {
+    return Vec3{c * x - s * y - shift * s, s * x + c * y + shift * c, z};
+  };
+  // The row that is stored first is the one of the lowest z.
+  const Vec3 source = turned(sid, 0, 0),
+             pixel = turned(sid - sdd, side_u * (column - 0.5 * (columns - 1)) + off_u,
+                            side_v * (row - 0.5 * (rows - 1)) + off_v);
+  double n[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& m = plain.cone->views[7][i];
+    n[i] = m[3];
+    for (std::size_t a = 0; a < 3; ++a) n[i] += m[a] * (source[a] + part * (pixel[a] - source[a]));
+  }
+  BOOST_TEST(std::abs(n[0] / n[2] - column) <= tolerance::fp64_sum(100, columns * sdd));
+  BOOST_TEST(std::abs(n[1] / n[2] - row) <= tolerance::fp64_sum(100, columns * sdd));
+
+  json table = json::array();
+  for (const double angle : angles) table.push_back({angle, 0, 0});
+  BOOST_TEST(with({{"angles", table}, {"DSD", std::vector<double>(views, sdd)}}) == "accepted");
+  BOOST_TEST(largest_difference(plain, read_scan(scan.folder.path())) == 0);
+  table[3][1] = 0.1;
+  BOOST_TEST(has(with({{"angles", table}}), "entry 3 turns about more"));
+  BOOST_TEST(has(with({{"rotDetector", {0, 0.1, 0}}}), "'rotDetector' holds 0.1"));
+  BOOST_TEST(has(with({{"mode", "parallel"}}), "'mode' is 'parallel'"));
+  BOOST_TEST(has(with({{"nDetector", {columns, rows}}}), "'nDetector' is [8, 6]"));
+  BOOST_TEST(has(with({{"DSO", {1, 2}}}), "'DSO' has 2 values"));
+  BOOST_TEST(has(with({{"DSO", 0}}), "distance from source to axis is 0"));
+}
+
 BOOST_AUTO_TEST_CASE(truncated_files_of_geometry_are_refused_at_every_length) {
   const Scan scan;
   const std::string xml = rtk_text(scan.setup),
@@ -651,7 +703,8 @@ BOOST_AUTO_TEST_CASE(nikon_scan_is_read_with_its_white_level_and_clockwise_angle
   BOOST_TEST(std::abs(scan.geometry.pitch_u - 0.25) <= same_geometry);
   BOOST_TEST(scan.report.source_to_detector == 100);
   const double expected = -std::log(static_cast<double>(static_cast<float>(raw_count(2, 1, 1))) / 60000);
-  BOOST_TEST(std::abs(static_cast<double>(scan.data[2 * V * U + U + 1]) - expected) <= tolerance::fp32_sum(2, expected));
+  BOOST_TEST(std::abs(static_cast<double>(scan.data[2 * V * U + U + 1]) - expected) <=
+             tolerance::fp32_sum(2, expected));
   const double theta = -100 * radians;
   BOOST_TEST(std::abs(cone_view(scan.cone->views[1]).source[0] - 50 * std::sin(theta)) <= same_geometry * 50);
   BOOST_TEST(noted(scan, "clockwise"));
