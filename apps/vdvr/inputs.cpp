@@ -49,9 +49,7 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
   ProjectionSet scan = read_scan(path, options, progress);
-  // The checks are of parallel beam; what a cone-beam scan must be, its reader saw to.
-  if (scan.cone) return scan;
-  for (auto& note : check_scan(scan.geometry)) scan.report.notes.push_back(std::move(note));
+  for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
   return scan;
 }
 

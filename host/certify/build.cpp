@@ -222,8 +222,20 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
   return bytes;
 }
 
-// Closes, packs, measures; raises bricks until every node is within the tolerance.
-Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, double tolerance) {
+// Whether a measured volume will do; else the smaller tolerance that it is brought within.
+using Accept = std::function<std::optional<double>(const Measured&)>;
+
+// Those that a smaller tolerance may ask more of than the one they were measured with.
+std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures, double tolerance) {
+  std::vector<std::uint8_t> above(measures.size(), 0);
+  for (std::size_t i = 0; i < above.size(); ++i)
+    above[i] = !(static_cast<double>(measures[i].total) <= tolerance);
+  return above;
+}
+
+// Closes, packs, measures; raises bricks until every node is within the tolerance, and the volume accepted.
+Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, double tolerance,
+                           const Accept& accept) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
   // change those.
   std::vector<std::uint8_t> pending(bricks.level.size());
@@ -248,15 +260,21 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
     const DeviceField field(in.state, volume, in.room.for_bytes(sample_buffer_bytes(volume)));
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
     in.watch.lap("verify");
-    raised = raise_violating(in, test, bricks, tolerance);
-    out.repaired += std::count(raised.begin(), raised.end(), 1);
-    if (std::find(raised.begin(), raised.end(), 1) == raised.end()) {
+    for (;;) {
+      raised = raise_violating(in, test, bricks, tolerance);
+      out.repaired += std::count(raised.begin(), raised.end(), 1);
+      if (std::find(raised.begin(), raised.end(), 1) != raised.end()) break;
       test.sharpen(field, tolerance);
       in.watch.lap("verify");
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      return out;
+      const std::optional<double> smaller = accept(out);
+      if (!smaller) return out;
+      volume = std::move(out.volume);
+      tolerance = *smaller;
+      test.measure(field, volume.level, tolerance, bricks_above(test.measures(), tolerance), "repair");
+      in.watch.lap("verify");
     }
     test.extract(raised);
     in.watch.lap("repair");
@@ -266,7 +284,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 
 // The volume of these base samples within the tolerance.
 Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
-                         double tolerance) {
+                         double tolerance, const Accept& accept) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
@@ -274,7 +292,7 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
   test.emplace(in.state, in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
   classify(in, *test, bricks, tolerance);
-  return close_and_measure(in, *test, bricks, tolerance);
+  return close_and_measure(in, *test, bricks, tolerance, accept);
 }
 
 // The node at which the largest measure lies, on the gold that decided its brick. A brick's border can be
@@ -370,14 +388,18 @@ void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan)
   host.count(4 * plan.base.samples.size(), "the base samples");
 }
 
+// How often a volume may be brought within a smaller tolerance: each time takes what was measured and a
+// quarter.
+constexpr int most_reserves = 4;
+
 SamplerTerms with_reserve(SamplerTerms terms) {
   terms.buffer.value *= 1.25;
   if (terms.image3d) terms.image3d->value *= 1.25;
   return terms;
 }
 
-// The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too much
-// or the samplers take more than was reserved. All but the scan, and what is thrown, in `units`.
+// The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
+// much. All but the scan, and what is thrown, in `units`.
 BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
                            const BuildOptions& options, const Progress& progress) {
   opencl::State& state = device.state();
@@ -418,39 +440,37 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
     return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold, underflow);
   };
-  // The samplers' share is known only from the stored samples: reserve what the base volume suggests, and
-  // more if that was short.
-  SamplerTerms reserve = with_reserve(sampler_of(slopes, longest_atlas(device.info())));
-  Lattice lattice = settings.lattice;
-  for (int attempt = 0;; ++attempt) {
-    const double tolerance = node_tolerance(in, reserve);
-    if (attempt == 0 && options.journal)
-      options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
-    Measured measured;
-    try {
-      measured = measured_volume(in, base, lattice, tolerance);
-    } catch (const ToleranceError&) {
-      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-      if (!(lattice.step > 0) || options.storage != StorageChoice::automatic) throw;
-      lattice = lattice_of(base, plan, units, StorageChoice::f32);
-      continue;
-    }
+  // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
+  // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
+  const double tolerance = node_tolerance(in, with_reserve(sampler_of(slopes, longest_atlas(device.info()))));
+  if (options.journal)
+    options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
+  int times = 0;
+  const Accept accept = [&](const Measured& measured) -> std::optional<double> {
     const SamplerTerms sampler =
         sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
     result.certificate = certify(in, device, scan, filtered, options, measured, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || attempt >= 2 || result.certificate.comparison) {
-      result.volume = std::move(measured.volume);
-      return result;
-    }
-    reserve = with_reserve(sampler);
+    if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
+    return node_tolerance(in, with_reserve(sampler));
+  };
+  try {
+    result.volume = measured_volume(in, base, settings.lattice, tolerance, accept).volume;
+  } catch (const ToleranceError&) {
+    // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
+    if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic) throw;
+    times = 0;
+    const Lattice floats = lattice_of(base, plan, units, StorageChoice::f32);
+    result.volume = measured_volume(in, base, floats, tolerance, accept).volume;
   }
+  return result;
 }
 
 }  // namespace
 
 BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                   const Progress& progress) {
+  require_parallel(scan, "build");
   check_line_integrals(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
   const Units units = units_of(scan);

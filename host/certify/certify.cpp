@@ -122,6 +122,7 @@ void refuse_empty_promise(const Certificate& c) {
 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                const CertifyOptions& options, const Progress& progress) {
+  require_parallel(scan, "plan");
   check_options(options);
   FieldOptions field = options.field;
   field.center = center_of(field, scan.geometry);

@@ -559,6 +559,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
                const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
                const Progress& progress) {
+  require_parallel(scan, "plan");
   if (settings.estimate)
     if (const auto window = row_window(scan, grid, most_samples_planned))
       return of_all_rows(

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/fbp/fdk_weights.hpp"
+#include "host/fbp/reconstruct_cone.hpp"
 #include "host/fbp/view_weights.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -115,6 +117,28 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
         options.origin ? (*options.origin)[a] : -0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a];
   check_grid(grid);
   return grid;
+}
+
+Grid make_grid(const ProjectionSet& scan, const GridOptions& options) {
+  if (!scan.cone) return make_grid(scan.geometry, options);
+  const Grid grid = make_cone_grid(scan, options);
+  check_grid(grid);
+  return grid;
+}
+
+std::vector<std::string> check_scan(const ProjectionSet& scan) {
+  if (!scan.cone) return check_scan(scan.geometry);
+  const FdkWeights weights(*scan.cone, scan.geometry.columns, scan.geometry.rows);
+  std::vector<std::string> notes;
+  if (weights.limited_angle())
+    notes.push_back(
+        "limited angle: a gap between views is above four times the median gap; its weight was capped");
+  if (weights.grouped_views() > 0)
+    notes.push_back(fmt::format("{} coincident views share their weights", weights.grouped_views()));
+  notes.push_back(
+      "FDK: exact in the plane of the orbit, approximate above and below it; a circle does not see enough "
+      "for more");
+  return notes;
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {

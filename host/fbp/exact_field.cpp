@@ -8,8 +8,12 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
+#include "host/fbp/cone_coverage.hpp"
 #include "host/fbp/coverage.hpp"
+#include "host/fbp/fdk_weights.hpp"
+#include "host/fbp/filter_cone.hpp"
 #include "host/fbp/ramp_kernel.hpp"
 #include "host/fbp/view_weights.hpp"
 #include "host/system/parallel.hpp"
@@ -57,14 +61,54 @@ std::shared_ptr<double[]> zeros(std::size_t n, const std::shared_ptr<Scratch>& s
           [scratch](double* first) { scratch->unmap(first); }};
 }
 
+// The samples that the ramp filter is given, and what each view weighs.
+struct WeighedViews {
+  WeighedViews(const ProjectionSet& of, const FieldOptions& field) : scan(of), columns(of.geometry.columns) {
+    if (!scan.cone) {
+      weight = view_weights(scan.geometry.theta_rad).weight;
+      return;
+    }
+    const ConeGeometry cone = used_cone(scan, field);
+    fdk.emplace(cone, columns, scan.geometry.rows);
+    pad_before = fdk->pad_before();
+    columns += pad_before + fdk->pad_after();
+    for (std::size_t k = 0; k < cone.views.size(); ++k) {
+      const ViewMatrix& m = cone.views[k];
+      matrices.push_back(recentred(m, m[0][3] / m[2][3] + static_cast<double>(pad_before)));
+      weight.push_back(fdk->of_view(k) / fdk->view(k).pitch_u);
+    }
+  }
+  // double [row][column] of view k.
+  [[nodiscard]] std::vector<double> samples(std::int64_t k) const {
+    const ParallelGeometry& g = scan.geometry;
+    const float* first = scan.data.data() + k * g.rows * g.columns;
+    if (!fdk) return {first, first + g.rows * g.columns};
+    std::vector<double> out(static_cast<std::size_t>(g.rows * columns));
+    fdk->apply(static_cast<std::size_t>(k), {first, static_cast<std::size_t>(g.rows * g.columns)}, out);
+    return out;
+  }
+
+  const ProjectionSet& scan;
+  std::int64_t columns, pad_before = 0;
+  std::optional<FdkWeights> fdk;
+  std::vector<ViewMatrix> matrices;
+  std::vector<double> weight;
+};
+
 }  // namespace
 
 ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress)
     : geometry_(scan.geometry) {
   if (field.center) geometry_.center = *field.center;
+  const WeighedViews views(scan, field);
+  if (scan.cone) {
+    cone_coverage_ = std::make_shared<ConeCoverage>(cone_coverage(scan, field));
+    views_ = views.matrices;
+    geometry_.center += static_cast<double>(views.pad_before);
+    geometry_.columns = views.columns;
+  }
   const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
-  const auto g = ramp_kernel(field, geometry_.pitch_u, U);
-  const ViewWeights weights = view_weights(geometry_.theta_rad);
+  const auto g = ramp_kernel(field, scan.cone ? 1.0 : geometry_.pitch_u, U);
   const auto cos_u = cosine_table(U), cos_v = cosine_table(V);
   const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
   std::vector<double> mirrored(at(2 * U - 1));  // [U - 1 + i - j]: the kernel at i - j
@@ -77,12 +121,12 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
     double largest_sample = 0, row_norm = 0, rows_norm = 0, norm = 0;
     std::vector<double> rows(at(V * U));  // [v][m]: cosine coefficients in u
     std::vector<double> q(at(U));
-    const float* p = scan.data.data() + k * V * U;
+    const std::vector<double> p = views.samples(k);
     for (std::int64_t v = 0; v < V; ++v) {
       // Sums side by side over i: they vectorise where a sum over j would not.
       std::fill(q.begin(), q.end(), 0.0);
       for (std::int64_t j = 0; j < U; ++j) {
-        const double sample = static_cast<double>(p[v * U + j]) * weights.weight[at(k)];
+        const double sample = p[at(v * U + j)] * views.weight[at(k)];
         const double* shifted = mirrored.data() + (U - 1 - j);
         for (std::int64_t i = 0; i < U; ++i) q[at(i)] += shifted[i] * sample;
         largest_sample = std::max(largest_sample, std::abs(sample));
@@ -113,7 +157,30 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
   rounding_ = std::accumulate(rounding.begin(), rounding.end(), 0.0);
 }
 
+// lambda^-2 times the series in u and v, view by view.
+std::vector<double> ExactField::at_cone(std::span<const Vec3> points, const Progress& progress) const {
+  const std::int64_t U = geometry_.columns, V = geometry_.rows;
+  const auto columns = static_cast<std::size_t>(U), rows = static_cast<std::size_t>(V);
+  std::vector<double> values(points.size());
+  parallel_for(static_cast<std::int64_t>(points.size()), progress, "exact points", [&](std::int64_t i) {
+    double& value = values[static_cast<std::size_t>(i)];
+    std::vector<double> line(columns), basis(rows);
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+      const auto [u, v, lambda] = projected(views_[k], points[static_cast<std::size_t>(i)]);
+      for (std::size_t l = 0; l < rows; ++l)
+        basis[l] = std::cos(static_cast<double>(l) * pi * (v + 0.5) / static_cast<double>(V));
+      for (std::size_t m = 0; m < columns; ++m) {
+        const double* a = coefficients_.get() + (k * columns + m) * rows;
+        line[m] = std::inner_product(basis.begin(), basis.end(), a, 0.0);
+      }
+      value += cosine_sum(line.data(), U, pi * (u + 0.5) / static_cast<double>(U)) / (lambda * lambda);
+    }
+  });
+  return values;
+}
+
 std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress& progress) const {
+  if (!views_.empty()) return at_cone(points, progress);
   const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
   std::map<double, std::vector<std::size_t>> by_height;
   for (std::size_t i = 0; i < points.size(); ++i) by_height[points[i][2]].push_back(i);
@@ -155,6 +222,8 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
   return values;
 }
 
-bool ExactField::covered(const Vec3& point) const { return is_covered(geometry_, geometry_.center, point); }
+bool ExactField::covered(const Vec3& point) const {
+  return cone_coverage_ ? cone_coverage_->margin(point) >= 0 : is_covered(geometry_, geometry_.center, point);
+}
 
 }  // namespace vdvr

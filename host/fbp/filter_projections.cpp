@@ -98,6 +98,7 @@ void measure_views(FilteredScan& out, std::span<const float> data, const ViewWei
 
 // The scan's geometry with the centre in use.
 ParallelGeometry used_geometry(const ProjectionSet& scan, const FieldOptions& field, const Units& units) {
+  require_parallel(scan, "filter_projections");
   ParallelGeometry geometry = from_world(scan.geometry, units);
   if (field.center) geometry.center = *field.center;
   return geometry;

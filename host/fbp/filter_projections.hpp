@@ -22,12 +22,14 @@
 
 namespace vdvr {
 
-/// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z).
+/// Ramp-filtered projections at detector resolution, times the view weights: F(x, y, z) = sum_k q_k(t_k, z),
+/// or, of a cone-beam scan, F(p) = sum_k lambda_k(p)^-2 q_k(u_k(p), v_k(p)).
 struct FilteredScan {
-  ParallelGeometry geometry;     ///< with the centre in use, in the units of the samples
-  SampleArray samples;           ///< [view][u][v]; lies where the scan's data do
-  std::int64_t fft_length = 0;   ///< of the zero-padded transform that gives the linear convolution
-  std::vector<double> view_max;  ///< max |q| of each view's samples
+  ParallelGeometry geometry;      ///< with the centre in use, in the units of the samples
+  std::vector<ViewMatrix> views;  ///< of cone beam, in the same units and for these columns; else none
+  SampleArray samples;            ///< [view][u][v]; lies where the scan's data do
+  std::int64_t fft_length = 0;    ///< of the zero-padded transform that gives the linear convolution
+  std::vector<double> view_max;   ///< max |q| of each view's samples
   double ramp_error =
       0;  ///< sum over views of a bound on the error of any filtered sample (docs/error-bounds.md)
   bool limited_angle = false;

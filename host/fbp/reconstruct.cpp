@@ -15,6 +15,7 @@
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/reconstruct.hpp"
+#include "host/fbp/reconstruct_cone.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
@@ -63,14 +64,23 @@ UpsampledColumns columns_for(const ParallelGeometry& g, const Grid& grid, int up
   return upsampled_columns(g.columns, upsampling, (kept_margin(grid, 1) + grid.spacing[0]) / g.pitch_u);
 }
 
-namespace {
+// Columns of z become rows of x. The planes of a volume lie a power of two apart and would share a few cache
+// sets: 16 of them are gathered aside and written row by row.
+void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
+                   std::array<std::int32_t, 2> kept, float* target, std::int64_t plane) {
+  const std::int64_t width = kept[1] - kept[0] + 1, aside = width + 16;
+  if (width <= 0) return;
+  std::vector<float> rows(static_cast<std::size_t>(16 * aside));
+  for (std::int64_t first = 0; first < nz; first += 16) {
+    const float* from = columns.data() + kept[0] * stride + first;
+    for (std::int64_t x = 0; x < width; ++x, from += stride)
+      for (std::int64_t z = 0; z < 16; ++z) rows[static_cast<std::size_t>(z * aside + x)] = from[z];
+    for (std::int64_t z = 0; z < std::min<std::int64_t>(16, nz - first); ++z)
+      std::copy_n(rows.data() + z * aside, width, target + (first + z) * plane + kept[0]);
+  }
+}
 
-// Where a slab's planes go, zeros so far, and what is done once they are there.
-struct Planes {
-  std::function<float*(std::int64_t first, std::int64_t count)> target;
-  std::function<void(std::int64_t first, std::int64_t count)> done = [](std::int64_t, std::int64_t) {};
-  std::uint64_t bytes = 0;  // that a plane takes beside the slab; 0: counted elsewhere
-};
+namespace {
 
 using SlabMaker = std::function<UpsampledSlab(const UpsampledColumns&, std::span<const double>)>;
 
@@ -111,22 +121,6 @@ std::vector<std::array<std::int32_t, 2>> kept_columns(const ParallelGeometry& g,
       kept[static_cast<std::size_t>(y)] = {static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)};
   });
   return kept;
-}
-
-// Columns of z become rows of x. The planes of a volume lie a power of two apart and would share a few cache
-// sets: 16 of them are gathered aside and written row by row.
-void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
-                   std::array<std::int32_t, 2> kept, float* target, std::int64_t plane) {
-  const std::int64_t width = kept[1] - kept[0] + 1, aside = width + 16;
-  if (width <= 0) return;
-  std::vector<float> rows(static_cast<std::size_t>(16 * aside));
-  for (std::int64_t first = 0; first < nz; first += 16) {
-    const float* from = columns.data() + kept[0] * stride + first;
-    for (std::int64_t x = 0; x < width; ++x, from += stride)
-      for (std::int64_t z = 0; z < 16; ++z) rows[static_cast<std::size_t>(z * aside + x)] = from[z];
-    for (std::int64_t z = 0; z < std::min<std::int64_t>(16, nz - first); ++z)
-      std::copy_n(rows.data() + z * aside, width, target + (first + z) * plane + kept[0]);
-  }
 }
 
 void reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const SlabMaker& make_slab,
@@ -231,6 +225,9 @@ void reconstruct_scan(Device& device, const ProjectionSet& scan, const Units& un
       (options.upsampling & (options.upsampling - 1)) != 0)
     throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", options.upsampling));
   opencl::State& state = device.state();
+  if (scan.cone)
+    return reconstruct_cone(state, scan, units, grid, options, planes, progress,
+                            [&](const std::string& stage) { watch.lap(state, stage); });
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;

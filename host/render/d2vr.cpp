@@ -135,6 +135,7 @@ std::vector<cl_float4> Projections::views(const Grid& grid) const {
 D2vrField::D2vrField(Device& device, const ProjectionSet& scan, const D2vrOptions& options,
                      const Progress& progress)
     : impl_(std::make_unique<Impl>()) {
+  require_parallel(scan, "method d2vr");
   check_options(scan.geometry, options);
   impl_->state = &device.state();
   impl_->rate = options.upsampling;

@@ -60,6 +60,12 @@ Vec3 projected(const ViewMatrix& m, const Vec3& p) {
   return {of(0) / lambda, of(1) / lambda, lambda};
 }
 
+Vec3 projected_direction(const ViewMatrix& m, const Vec3& d) {
+  const auto of = [&](std::size_t i) { return m[i][0] * d[0] + m[i][1] * d[1] + m[i][2] * d[2]; };
+  const double lambda = of(2);
+  return {of(0) / lambda, of(1) / lambda, lambda};
+}
+
 ViewMatrix normalised(ViewMatrix matrix) {
   const double scale = matrix[2][3];
   if (!std::isfinite(scale) || scale == 0)

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <memory>
 #include <set>
+#include <tuple>
 
 #include "host/geometry/description.hpp"
 #include "host/geometry/nikon_geometry.hpp"
@@ -128,13 +129,7 @@ RawScan open_hdf5(const Description& about) {
 void set_geometry(const Description& about, RawScan& scan) {
   if (about.has("center")) scan.center = about.number("center");
   if (about.has("unit")) scan.unit = about.text("unit");
-  if (about.has("pitch")) {
-    const auto pitch =
-        about.is_list("pitch") ? about.numbers("pitch") : std::vector<double>(2, about.number("pitch"));
-    if (pitch.size() != 2) about.fail("'pitch' must be one number or [u, v]");
-    scan.pitch_u = pitch[0];
-    scan.pitch_v = pitch[1];
-  }
+  if (about.has("pitch")) std::tie(scan.pitch_u, scan.pitch_v) = about.pair("pitch");
   if (!about.has("air_columns")) return;
   scan.air_columns = about.ranges("air_columns");
   std::int64_t count = 0;

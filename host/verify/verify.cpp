@@ -333,6 +333,7 @@ void add_differences(VerifyResult& r) {
 
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                     const Certificate& stored, const VerifyOptions& options, const Progress& progress) {
+  require_parallel(scan, "verify");
   opencl::State& state = device.state();
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;

@@ -81,6 +81,8 @@ VDVR_API Redundancy natural_redundancy(const ConeGeometry& cone, std::int64_t co
 VDVR_API ViewMatrix recentred(ViewMatrix matrix, double center);
 
 /// (u, v, lambda) of a point.
-Vec3 projected(const ViewMatrix& matrix, const Vec3& point);
+VDVR_API Vec3 projected(const ViewMatrix& matrix, const Vec3& point);
+/// u and v of the points infinitely far away in a direction, and by how much lambda grows along it.
+VDVR_API Vec3 projected_direction(const ViewMatrix& matrix, const Vec3& direction);
 
 }  // namespace vdvr

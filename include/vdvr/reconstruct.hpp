@@ -29,6 +29,9 @@ struct GridOptions {
 
 /// Throws InputError for an empty, non-finite or overflowing grid, or a scan with no covered region.
 VDVR_API Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options);
+/// The same for rays of either kind. Of cone beam the default box is that around the circle that all views
+/// see and the heights that they see of the axis.
+VDVR_API Grid make_grid(const ProjectionSet& scan, const GridOptions& options);
 
 /// How far inside (positive) or outside (negative) the covered region a point lies, in world units; a lower
 /// bound of the distance to the region's boundary outside it. Covered: margin >= 0.
@@ -66,5 +69,6 @@ VDVR_API void reconstruct_planes(Device& device, const ProjectionSet& scan, cons
 /// Checks a scan for what reconstruction assumes; throws InputError (half acquisition, too few views, ...).
 /// Returns notes for the user: limited angle, grouped views.
 VDVR_API std::vector<std::string> check_scan(const ParallelGeometry& geometry);
+VDVR_API std::vector<std::string> check_scan(const ProjectionSet& scan);
 
 }  // namespace vdvr

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/cone.hpp"
@@ -75,21 +74,20 @@ int volume_info(const std::filesystem::path& path, const CommonOptions& common) 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
+  const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
   Json json = {{"file", path.string()},
                {"kind", "projections"},
                {"geometry", geometry_json(scan.geometry)},
                {"report", report_json(scan.report)},
-               {"range", {*range.first, *range.second}}};
-  std::optional<Grid> grid;  // what parallel beam covers
-  if (!scan.cone) grid = make_grid(scan.geometry, {});
-  if (grid) json["default_grid"] = grid_json(*grid);
+               {"range", {*range.first, *range.second}},
+               {"default_grid", grid_json(grid)}};
   if (scan.cone) json["cone"] = cone_json(scan);
   print_result(common, json, [&] {
     print_scan(scan);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
-    if (grid) print_grid(*grid);
+    print_grid(grid);
   });
   return 0;
 }

@@ -41,7 +41,7 @@ int reconstruct_command(Arguments& args) {
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, options.field, progress.callback());
-  const Grid grid = make_grid(scan.geometry, grid_wanted);
+  const Grid grid = make_grid(scan, grid_wanted);
   VolumeWriter file(output, grid);
   float lo = std::numeric_limits<float>::infinity(), hi = -lo;
   const auto take = [&](std::int64_t, std::span<const float> planes) {

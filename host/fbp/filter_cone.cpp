@@ -1,0 +1,105 @@
+// Cone-beam projections weighed and ramp-filtered. Calls fdk_weights.cpp and filter_rows.cpp.
+#include "host/fbp/filter_cone.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/fbp/fdk_weights.hpp"
+#include "host/fbp/ramp_kernel.hpp"
+#include "host/system/casts.hpp"
+#include "host/system/huge_pages.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+ConeGeometry used_cone(const ProjectionSet& scan, const FieldOptions& field) {
+  ConeGeometry cone = *scan.cone;
+  if (!field.center) return cone;
+  // All views move alike: what they differ by is known, where the axis lies among them is not.
+  const double shift = *field.center - scan.geometry.center;
+  for (ViewMatrix& matrix : cone.views) matrix = recentred(matrix, matrix[0][3] / matrix[2][3] + shift);
+  return cone;
+}
+
+namespace {
+
+ViewMatrix padded(const ViewMatrix& matrix, const FdkWeights& weights) {
+  return recentred(matrix, matrix[0][3] / matrix[2][3] + static_cast<double>(weights.pad_before()));
+}
+
+}  // namespace
+
+ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field) {
+  ConeGeometry cone = used_cone(scan, field);
+  const ParallelGeometry& g = scan.geometry;
+  const FdkWeights weights(cone, g.columns, g.rows);
+  for (ViewMatrix& matrix : cone.views) matrix = padded(matrix, weights);
+  return {cone.views, g.columns + weights.pad_before() + weights.pad_after(), g.rows};
+}
+
+ViewMatrix from_world(ViewMatrix matrix, const Units& units) {
+  for (auto& row : matrix)
+    for (std::size_t a = 0; a < 3; ++a) row[a] = std::ldexp(row[a], a == 2 ? units.along : units.across);
+  return matrix;
+}
+
+FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                         const Progress& progress, Precision precision, const Units& units) {
+  const ParallelGeometry& detector = scan.geometry;
+  const ConeGeometry cone = used_cone(scan, field);
+  const FdkWeights weights(cone, detector.columns, detector.rows);
+  FilteredScan out;
+  out.geometry = parallel_limit(cone, detector.columns + weights.pad_before() + weights.pad_after(),
+                                detector.rows, detector.unit);
+  out.geometry.center += static_cast<double>(weights.pad_before());
+  out.geometry.pitch_u = std::ldexp(out.geometry.pitch_u, -units.across);
+  out.geometry.pitch_v = std::ldexp(out.geometry.pitch_v, -units.along);
+  out.limited_angle = weights.limited_angle();
+  std::vector<double> of_view;
+  for (std::size_t k = 0; k < cone.views.size(); ++k) {
+    out.views.push_back(from_world(padded(cone.views[k], weights), units));
+    // The ramp's is 1 over the pitch; line integrals and pitches are those of computation.
+    of_view.push_back(std::ldexp(weights.of_view(k) / weights.view(k).pitch_u, units.across - units.line));
+  }
+
+  const ParallelGeometry& g = out.geometry;
+  const std::int64_t size = g.rows * g.columns, own = detector.rows * detector.columns, views = g.views();
+  const auto samples = at(views * size);
+  out.samples = scan.data.scratch() ? SampleArray(samples, scan.data.scratch(), "the filtered projections")
+                                    : SampleArray(large_zeros(samples));
+  out.view_max.assign(at(views), 0.0);
+  constexpr std::int64_t together = std::int64_t{64} << 20;  // bytes of a chunk of weighed views
+  ParallelGeometry chunk = g;
+  const std::vector<double> kernel = ramp_kernel(field, 1.0, g.columns);
+  std::unique_ptr<RowFilter> filter;
+  std::vector<float> weighed;
+  const std::int64_t step = std::clamp<std::int64_t>(together / (size * 4), 1, views);
+  for (std::int64_t first = 0; first < views; first += step) {
+    const std::int64_t n = std::min(step, views - first);
+    if (!filter || chunk.views() != n) {
+      chunk.theta_rad.assign(at(n), 0.0);
+      filter = make_row_filter(state, chunk, kernel, FilterMethod::automatic, precision);
+      weighed.resize(at(n * size));
+    }
+    parallel_for(n, {}, "", [&](std::int64_t k) {
+      std::vector<double> view(at(size));
+      weights.apply(at(first + k), std::span<const float>(scan.data).subspan(at((first + k) * own), at(own)),
+                    view);
+      std::transform(view.begin(), view.end(), weighed.begin() + k * size,
+                     [](double p) { return static_cast<float>(p); });
+    });
+    const std::span<float> target = std::span<float>(out.samples).subspan(at(first * size), at(n * size));
+    (*filter)(weighed, std::span<const double>(of_view).subspan(at(first), at(n)), target, {});
+    parallel_for(n, {}, "", [&](std::int64_t k) {
+      const std::span<const float> view = target.subspan(at(k * size), at(size));
+      if (!std::all_of(view.begin(), view.end(), [](float q) { return std::isfinite(q); }))
+        throw not_finite(first + k);
+      out.view_max[at(first + k)] = static_cast<double>(largest_magnitude(view));
+    });
+    report(progress, "filter", static_cast<double>(first + n) / static_cast<double>(views));
+  }
+  return out;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,24 @@
+// The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam"). Called by reconstruct_cone.cpp.
+#pragma once
+
+#include "host/fbp/cone_coverage.hpp"
+#include "host/fbp/filter_projections.hpp"
+#include "host/scan/units.hpp"
+
+namespace vdvr {
+
+/// The matrices with the centre in use.
+ConeGeometry used_cone(const ProjectionSet& scan, const FieldOptions& field);
+/// Columns that a displaced detector is padded with count as seen: their rays weigh nothing.
+ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field);
+/// In units of computation.
+ViewMatrix from_world(ViewMatrix matrix, const Units& units);
+
+/// Samples weighed, filtered along rows at the pitch at the axis, times the views' weights. The detector gets
+/// the columns that FdkWeights pads it with. Cost: as filter_projections(). Memory: as its; a chunk of views
+/// in double precision.
+FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                         const Progress& progress = {}, Precision precision = Precision::fp64,
+                         const Units& units = {});
+
+}  // namespace vdvr
