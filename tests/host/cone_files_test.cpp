@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <boost/test/unit_test.hpp>
+#include <optional>
+#include <sstream>
 
 #include "host/geometry/nikon_geometry.hpp"
 #include "host/io/npy_file.hpp"
@@ -331,6 +333,66 @@ BOOST_AUTO_TEST_CASE(rtk_parameters_hold_until_they_are_given_again_as_in_rtk) {
       scan.folder.file("g.xml", rtk_text(scan.setup, "<CollimationUInf>1e308</CollimationUInf>\n",
                                          "<InPlaneAngle>2</InPlaneAngle><!-- again -->")));
   BOOST_TEST(largest_difference(once, scan.read({{"rtk_geometry", "g.xml"}})) == 0);
+}
+
+// Blocks of docs/inputs.md, "Cone beam", as a user copies them: what begins with '{"proj' or '{"nikon' is a
+// scan.json, the others are the files that it names.
+BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
+  const std::string text = support::bytes_of(Path(VDVR_SOURCE_DIR) / "docs/inputs.md");
+  std::istringstream lines(text.substr(text.find("## Cone beam\n")));
+  std::vector<std::string> blocks;
+  std::string line;
+  for (bool within = false; std::getline(lines, line) && line.rfind("## From counts", 0) != 0;) {
+    const bool code = line.rfind("    ", 0) == 0;
+    if (code && !within) blocks.emplace_back();
+    if (code) blocks.back() += line.substr(4) + "\n";
+    within = code;
+  }
+  const TemporaryFolder folder;
+  static_cast<void>(folder.file(
+      "stack.mha", stack_bytes(256, 256, 4, "Offset = -25.5 -25.5 0\nElementSpacing = 0.2 0.2 1\n")));
+  for (const char* name : {"view_0.tif", "view_1.tif", "view_2.tif", "view_3.tif", "flat.tif", "dark.tif"})
+    write_tiff(folder / name, 256, 256,
+               std::vector<std::uint16_t>(256 * 256, name[0] == 'f'   ? 60000
+                                                     : name[0] == 'd' ? 10
+                                                                      : 30000),
+               SAMPLEFORMAT_UINT);
+  static_cast<void>(folder.file("angles.txt", "0 90 180 270\n"));
+  std::optional<ProjectionSet> first;
+  std::size_t read = 0;
+  const auto check = [&](const std::string& scan) {
+    static_cast<void>(folder.file("scan.json", scan));
+    const ProjectionSet one = read_scan(folder.path());
+    BOOST_TEST(one.cone->views.size() == 4u);
+    BOOST_TEST(one.report.source_to_detector ==
+               (scan.find("matrices") == std::string::npos && scan.find("vectors.json") == std::string::npos
+                    ? 1000
+                    : 0));
+    if (!first) first = one;
+    static_cast<void>(folder.file("P.npy", npy_bytes(matrices_of(*first), "4, 3, 4")));
+    ++read;
+  };
+  std::string scan;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const std::string& block = blocks[i];
+    const bool described = block.rfind("{\"proj", 0) == 0 || block.rfind("{\"nikon", 0) == 0;
+    if (described) scan = block;
+    // The files that a description names follow it.
+    const bool file_follows = i + 1 < blocks.size() && blocks[i + 1].rfind("{\"proj", 0) != 0 &&
+                              blocks[i + 1].rfind("{\"nikon", 0) != 0;
+    if (described && !file_follows) check(scan);
+    if (described) continue;
+    if (block.rfind("<RTK", 0) == 0) static_cast<void>(folder.file("geometry.xml", block));
+    else if (block.rfind("[XTekCT]", 0) == 0) static_cast<void>(folder.file("scan.xtekct", block));
+    else if (block.find("\"mode\"") != std::string::npos) static_cast<void>(folder.file("tigre.json", block));
+    else static_cast<void>(folder.file("astra.json", block));
+    if (block.find("cone_vec") != std::string::npos) {
+      static_cast<void>(folder.file("vectors.json", block));
+      scan.replace(scan.find("astra.json"), 10, "vectors.json");
+    }
+    check(scan);
+  }
+  BOOST_TEST(read == 7u);
 }
 
 // --- what is assumed, and who wins ---
