@@ -286,8 +286,8 @@ void require_no_displaced_short_scan(const fs::path& path, const ConeGeometry& c
   if (open && displaced && cone.redundancy != Redundancy::full_turn)
     throw FileError(fmt::format(
         "{}: a short scan ({:.1f} degrees) whose axis is seen at column {:.2f} of {}: the opposite views "
-        "that "
-        "would see the far side do not exist; crop the wider side of the detector, or measure a full turn",
+        "that would see the far side do not exist; crop the wider side of the detector, or measure a full "
+        "turn",
         path.string(), arc.arc_rad * (180 / std::numbers::pi), g.center, g.columns));
 }
 

@@ -16,7 +16,7 @@ macro(find_python_with test seconds)
         execute_process(COMMAND "${python}" -m pip install --quiet --disable-pip-version-check ${ARGN} RESULT_VARIABLE code
           OUTPUT_QUIET ERROR_QUIET TIMEOUT ${seconds})
         if(NOT code EQUAL 0)
-          set(reason "${ARGN} cannot be installed")
+          string(REPLACE ";" " and " reason "${ARGN} cannot be installed")
         endif()
       endif()
     endif()
