@@ -20,6 +20,7 @@ int verify_command(Arguments& args);
 int probe_command(Arguments& args);
 int render_command(Arguments& args);
 int export_command(Arguments& args);
+int convert_geometry_command(Arguments& args);
 int run_command(Arguments& args);
 int bench_command(Arguments& args);
 

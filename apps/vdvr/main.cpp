@@ -23,6 +23,8 @@ const std::vector<Command>& commands() {
        probe_command},
       {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
       {"export", "OUT.vdvr -o VOL.mha", "a uniform volume from a certified one", export_command},
+      {"convert-geometry", "IN -o geometry.xml", "RTK's geometry file of a cone-beam scan",
+       convert_geometry_command},
       {"run", "IN --epsilon E -o DIR", "plan, build, verify, render: everything from one scan", run_command},
       {"bench", "fbp|build|render ...", "timings, one JSON line per case", bench_command}};
   return table;
@@ -35,7 +37,7 @@ void print_overview() {
              VDVR_VERSION);
   fmt::print(
       "usage: vdvr COMMAND [options]\n       vdvr COMMAND --help\n       vdvr --version\n\ncommands:\n");
-  for (const Command& c : commands()) fmt::print("  {:<12} {}\n", c.name, c.purpose);
+  for (const Command& c : commands()) fmt::print("  {:<16} {}\n", c.name, c.purpose);
 }
 
 int dispatch(const std::vector<std::string>& words) {

@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "apps/common/messages.hpp"
+#include "apps/vdvr/cone.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;
@@ -112,6 +113,7 @@ void print_scan(const ProjectionSet& scan) {
              g.views(), g.columns, g.rows);
   fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
   fmt::print("  centre       column {:.4f} ({})\n", g.center, scan.report.center_source);
+  if (scan.cone) print_cone(scan);
   if (scan.report.dead_pixels != 0) fmt::print("  dead pixels  {} replaced\n", scan.report.dead_pixels);
   if (scan.report.air_background) fmt::print("  background   linear air background taken off\n");
   fmt::print("  sha256       {}\n", scan.report.sha256);

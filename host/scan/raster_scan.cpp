@@ -39,18 +39,15 @@ std::vector<double> read_numbers(const std::filesystem::path& path) {
   return values;
 }
 
-RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file) {
+RawScan open_raster_stack(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   RawScan scan;
-  const auto samples = std::make_shared<RasterSamples>(read_raster_header(path));
+  const auto samples = std::make_shared<RasterSamples>(read_raster_header(path), max_memory_bytes);
   const RasterHeader& header = samples->header();
   scan.format = header.format;
   scan.columns = header.samples[0];
   scan.rows = header.samples[1];
   scan.counts = false;
-  scan.theta_deg = read_numbers(angles_file);
-  if (static_cast<std::int64_t>(scan.theta_deg.size()) != header.samples[2])
-    throw FileError(fmt::format("{}: {} angles for the {} views of {}", angles_file.string(),
-                                scan.theta_deg.size(), header.samples[2], path.string()));
+  scan.integer = header.kind != ScalarKind::floating;
   scan.pitch_u = header.spacing[0];
   scan.pitch_v = header.spacing[1];
   if (!header.unit.empty()) scan.unit = header.unit;
@@ -65,6 +62,15 @@ RawScan open_raster_scan(const std::filesystem::path& path, const std::filesyste
   scan.files.emplace_back(path.filename().string(), path);
   if (header.data_file != header.file)
     scan.files.emplace_back(header.data_file.filename().string(), header.data_file);
+  return scan;
+}
+
+RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file) {
+  RawScan scan = open_raster_stack(path, 0);
+  scan.theta_deg = read_numbers(angles_file);
+  if (static_cast<std::int64_t>(scan.theta_deg.size()) != scan.projections.count)
+    throw FileError(fmt::format("{}: {} angles for the {} views of {}", angles_file.string(),
+                                scan.theta_deg.size(), scan.projections.count, path.string()));
   return scan;
 }
 

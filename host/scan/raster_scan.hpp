@@ -1,13 +1,17 @@
-// MetaImage and NRRD stacks as scans. Called by read_scan.cpp and scan_folder.cpp.
+// MetaImage and NRRD stacks as scans. Called by read_scan.cpp, scan_folder.cpp and scan_members.cpp.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 #include "host/scan/raw_scan.hpp"
 
 namespace vdvr::io {
 
-/// A MetaImage or NRRD stack [angle][v][u] of line integrals. Throws FileError.
+/// A MetaImage or NRRD stack [angle][v][u] without its angles, and until the caller says otherwise of line
+/// integrals. Throws FileError, ResourceError.
+RawScan open_raster_stack(const std::filesystem::path& path, std::uint64_t max_memory_bytes);
+/// The same with its angles.
 RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file);
 
 /// Numbers separated by blanks, commas or line ends; # starts a comment. Throws FileError naming the word and

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "host/geometry/cone_views.hpp"
+
 namespace vdvr::io {
 
 /// Frames of rows x columns samples.
@@ -20,10 +22,18 @@ struct Frames {
   std::function<std::string(std::int64_t)> name;                              ///< of one frame, for messages
 };
 
+/// What makes a scan one of cone beam.
+struct RawCone {
+  ConeViews geometry;                    ///< one view for each projection
+  std::string member;                    ///< of scan.json, which brought it
+  std::optional<Redundancy> redundancy;  ///< where scan.json states it
+};
+
 struct RawScan {
   std::string format;  ///< "data-exchange", "nxtomo", "scan.json", "mha", "nrrd"
   std::int64_t rows = 0, columns = 0;
-  std::vector<double> theta_deg;
+  std::vector<double> theta_deg;     ///< parallel beam: one a view
+  std::optional<RawCone> cone;       ///< then `center` is where scan.json moves the axis to
   Frames projections, flats, darks;  ///< flats and darks only with counts
   bool counts = true;                ///< false: line integrals
   bool integer = false;              ///< counts are whole numbers
@@ -36,7 +46,7 @@ struct RawScan {
   std::vector<std::string> notes;
 };
 
-/// Keeps the views first .. last - 1 and their angles.
+/// Keeps the views first .. last - 1 and their geometry.
 inline void select_views(RawScan& scan, std::int64_t first, std::int64_t last) {
   const Frames all = scan.projections;
   scan.projections.count = last - first;
@@ -44,7 +54,12 @@ inline void select_views(RawScan& scan, std::int64_t first, std::int64_t last) {
     all.read(first + k, n, out);
   };
   scan.projections.name = [all, first](std::int64_t k) { return all.name(first + k); };
-  scan.theta_deg.assign(scan.theta_deg.begin() + first, scan.theta_deg.begin() + last);
+  const auto keep = [first, last](auto& list) {
+    list.erase(list.begin() + last, list.end());
+    list.erase(list.begin(), list.begin() + first);
+  };
+  if (scan.cone) keep(scan.cone->geometry.views);
+  else keep(scan.theta_deg);
 }
 
 }  // namespace vdvr::io

@@ -86,17 +86,19 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
 
 // --- geometry and memory ---
 
+// Of cone beam the detector alone.
 ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
   ParallelGeometry g;
   g.columns = raw.columns;
   g.rows = raw.rows;
+  g.unit = raw.unit;
+  if (raw.projections.count < 1) throw FileError(fmt::format("{}: holds no projections", name));
+  if (raw.cone) return g;
   g.pitch_u = raw.pitch_u;
   g.pitch_v = raw.pitch_v;
-  g.unit = raw.unit;
   for (const double pitch : {g.pitch_u, g.pitch_v})
     if (!(pitch > 0) || !std::isfinite(pitch))
       throw FileError(fmt::format("{}: pitch {}; it must be positive", name, pitch));
-  if (raw.projections.count < 1) throw FileError(fmt::format("{}: holds no projections", name));
   for (std::size_t k = 0; k < raw.theta_deg.size(); ++k) {
     if (!std::isfinite(raw.theta_deg[k]))
       throw FileError(fmt::format("{}: angle {} is {}", name, k, raw.theta_deg[k]));
@@ -224,6 +226,17 @@ std::string name_of(const fs::path& path, bool folder) {
   return whole.filename().string();
 }
 
+void require_on_detector(const fs::path& path, double center, std::int64_t columns,
+                         const ScanOptions& options) {
+  const double last = static_cast<double>(columns) - 0.5;
+  if (!(center >= -0.5 && center <= last)) {
+    const std::string text =
+        fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}", path.string(), center, last);
+    if (options.center) throw InputError(text);
+    throw FileError(text);
+  }
+}
+
 void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
                    ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
@@ -248,13 +261,58 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
         "`center` where it is elsewhere",
         g.center));
   }
-  const double last = static_cast<double>(g.columns) - 0.5;
-  if (!(g.center >= -0.5 && g.center <= last)) {
-    const std::string text = fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}",
-                                         path.string(), g.center, last);
-    if (options.center) throw InputError(text);
-    throw FileError(text);
+  require_on_detector(path, g.center, g.columns, options);
+}
+
+// --- cone beam ---
+
+// All views moved alike, so that the isocentre is seen at column `wanted` on the average.
+void move_axis(ConeGeometry& cone, double wanted) {
+  double mean = 0;
+  for (const ViewMatrix& m : cone.views) mean += m[0][3] / m[2][3] / static_cast<double>(cone.views.size());
+  for (ViewMatrix& m : cone.views) m = recentred(m, m[0][3] / m[2][3] + wanted - mean);
+}
+
+// The opposite views, which would see what the narrower side does not, do not exist. Who states a full turn
+// has it so.
+void require_no_displaced_short_scan(const fs::path& path, const ConeGeometry& cone,
+                                     const ParallelGeometry& g) {
+  const SourceArc arc = source_arc(cone);
+  const double below = g.center, above = static_cast<double>(g.columns - 1) - g.center;
+  const bool open = cone.redundancy == Redundancy::short_scan ||
+                    natural_redundancy(cone, g.columns) == Redundancy::short_scan;
+  const bool displaced =
+      cone.redundancy == Redundancy::displaced || std::abs(above - below) >= 0.1 * (above + below);
+  if (open && displaced && cone.redundancy != Redundancy::full_turn)
+    throw FileError(fmt::format(
+        "{}: a short scan ({:.1f} degrees) whose axis is seen at column {:.2f} of {}: the opposite views "
+        "that would see the far side do not exist; crop the wider side of the detector, or measure a full "
+        "turn",
+        path.string(), arc.arc_rad * (180 / std::numbers::pi), g.center, g.columns));
+}
+
+void set_cone(const fs::path& path, const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan) {
+  ConeGeometry cone;
+  cone.views = raw.cone->geometry.views;
+  InputReport& r = scan.report;
+  r.source_to_detector = raw.cone->geometry.source_to_detector;
+  r.center_source = options.center ? "option" : raw.center ? "file" : raw.cone->geometry.center_source;
+  if (const auto wanted = options.center ? options.center : raw.center) {
+    require_on_detector(path, *wanted, raw.columns, options);
+    move_axis(cone, *wanted);
+    r.notes.push_back(fmt::format("all views were moved so that the axis is at column {:g}, as {} says",
+                                  *wanted, options.center ? "`center`" : "scan.json's 'center'"));
   }
+  cone.redundancy = raw.cone->redundancy.value_or(natural_redundancy(cone, raw.columns));
+  scan.geometry = parallel_limit(cone, raw.columns, raw.rows, raw.unit);
+  require_on_detector(path, scan.geometry.center, raw.columns, options);
+  require_no_displaced_short_scan(path, cone, scan.geometry);
+  const SourceArc arc = source_arc(cone);
+  r.notes.push_back(
+      fmt::format("weights of a {} scan, as {}: sources over {:.1f} degrees, axis at column {:.2f}",
+                  text_of(cone.redundancy), raw.cone->redundancy ? "scan.json says" : "the views tell",
+                  arc.arc_rad * (180 / std::numbers::pi), scan.geometry.center));
+  scan.cone = std::move(cone);
 }
 
 // A description that may name an HDF5 file: by its member, or by a letter of it written as \\u0068.
@@ -297,6 +355,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.report.format = raw.format;
   scan.report.notes = raw.notes;
   scan.geometry = geometry_of(raw, path.string());
+  if (raw.cone) set_cone(path, raw, options, scan);
   require_room(raw, options, path.string());
   const auto before = stamps_of(raw);
   read_samples(raw, options, scan, progress);
@@ -313,7 +372,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
-  choose_center(path, raw, options, scan);
+  if (!raw.cone) choose_center(path, raw, options, scan);
   return scan;
 }
 

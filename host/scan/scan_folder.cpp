@@ -7,13 +7,15 @@
 #include <fnmatch.h>
 
 #include <algorithm>
-#include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <set>
+#include <tuple>
 
-#include "host/io/natural_order.hpp"
+#include "host/geometry/description.hpp"
+#include "host/geometry/nikon_geometry.hpp"
+#include "host/io/raster_file.hpp"
 #include "host/io/tiff.hpp"
+#include "host/scan/scan_members.hpp"
 #include "host/scan/hdf5_scan.hpp"
 #include "host/scan/raster_scan.hpp"
 #include "host/system/limits.hpp"
@@ -23,121 +25,14 @@ namespace vdvr::io {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
-// scan.json with typed access; every complaint names the member.
-class Description {
- public:
-  explicit Description(const fs::path& folder) : folder_(folder), path_(folder / "scan.json") {
-    std::error_code error;
-    std::ifstream file(path_);
-    if (!fs::is_regular_file(path_, error) || !file)
-      fail("cannot be opened; a folder is a scan by its scan.json");
-    // The description of a scan takes lines, not megabytes: a larger file is something else.
-    constexpr std::uintmax_t largest = 16u << 20;
-    if (fs::file_size(path_, error) > largest) fail("is too large for a description");
-    try {
-      json_ = json::parse(file, nullptr, true, true);
-    } catch (const json::exception& e) {
-      fail(fmt::format("is not JSON: {}", e.what()));
-    }
-    if (!json_.is_object()) fail("is not a JSON object");
-    static const std::set<std::string> known{"projections", "hdf5",        "flats",  "darks", "angles",
-                                             "angle_range", "use",         "center", "pitch", "unit",
-                                             "air_columns", "description", "comment"};
-    for (const auto& [key, value] : json_.items())
-      if (!known.count(key)) fail(fmt::format("member '{}' is unknown", key));
-  }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw FileError(fmt::format("{}: {}", path_.string(), what));
-  }
-  bool has(const char* key) const { return json_.contains(key); }
-  const fs::path& folder() const { return folder_; }
-
-  std::string text(const char* key) const {
-    if (!json_.at(key).is_string()) fail(fmt::format("'{}' must be a string", key));
-    return json_.at(key).get<std::string>();
-  }
-  double number(const char* key) const {
-    if (!json_.at(key).is_number()) fail(fmt::format("'{}' must be a number", key));
-    return json_.at(key).get<double>();
-  }
-  std::vector<std::string> texts(const char* key) const {
-    if (json_.at(key).is_string()) return {text(key)};
-    std::vector<std::string> all;
-    if (!json_.at(key).is_array()) fail(fmt::format("'{}' must be a list of strings", key));
-    for (const json& item : json_.at(key)) {
-      if (!item.is_string()) fail(fmt::format("'{}' must be a list of strings", key));
-      all.push_back(item.get<std::string>());
-    }
-    return all;
-  }
-  std::vector<double> numbers(const char* key) const {
-    std::vector<double> all;
-    for (const json& item : json_.at(key)) {
-      if (!item.is_number()) fail(fmt::format("'{}' must be a list of numbers", key));
-      all.push_back(item.get<double>());
-    }
-    return all;
-  }
-  bool is_list(const char* key) const { return json_.at(key).is_array(); }
-
-  std::pair<std::int64_t, std::int64_t> range(const json& item, const char* key) const {
-    if (!item.is_array() || item.size() != 2 || !item[0].is_number_integer() || !item[1].is_number_integer())
-      fail(fmt::format("'{}' must be [first, last], two integers", key));
-    return {item[0].get<std::int64_t>(), item[1].get<std::int64_t>()};
-  }
-  /// A half-open range within 0 .. count.
-  std::pair<std::int64_t, std::int64_t> half_open(const char* key, std::int64_t count,
-                                                  const char* what) const {
-    const auto [first, end] = range(json_.at(key), key);
-    if (!(0 <= first && first < end && end <= count))
-      fail(fmt::format("'{}' = [{}, {}) is not a range within the {} {}", key, first, end, count, what));
-    return {first, end};
-  }
-  std::vector<std::pair<std::int64_t, std::int64_t>> ranges(const char* key) const {
-    std::vector<std::pair<std::int64_t, std::int64_t>> all;
-    if (!json_.at(key).is_array()) fail(fmt::format("'{}' must be a list of [first, last]", key));
-    for (const json& item : json_.at(key)) all.push_back(range(item, key));
-    return all;
-  }
-
-  fs::path inside(const std::string& name, const char* key) const {
-    const fs::path relative(name);
-    if (name.empty() || relative.is_absolute() ||
-        std::find(relative.begin(), relative.end(), "..") != relative.end())
-      fail(fmt::format("'{}' names '{}'; names are relative to the folder and stay within it", key, name));
-    return folder_ / relative;
-  }
-
-  /// Names relative to the folder; * ? [] in the last part, in natural order.
-  std::vector<std::string> matches(const char* key) const {
-    std::vector<std::string> all;
-    for (const std::string& pattern : texts(key)) {
-      const fs::path path = inside(pattern, key);
-      std::vector<std::string> found;
-      if (pattern.find_first_of("*?[") == std::string::npos) {
-        found.push_back(pattern);
-      } else {
-        std::error_code error;
-        for (const auto& entry : fs::directory_iterator(path.parent_path(), error))
-          if (::fnmatch(path.filename().c_str(), entry.path().filename().c_str(), FNM_PERIOD) == 0)
-            found.push_back((fs::path(pattern).parent_path() / entry.path().filename()).generic_string());
-        if (error)
-          fail(fmt::format("'{}': folder of '{}' cannot be listed: {}", key, pattern, error.message()));
-        std::sort(found.begin(), found.end(), natural_less);
-      }
-      all.insert(all.end(), found.begin(), found.end());
-    }
-    if (all.empty()) fail(fmt::format("'{}' matches no file", key));
-    return all;
-  }
-
- private:
-  fs::path folder_, path_;
-  json json_;
-};
+std::set<std::string> known_members() {
+  std::set<std::string> known{"projections", "hdf5",        "flats",   "darks",     "angles",
+                              "angle_range", "use",         "center",  "pitch",     "unit",
+                              "air_columns", "description", "comment", "redundancy"};
+  known.insert(cone_kinds.begin(), cone_kinds.end());
+  return known;
+}
 
 // TIFF files as frames, all of one size.
 Frames tiff_frames(const fs::path& folder, const std::vector<std::string>& names, const RawScan& scan) {
@@ -161,10 +56,6 @@ Frames tiff_frames(const fs::path& folder, const std::vector<std::string>& names
   return frames;
 }
 
-void use_file(RawScan& scan, const fs::path& folder, const std::string& name) {
-  scan.files.emplace_back(name, folder / name);
-}
-
 // Frames of `key`, and their files into the hash.
 Frames listed_frames(const Description& about, const char* key, RawScan& scan) {
   if (!about.has(key))
@@ -173,59 +64,72 @@ Frames listed_frames(const Description& about, const char* key, RawScan& scan) {
         "\"line integrals\")",
         key));
   const auto names = about.matches(key);
-  for (const auto& name : names) use_file(scan, about.folder(), name);
+  for (const auto& name : names) use_file(scan, about, name);
   return tiff_frames(about.folder(), names, scan);
 }
 
-// The angles: a file of numbers or a list, cut by angle_range.
-std::vector<double> listed_angles(const Description& about, RawScan& scan) {
-  std::vector<double> angles;
-  if (about.is_list("angles")) {
-    angles = about.numbers("angles");
-  } else {
-    const std::string name = about.text("angles");
-    angles = read_numbers(about.inside(name, "angles"));
-    use_file(scan, about.folder(), name);
-  }
-  if (!about.has("angle_range")) return angles;
-  const auto [first, end] =
-      about.half_open("angle_range", static_cast<std::int64_t>(angles.size()), "angles");
-  return {angles.begin() + first, angles.begin() + end};
+// Frames that all hold one number: the flats and darks of scanners that give a level for them.
+Frames level_frame(double level, const RawScan& scan, const std::string& name) {
+  Frames frames;
+  frames.count = 1;
+  frames.name = [name](std::int64_t) { return name; };
+  frames.read = [level, size = scan.rows * scan.columns](std::int64_t, std::int64_t n, double* out) {
+    std::fill_n(out, n * size, level);
+  };
+  return frames;
 }
 
-RawScan open_tiffs(const Description& about, std::uint64_t max_memory_bytes,
-                   std::vector<std::string>& names) {
-  RawScan scan;
-  names = about.matches("projections");
-  const TiffImage first = read_tiff(about.folder() / names.front(), max_memory_bytes);
-  scan.rows = first.rows;
-  scan.columns = first.columns;
-  scan.integer = first.is_integer;
-  scan.projections = tiff_frames(about.folder(), names, scan);
+// Flats and darks, unless the values are line integrals.
+void set_counts(const Description& about, const std::optional<NikonScan>& nikon, RawScan& scan) {
   scan.counts = true;
   if (about.has("description")) {
     if (about.text("description") != "line integrals")
       about.fail("'description' can only be \"line integrals\"");
     scan.counts = false;
   }
-  if (scan.counts) {
-    scan.flats = listed_frames(about, "flats", scan);
-    scan.darks = listed_frames(about, "darks", scan);
+  if (!scan.counts) return;
+  if (nikon && !about.has("flats") && !about.has("darks")) {
+    scan.flats = level_frame(nikon->white_level, scan, nikon->path.string() + ": WhiteLevel");
+    scan.darks = level_frame(0, scan, nikon->path.string() + ": the dark level");
+    return;
   }
-  if (!about.has("angles")) about.fail("'angles' is missing: a file of degrees, or a list");
+  scan.flats = listed_frames(about, "flats", scan);
+  scan.darks = listed_frames(about, "darks", scan);
+}
+
+RawScan open_tiffs(const Description& about, const std::vector<std::string>& names,
+                   std::uint64_t max_memory_bytes) {
+  RawScan scan;
+  const TiffImage first = read_tiff(about.folder() / names.front(), max_memory_bytes);
+  scan.rows = first.rows;
+  scan.columns = first.columns;
+  scan.integer = first.is_integer;
+  scan.projections = tiff_frames(about.folder(), names, scan);
+  return scan;
+}
+
+// One stack that 'projections' names; its files under their names in the folder.
+RawScan open_stack(const Description& about, const std::string& name, std::uint64_t max_memory_bytes) {
+  RawScan scan = open_raster_stack(about.folder() / name, max_memory_bytes);
+  for (auto& [hashed, path] : scan.files) hashed = (fs::path(name).parent_path() / hashed).generic_string();
+  return scan;
+}
+
+RawScan open_hdf5(const Description& about) {
+  for (const char* key : {"flats", "darks", "description"})
+    if (about.has(key))
+      about.fail(fmt::format("'{}' goes with 'projections'; an HDF5 file brings its own", key));
+  const std::string name = about.text("hdf5");
+  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"));
+  scan.files.clear();
+  use_file(scan, about, name);
   return scan;
 }
 
 void set_geometry(const Description& about, RawScan& scan) {
   if (about.has("center")) scan.center = about.number("center");
   if (about.has("unit")) scan.unit = about.text("unit");
-  if (about.has("pitch")) {
-    const auto pitch =
-        about.is_list("pitch") ? about.numbers("pitch") : std::vector<double>(2, about.number("pitch"));
-    if (pitch.size() != 2) about.fail("'pitch' must be one number or [u, v]");
-    scan.pitch_u = pitch[0];
-    scan.pitch_v = pitch[1];
-  }
+  if (about.has("pitch")) std::tie(scan.pitch_u, scan.pitch_v) = about.pair("pitch");
   if (!about.has("air_columns")) return;
   scan.air_columns = about.ranges("air_columns");
   std::int64_t count = 0;
@@ -238,38 +142,48 @@ void set_geometry(const Description& about, RawScan& scan) {
   if (count < 2) about.fail("'air_columns' must name at least two columns: a line is fitted through them");
 }
 
-}  // namespace
-
-RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes) {
-  const Description about(folder);
-  if (about.has("projections") == about.has("hdf5")) about.fail("needs one of 'projections' and 'hdf5'");
-  RawScan scan;
-  std::vector<std::string> names;  // of the projections, one file each; empty for HDF5
-  if (about.has("hdf5")) {
-    for (const char* key : {"flats", "darks", "description"})
-      if (about.has(key))
-        about.fail(fmt::format("'{}' goes with 'projections'; an HDF5 file brings its own", key));
-    const std::string name = about.text("hdf5");
-    scan = open_hdf5_scan(about.inside(name, "hdf5"));
-    scan.files.clear();
-    use_file(scan, folder, name);
-  } else {
-    scan = open_tiffs(about, max_memory_bytes, names);
-  }
-  scan.format = "scan.json";
-  use_file(scan, folder, "scan.json");
+void set_angles(const Description& about, RawScan& scan) {
+  if (about.has("redundancy")) about.fail("'redundancy' goes with cone-beam geometry");
   if (about.has("angles")) scan.theta_deg = listed_angles(about, scan);
-  if (!about.has("angles") && about.has("angle_range")) about.fail("'angle_range' needs 'angles'");
+  else if (about.has("angle_range")) about.fail("'angle_range' needs 'angles'");
+  else if (!about.has("hdf5")) about.fail("'angles' is missing: a file of degrees, or a list");
   if (static_cast<std::int64_t>(scan.theta_deg.size()) != scan.projections.count)
     about.fail(fmt::format("{} angles for {} projections; 'angle_range' selects entries of 'angles'",
                            scan.theta_deg.size(), scan.projections.count));
+}
+
+}  // namespace
+
+RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes) {
+  const Description about(folder / "scan.json", known_members());
+  std::optional<NikonScan> nikon;
+  if (about.has("nikon")) nikon = read_nikon(about.inside(about.text("nikon"), "nikon"));
+  const bool own_projections = nikon && !about.has("projections") && !about.has("hdf5");
+  if (!own_projections && about.has("projections") == about.has("hdf5"))
+    about.fail("needs one of 'projections' and 'hdf5'");
+  RawScan scan;
+  std::vector<std::string> names;  // of the projections, one file each; empty for one file of all
+  if (about.has("hdf5")) {
+    scan = open_hdf5(about);
+  } else {
+    names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
+    const bool stack = names.size() == 1 && is_raster_file(folder / names.front());
+    scan = stack ? open_stack(about, names.front(), max_memory_bytes)
+                 : open_tiffs(about, names, max_memory_bytes);
+    if (stack) names.clear();
+    set_counts(about, nikon, scan);
+  }
+  scan.format = "scan.json";
+  use_file(scan, about, "scan.json");
   set_geometry(about, scan);
+  if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
+  else set_angles(about, scan);
   const std::int64_t count = scan.projections.count;
   const auto [first, end] = about.has("use") ? about.half_open("use", count, "projections")
                                              : std::pair<std::int64_t, std::int64_t>(0, count);
   if (about.has("use")) select_views(scan, first, end);
   for (std::int64_t k = first; !names.empty() && k < end; ++k)
-    use_file(scan, folder, names[static_cast<std::size_t>(k)]);
+    use_file(scan, about, names[static_cast<std::size_t>(k)]);
   return scan;
 }
 

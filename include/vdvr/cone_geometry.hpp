@@ -23,8 +23,8 @@ enum class Redundancy {
   short_scan,  ///< 180 degrees and the fan, or more: Parker's weights
   displaced    ///< a full turn whose detector reaches farther on one side of the axis: Wang's weights
 };
-const char* text_of(Redundancy redundancy);
-std::optional<Redundancy> redundancy_of(const std::string& text);
+VDVR_API const char* text_of(Redundancy redundancy);
+VDVR_API std::optional<Redundancy> redundancy_of(const std::string& text);
 
 struct ConeGeometry {
   std::vector<ViewMatrix> views;

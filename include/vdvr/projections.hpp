@@ -35,6 +35,7 @@ struct InputReport {
   std::int64_t dead_pixels = 0;    ///< samples replaced by the median of their neighbours
   double transmission_floor = 0;   ///< the floor under -log
   std::string center_source;       ///< "file", "option", "found", "default"
+  double source_to_detector = 0;   ///< of cone beam, in world units; 0: not stated, as matrices do not
   bool air_background = false;     ///< a linear air background was fitted and taken off
   std::vector<std::string> notes;  ///< one line each, shown to the user
 };

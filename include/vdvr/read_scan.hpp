@@ -22,8 +22,8 @@ struct ScanOptions {
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'
 /// median and counted, optional air background taken off. Centre: option, else file, else found from opposite
-/// views, else (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated
-/// files, ...).
+/// views, else (U-1)/2; of cone beam option, else file, else (U-1)/2. Throws FileError or InputError (NaN,
+/// zero flats, wrong counts of angles, truncated files, ...).
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
                                  const Progress& progress = {});
 

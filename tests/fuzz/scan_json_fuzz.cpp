@@ -1,4 +1,5 @@
-// scan.json over a folder of TIFF frames, and over an HDF5 file beside it.
+// scan.json over a folder of TIFF frames, with and without cone-beam geometry, and over an HDF5 file beside
+// it.
 #include "tests/fuzz/target.hpp"
 #include "tests/support/scan_files.hpp"
 
@@ -20,7 +21,15 @@ std::vector<std::string> seeds(const fs::path& folder) {
   more["air_columns"] = {{0, 1}};
   const nlohmann::json hdf5{
       {"hdf5", "scan.h5"}, {"angles", {0, 45.5, 90, 135}}, {"center", 1}, {"comment", "none"}};
-  return {tiffs.dump(1), more.dump(1), hdf5.dump(1)};
+  nlohmann::json cone = tiffs;
+  cone.erase("angles");
+  cone.erase("angle_range");
+  cone["redundancy"] = "full-turn";
+  cone["geometry"] = {
+      {"source_to_axis", 50}, {"source_to_detector", 100.5}, {"pitch", {0.5, 0.75}}, {"center", 1.25},
+      {"row", 0.5},           {"angles", {0, 90, 180, 270}}, {"tilt", {1, -2}},      {"sense", -1},
+      {"offset_u", 0.125}};
+  return {tiffs.dump(1), more.dump(1), hdf5.dump(1), cone.dump(1)};
 }
 
 void read(const fs::path& file) {

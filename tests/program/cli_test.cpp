@@ -16,8 +16,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::vector<std::string> kCommands{"devices", "simulate", "info",   "reconstruct", "plan", "build",
-                                         "verify",  "probe",    "render", "export",      "run",  "bench"};
+const std::vector<std::string> kCommands{
+    "devices", "simulate", "info",   "reconstruct",      "plan", "build", "verify",
+    "probe",   "render",   "export", "convert-geometry", "run",  "bench"};
 
 /// The words of each command that reads a file, with that file in the place of IN.
 std::vector<std::vector<std::string>> readers(const std::string& input) {
@@ -31,6 +32,7 @@ std::vector<std::vector<std::string>> readers(const std::string& input) {
           {"probe", input, "--exact", "--points", points, "-o", at("o.csv")},
           {"render", input, "-o", at("o.png")},
           {"export", input, "-o", at("o.mha")},
+          {"convert-geometry", input, "-o", at("o.xml")},
           {"run", input, "--epsilon", "3%", "-o", at("o.dir")},
           {"simulate", "--volume", input, "-o", at("o.h5")},
           {"bench", "build", input, "--epsilon", "3%"},
@@ -140,7 +142,7 @@ BOOST_AUTO_TEST_CASE(truncated_input_is_refused) {
 }
 
 BOOST_AUTO_TEST_CASE(refusals_leave_no_output_behind) {
-  for (const std::string name : {"o.mha", "o.vdvr", "o.csv", "o.png", "o.dir", "o.h5"})
+  for (const std::string name : {"o.mha", "o.vdvr", "o.csv", "o.png", "o.dir", "o.h5", "o.xml"})
     BOOST_TEST(!fs::exists(at(name)));
   check_no_temporary_file_is_left();
 }

@@ -215,6 +215,34 @@ inline nlohmann::json write_folder(const TemporaryFolder& folder) {
           {"angle_range", {1, 5}}};
 }
 
+// --- stacks and geometry of cone beam ---
+
+/// An .npy file of the given type; values in the order of the file.
+template <typename T>
+std::string npy_bytes(const std::vector<T>& values, const std::string& shape, bool fortran = false) {
+  std::string header = std::string("{'descr': '<f") + (sizeof(T) == 8 ? "8" : "4") +
+                       "', 'fortran_order': " + (fortran ? "True" : "False") + ", 'shape': (" + shape +
+                       "), }";
+  header.append(63 - (10 + header.size()) % 64, ' ').push_back('\n');
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes.push_back(static_cast<char>(header.size() & 0xff));
+  bytes.push_back(static_cast<char>(header.size() >> 8));
+  bytes += header;
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  return bytes;
+}
+
+/// A MetaImage stack of float zeros but for its first sample, 1.
+inline std::string stack_bytes(int columns, int rows, int views, const std::string& place) {
+  std::vector<float> samples(static_cast<std::size_t>(columns * rows * views));
+  samples.at(0) = 1;
+  std::string bytes = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n" +
+                      place + "DimSize = " + std::to_string(columns) + " " + std::to_string(rows) + " " +
+                      std::to_string(views) + "\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
+  bytes.append(reinterpret_cast<const char*>(samples.data()), samples.size() * sizeof(float));
+  return bytes;
+}
+
 inline std::string folder_refusal(const TemporaryFolder& folder, const nlohmann::json& description) {
   static_cast<void>(folder.file("scan.json", description.dump()));
   return refusal(folder.path());

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
@@ -76,12 +77,13 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
-  const Json json = {{"file", path.string()},
-                     {"kind", "projections"},
-                     {"geometry", geometry_json(scan.geometry)},
-                     {"report", report_json(scan.report)},
-                     {"range", {*range.first, *range.second}},
-                     {"default_grid", grid_json(grid)}};
+  Json json = {{"file", path.string()},
+               {"kind", "projections"},
+               {"geometry", geometry_json(scan.geometry)},
+               {"report", report_json(scan.report)},
+               {"range", {*range.first, *range.second}},
+               {"default_grid", grid_json(grid)}};
+  if (scan.cone) json["cone"] = cone_json(scan);
   print_result(common, json, [&] {
     print_scan(scan);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);

@@ -1,0 +1,57 @@
+// Checks that all geometry files share; see cone_views.hpp.
+#include "host/geometry/cone_views.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "vdvr/error.hpp"
+
+namespace vdvr::io {
+
+ViewMatrix checked_view(const ViewMatrix& matrix, const std::string& where, std::int64_t view) {
+  try {
+    for (const auto& row : matrix)
+      for (const double value : row)
+        if (!std::isfinite(value)) throw InputError("the matrix holds a number that is not finite");
+    const ViewMatrix out = normalised(matrix);
+    static_cast<void>(cone_view(out));
+    return out;
+  } catch (const InputError& e) {
+    throw FileError(fmt::format("{}: view {}: {}", where, view, e.what()));
+  }
+}
+
+ViewMatrix checked_view(const CircularView& v, const std::string& where, std::int64_t number) {
+  const auto require_positive = [&](const char* what, double value, const char* why) {
+    if (!(value > 0) || !std::isfinite(value))
+      throw FileError(fmt::format("{}: view {}: {} is {}; {}", where, number, what, value, why));
+  };
+  require_positive("the distance from source to axis", v.source_to_axis,
+                   "the isocentre must lie before the source");
+  require_positive("the distance from source to detector", v.source_to_detector,
+                   "the detector must lie before the source");
+  for (const auto& [what, pitch] :
+       {std::pair{"the pitch of columns", v.pitch_u}, {"the pitch of rows", v.pitch_v}})
+    require_positive(what, pitch, "it must be positive");
+  return checked_view(circular_view(v), where, number);
+}
+
+void require_views(const std::string& where, const std::string& what, std::int64_t described,
+                   const StackShape& stack) {
+  if (described != stack.views)
+    throw FileError(fmt::format("{}: {} {} for {} projections; one for each is needed", where, described,
+                                what, stack.views));
+}
+
+void require_detector(const std::string& where, std::int64_t columns, std::int64_t rows,
+                      const StackShape& stack) {
+  if (columns != stack.columns || rows != stack.rows)
+    throw FileError(fmt::format(
+        "{}: a detector of {} columns x {} rows, but the projections have {} x {}; bin or crop the geometry "
+        "as they were, or write it as 'geometry'",
+        where, columns, rows, stack.columns, stack.rows));
+}
+
+}  // namespace vdvr::io

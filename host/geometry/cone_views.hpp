@@ -1,0 +1,42 @@
+// What a geometry file says of a cone-beam scan, and what every such file is held to. Filled by the readers
+// of this room; called by host/scan/scan_members.cpp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "vdvr/cone_geometry.hpp"
+
+namespace vdvr::io {
+
+/// The stack that a geometry goes with.
+struct StackShape {
+  std::int64_t views = 0, rows = 0, columns = 0;
+
+  [[nodiscard]] double middle_column() const { return 0.5 * static_cast<double>(columns - 1); }
+  [[nodiscard]] double middle_row() const { return 0.5 * static_cast<double>(rows - 1); }
+};
+
+struct ConeViews {
+  std::vector<ViewMatrix> views;   ///< one for each of the stack's views, lambda = 1 at the isocentre
+  std::string center_source;       ///< "file", or "default" where the detector's middle was assumed
+  std::string unit;                ///< of its lengths; empty where the format says nothing
+  double source_to_detector = 0;   ///< 0 where the format does not say, or views differ
+  std::vector<std::string> notes;  ///< what was assumed
+};
+
+/// The matrix with lambda = 1 at the isocentre. Throws FileError ("where: view k: ...") unless it is that of
+/// a camera whose rows and columns are at right angles.
+ViewMatrix checked_view(const ViewMatrix& matrix, const std::string& where, std::int64_t view);
+/// circular_view, whose lengths must be finite and positive.
+ViewMatrix checked_view(const CircularView& view, const std::string& where, std::int64_t number);
+/// Throws FileError, which names `what`, unless as many views are described as there are.
+void require_views(const std::string& where, const std::string& what, std::int64_t described,
+                   const StackShape& stack);
+/// The same of the detector.
+void require_detector(const std::string& where, std::int64_t columns, std::int64_t rows,
+                      const StackShape& stack);
+
+}  // namespace vdvr::io

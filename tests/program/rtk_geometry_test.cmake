@@ -1,0 +1,10 @@
+# Geometry that RTK wrote is what vdvr reads, and the other way round. Skipped where RTK's Python package cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_python_with(rtk_geometry_test 540 itk-rtk numpy)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/rtk_geometry.py" "${VDVR}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "rtk_geometry.py failed with ${code}")
+endif()
