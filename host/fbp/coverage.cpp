@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/fbp/fdk_weights.hpp"
-#include "host/fbp/reconstruct_cone.hpp"
 #include "host/fbp/view_weights.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -83,6 +81,8 @@ std::int64_t cells_around(double length, double spacing) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing - 1e-9)));
 }
 
+}  // namespace
+
 void check_grid(const Grid& grid) {
   std::int64_t product = 1;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -98,8 +98,6 @@ void check_grid(const Grid& grid) {
     product *= grid.cells[a] + 1;
   }
 }
-
-}  // namespace
 
 Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
   const Coverage coverage(geometry);
@@ -117,28 +115,6 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
         options.origin ? (*options.origin)[a] : -0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a];
   check_grid(grid);
   return grid;
-}
-
-Grid make_grid(const ProjectionSet& scan, const GridOptions& options) {
-  if (!scan.cone) return make_grid(scan.geometry, options);
-  const Grid grid = make_cone_grid(scan, options);
-  check_grid(grid);
-  return grid;
-}
-
-std::vector<std::string> check_scan(const ProjectionSet& scan) {
-  if (!scan.cone) return check_scan(scan.geometry);
-  const FdkWeights weights(*scan.cone, scan.geometry.columns, scan.geometry.rows);
-  std::vector<std::string> notes;
-  if (weights.limited_angle())
-    notes.push_back(
-        "limited angle: a gap between views is above four times the median gap; its weight was capped");
-  if (weights.grouped_views() > 0)
-    notes.push_back(fmt::format("{} coincident views share their weights", weights.grouped_views()));
-  notes.push_back(
-      "FDK: exact in the plane of the orbit, approximate above and below it; a circle does not see enough "
-      "for more");
-  return notes;
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "vdvr/grid.hpp"
 #include "vdvr/projections.hpp"
 
 namespace vdvr {
@@ -30,5 +31,8 @@ class Coverage {
   std::vector<std::size_t> nearest_;  // by sectors of directions: the view that looks along the middle best
   double t_min_, t_max_, inner_, half_height_, slack_, slack_z_;
 };
+
+/// Throws InputError for a grid that is empty, not finite, or too large.
+void check_grid(const Grid& grid);
 
 }  // namespace vdvr

@@ -15,7 +15,6 @@
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/reconstruct.hpp"
-#include "host/fbp/reconstruct_cone.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
@@ -24,27 +23,6 @@
 #include "vdvr/error.hpp"
 
 namespace vdvr {
-
-namespace {
-
-// Laps of device work; without a receiver nothing waits.
-class StageWatch {
- public:
-  explicit StageWatch(StageSeconds* seconds) : seconds_(seconds) {}
-  void lap(opencl::State& state, const std::string& stage) {
-    if (!seconds_) return;
-    opencl::finish(state, stage);
-    const auto now = std::chrono::steady_clock::now();
-    (*seconds_)[stage] += std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-  }
-
- private:
-  StageSeconds* seconds_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-}  // namespace
 
 std::vector<double> detector_rows(const ParallelGeometry& g, double first_z, double step,
                                   std::int64_t count) {
@@ -172,32 +150,6 @@ void reconstruct_slabs(opencl::State& state, const ParallelGeometry& g, const Sl
   }
 }
 
-// All of them as a volume.
-class WholeVolume {
- public:
-  // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
-  // left.
-  explicit WholeVolume(const Grid& grid)
-      : volume_{grid, {}},
-        samples_(std::async(std::launch::async | std::launch::deferred,
-                            [n = grid.sample_count()] { return large_zeros(static_cast<std::size_t>(n)); })) {
-  }
-  [[nodiscard]] Planes planes() {
-    Planes out;
-    out.target = [this](std::int64_t first, std::int64_t) {
-      if (samples_.valid()) volume_.samples = samples_.get();
-      const Index3 n = volume_.grid.samples();
-      return volume_.samples.data() + first * n[0] * n[1];
-    };
-    return out;
-  }
-  [[nodiscard]] Volume take() { return std::move(volume_); }
-
- private:
-  Volume volume_;
-  std::future<std::vector<float>> samples_;
-};
-
 }  // namespace
 
 Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
@@ -215,19 +167,9 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   return volume.take();
 }
 
-namespace {
-
-// In `units`, as the grid is.
-void reconstruct_scan(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
-                      const ReconstructOptions& options, const Planes& planes, const Progress& progress,
-                      StageWatch& watch) {
-  if (options.upsampling < 1 || options.upsampling > 64 ||
-      (options.upsampling & (options.upsampling - 1)) != 0)
-    throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", options.upsampling));
-  opencl::State& state = device.state();
-  if (scan.cone)
-    return reconstruct_cone(state, scan, units, grid, options, planes, progress,
-                            [&](const std::string& stage) { watch.lap(state, stage); });
+void reconstruct_parallel(opencl::State& state, const ProjectionSet& scan, const Units& units,
+                          const Grid& grid, const ReconstructOptions& options, const Planes& planes,
+                          const Progress& progress, StageWatch& watch) {
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;
@@ -264,48 +206,6 @@ void reconstruct_scan(Device& device, const ProjectionSet& scan, const Units& un
   if (options.field.center) geometry.center = *options.field.center;
   reconstruct_slabs(state, geometry, make_slab, grid, options.upsampling, options.interpolation, planes,
                     progress, watch);
-}
-
-}  // namespace
-
-Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
-                   const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
-  StageWatch watch(seconds);
-  check_line_integrals(scan);
-  const Units units = units_of(scan);
-  WholeVolume whole(from_world(grid, units));
-  reconstruct_scan(device, scan, units, from_world(grid, units), options, whole.planes(), progress, watch);
-  Volume volume = whole.take();
-  if (units.are_world()) return volume;
-  volume.grid = grid;
-  check_densities(to_world(largest_magnitude(volume.samples), units));
-  scale(volume.samples, units.density());
-  return volume;
-}
-
-void reconstruct_planes(Device& device, const ProjectionSet& scan, const Grid& grid,
-                        const ReconstructOptions& options, const TakePlanes& take, const Progress& progress) {
-  StageWatch watch(nullptr);
-  check_line_integrals(scan);
-  const Units units = units_of(scan);
-  const Index3 n = grid.samples();
-  HostMemory host(device.state());
-  std::vector<float> slab;
-  Planes planes;
-  planes.bytes = sizeof(float) * static_cast<std::uint64_t>(n[0] * n[1]);
-  planes.target = [&](std::int64_t, std::int64_t count) {
-    if (slab.empty()) host.count(static_cast<std::uint64_t>(count) * planes.bytes, "planes of the volume");
-    slab.assign(static_cast<std::size_t>(count * n[0] * n[1]), 0.0f);
-    return slab.data();
-  };
-  planes.done = [&](std::int64_t first, std::int64_t) {
-    if (!units.are_world()) {
-      check_densities(to_world(largest_magnitude(slab), units));
-      scale(slab, units.density());
-    }
-    take(first, slab);
-  };
-  reconstruct_scan(device, scan, units, from_world(grid, units), options, planes, progress, watch);
 }
 
 }  // namespace vdvr

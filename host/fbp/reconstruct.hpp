@@ -1,11 +1,12 @@
-// Uniform reconstruction from filtered projections, and what gold shares with it. Called by reconstruct.cpp,
-// plan.cpp, gold_stream.cpp.
+// Uniform reconstruction from filtered projections, and what gold shares with it. Called by plan.cpp,
+// gold_stream.cpp and fdk/reconstruct_scan.cpp.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "host/fbp/filter_projections.hpp"
+#include "host/fbp/whole_volume.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -26,5 +27,15 @@ UpsampledColumns columns_for(const ParallelGeometry& geometry, const Grid& grid,
 Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Upsampler& upsampler,
                          const Grid& grid, int upsampling, Interpolation interpolation,
                          const Progress& progress, StageSeconds* seconds = nullptr);
+
+/// Columns of z become rows of x, of one y: `columns` has nz samples of each x, `stride` apart; those of
+/// kept[0] .. kept[1] go to target[z][x], planes `plane` apart.
+void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
+                   std::array<std::int32_t, 2> kept, float* target, std::int64_t plane);
+
+/// FBP of a scan; grid in `units`. Cost and memory: as reconstruct_planes().
+void reconstruct_parallel(opencl::State& state, const ProjectionSet& scan, const Units& units,
+                          const Grid& grid, const ReconstructOptions& options, const Planes& planes,
+                          const Progress& progress, StageWatch& watch);
 
 }  // namespace vdvr

@@ -1,5 +1,5 @@
 // Weights of cone-beam samples and views.
-#include "host/fbp/fdk_weights.hpp"
+#include "host/fdk/fdk_weights.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "host/fbp/view_weights.hpp"
-#include "host/scan/vectors.hpp"
+#include "host/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

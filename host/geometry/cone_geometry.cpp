@@ -8,9 +8,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/scan/vectors.hpp"
+#include "host/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/projections.hpp"
 
 namespace vdvr {
 namespace {
@@ -178,32 +177,6 @@ ViewMatrix recentred(ViewMatrix matrix, double center) {
   const double shift = center - matrix[0][3] / matrix[2][3];
   for (std::size_t j = 0; j < 4; ++j) matrix[0][j] += shift * matrix[2][j];
   return matrix;
-}
-
-ParallelGeometry parallel_limit(const ConeGeometry& cone, std::int64_t columns, std::int64_t rows,
-                                const std::string& unit) {
-  ParallelGeometry g;
-  g.columns = columns;
-  g.rows = rows;
-  g.unit = unit;
-  g.pitch_u = g.pitch_v = g.center = 0;
-  const auto n = static_cast<double>(cone.views.size());
-  for (const ViewMatrix& matrix : cone.views) {
-    const ConeView view = cone_view(matrix);
-    g.pitch_u += view.pitch_u / n;
-    g.pitch_v += view.pitch_v / n;
-    g.center += view.center / n;
-    // The source lies a quarter turn behind the angle of its view.
-    g.theta_rad.push_back(view.angle() + 0.5 * std::numbers::pi);
-  }
-  return g;
-}
-
-void require_parallel(const ProjectionSet& scan, const std::string& what) {
-  if (scan.cone)
-    throw InputError(
-        what + ": is for parallel beam in this version; " + scan.report.name +
-        " is a cone-beam scan, of which `reconstruct` and `probe --exact` make a volume and values");
 }
 
 }  // namespace vdvr

@@ -1,7 +1,7 @@
 // The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam"). Called by reconstruct_cone.cpp.
 #pragma once
 
-#include "host/fbp/cone_coverage.hpp"
+#include "host/fdk/cone_coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
 #include "host/scan/units.hpp"
 

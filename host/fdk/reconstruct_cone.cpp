@@ -1,5 +1,5 @@
 // Uniform FDK in slabs of planes, bands of columns and chunks of views (docs/geometry.md, "Cone beam").
-#include "host/fbp/reconstruct_cone.hpp"
+#include "host/fdk/reconstruct_cone.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,10 @@
 #include <cmath>
 
 #include "host/fbp/back_project.hpp"
-#include "host/fbp/cone_back_project.hpp"
-#include "host/fbp/cone_coverage.hpp"
-#include "host/fbp/filter_cone.hpp"
+#include "host/fbp/reconstruct.hpp"
+#include "host/fdk/cone_back_project.hpp"
+#include "host/fdk/cone_coverage.hpp"
+#include "host/fdk/filter_cone.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "shared/cone_back_project.h"
@@ -19,7 +20,7 @@ namespace vdvr {
 namespace {
 
 // Samples that may share a cell with the covered region are kept.
-double kept_margin(const Grid& grid) {
+double kept_distance(const Grid& grid) {
   return std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]) * (1 + 1e-6);
 }
 
@@ -31,8 +32,8 @@ ConeMargins margins_of(const FilteredScan& scan, const Grid& grid) {
     const ConeView view = cone_view(matrix);
     // Covered points lie at least as far from the source's plane as the nearer edge of what it sees of the
     // axis' cylinder; a margin that is small beside that is seen at no more than twice the pitch at the axis.
-    columns = std::max(columns, 2 * kept_margin(grid) / view.pitch_u);
-    rows = std::max(rows, 2 * kept_margin(grid) / view.pitch_v);
+    columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
+    rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
   }
   return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1};
 }
@@ -45,7 +46,7 @@ std::vector<std::array<std::int32_t, 2>> kept_planes(const ConeCoverage& coverag
   parallel_for(n[1], {}, "", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < n[0]; ++x) {
       const Vec3 p = grid.position({x, y, 0});
-      const auto [low, high] = coverage.heights(p[0], p[1], -kept_margin(grid));
+      const auto [low, high] = coverage.heights(p[0], p[1], -kept_distance(grid));
       if (!(low <= high)) continue;
       const auto plane = [&](double z) {
         return (z - grid.origin[2]) / grid.spacing[2] - static_cast<double>(first_z);
@@ -107,13 +108,13 @@ std::int64_t cells_around(double length, double spacing) {
 
 void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
                       const ReconstructOptions& options, const Planes& planes, const Progress& progress,
-                      const Lap& lap) {
+                      StageWatch& watch) {
   if (options.interpolation != Interpolation::linear)
     throw InputError("cone beam: `u_filter` can only be linear; raise `upsampling` instead");
   const int rate = options.upsampling;
   const FilteredScan filtered =
       filter_cone(state, scan, options.field, progress, rate == 1 ? Precision::fp32 : Precision::fp64, units);
-  lap("filter");
+  watch.lap(state, "filter");
   const ParallelGeometry& g = filtered.geometry;
   const ConeCoverage coverage(filtered.views, g.columns, g.rows);
   const ConeMargins margins = margins_of(filtered, grid);
@@ -141,11 +142,11 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
         if (!table || table->first_view != first || table->views != views) {
           table.reset();
           table = cone_table(state, filtered, upsampler, rate, margins, first, views);
-          lap("upsample");
+          watch.lap(state, "upsample");
         }
         band.adds = first > 0;
         cone_back_project(state, filtered, *table, band, out);
-        lap("back-project");
+        watch.lap(state, "back-project");
       }
       out.read_mapped([&](std::span<const float> columns) {
         parallel_for(ny, {}, "", [&](std::int64_t y) {
@@ -156,7 +157,7 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
                         n[0] * n[1]);
         });
       });
-      lap("read back");
+      watch.lap(state, "read back");
     }
     planes.done(z0, nz);
   }

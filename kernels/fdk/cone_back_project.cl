@@ -8,7 +8,7 @@
 // evenly along it; else each sample has its own. A vector of VDVR_LANES samples reads runs of as many rows,
 // a pixel apart: lane i reads the i-th row of each run, and takes its two rows from those runs in which they
 // are its neighbours, because v moves by about a pixel per sample. Where it moves by more, the runs are more,
-// or vectors have one lane. Called by host/fbp/cone_back_project.cpp.
+// or vectors have one lane. Called by host/fdk/cone_back_project.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
 #include "device/lanes.h"

@@ -10,10 +10,10 @@
 #include <numeric>
 #include <optional>
 
-#include "host/fbp/cone_coverage.hpp"
+#include "host/fdk/cone_coverage.hpp"
 #include "host/fbp/coverage.hpp"
-#include "host/fbp/fdk_weights.hpp"
-#include "host/fbp/filter_cone.hpp"
+#include "host/fdk/fdk_weights.hpp"
+#include "host/fdk/filter_cone.hpp"
 #include "host/fbp/ramp_kernel.hpp"
 #include "host/fbp/view_weights.hpp"
 #include "host/system/parallel.hpp"

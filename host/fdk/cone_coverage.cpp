@@ -1,5 +1,5 @@
 // Half-spaces of cone-beam views.
-#include "host/fbp/cone_coverage.hpp"
+#include "host/fdk/cone_coverage.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
-// Launcher of kernels/fbp/cone_back_project.cl, and the tables it reads.
-#include "host/fbp/cone_back_project.hpp"
+// Launcher of kernels/fdk/cone_back_project.cl, and the tables it reads.
+#include "host/fdk/cone_back_project.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -68,7 +68,7 @@ void copy_upsampled(opencl::State& state, Upsampler& upsampler, const UpsampledC
   for (std::size_t r = 0; r < rows.size(); ++r)
     rows[r] = table.first_row + static_cast<double>(r) / table.rate;
   const UpsampledSlab slab = upsampler(columns, rows, 0, 0, table.rate, table.first_view, table.views);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> kernel(state, "fbp/join_rows",
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> kernel(state, "fdk/join_rows",
                                                                                 "join_rows");
   const auto all = table.views * table.columns;
   kernel({{count(table.row_stride), count(all), 1}, {64, 1, 1}}, table.values.buffer(), slab.values.buffer(),
@@ -227,7 +227,7 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
   const bool wide = lanes > 1;
   const int tile = wide ? 4 : 1, vectors_each = wide && band.nz > lanes ? 4 : 1;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrConeBand> kernel(
-      state, "fbp/cone_back_project", "cone_back_project",
+      state, "fdk/cone_back_project", "cone_back_project",
       {{"VDVR_LANES", std::to_string(lanes)},
        {"VDVR_RATE", std::to_string(table.rate)},
        {"VDVR_UPRIGHT", spread.upright ? "1" : "0"},

@@ -1,10 +1,10 @@
 // Cone-beam projections weighed and ramp-filtered. Calls fdk_weights.cpp and filter_rows.cpp.
-#include "host/fbp/filter_cone.hpp"
+#include "host/fdk/filter_cone.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "host/fbp/fdk_weights.hpp"
+#include "host/fdk/fdk_weights.hpp"
 #include "host/fbp/ramp_kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/huge_pages.hpp"
