@@ -31,14 +31,15 @@ class StageWatch {
   void lap(opencl::State& state, const std::string& stage) {
     if (!seconds_) return;
     opencl::finish(state, stage);
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = Clock::now();
     (*seconds_)[stage] += std::chrono::duration<double>(now - last_).count();
     last_ = now;
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
   StageSeconds* seconds_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  Clock::time_point last_{Clock::now()};
 };
 
 /// All of them as a volume.
@@ -46,10 +47,10 @@ class WholeVolume {
  public:
   // Fresh pages cost a core's time, which the device leaves between its kernels; later where no thread is
   // left.
-  explicit WholeVolume(const Grid& grid)
-      : volume_{grid, {}},
-        samples_(std::async(std::launch::async | std::launch::deferred,
-                            [n = grid.sample_count()] { return large_zeros(static_cast<std::size_t>(n)); })) {
+  explicit WholeVolume(const Grid& grid) {
+    volume_.grid = grid;
+    const auto n = static_cast<std::size_t>(grid.sample_count());
+    samples_ = std::async(std::launch::async | std::launch::deferred, [n] { return large_zeros(n); });
   }
   [[nodiscard]] Planes planes() {
     Planes out;
