@@ -20,6 +20,9 @@ namespace {
 constexpr std::int64_t longest_vector = 16;
 // Pixels that a vector may lie between, beyond which single lanes are faster.
 constexpr int most_spans = 10;
+// Rows beyond the margins on either side: a vector with a lane that is wanted begins as many rows below, and
+// ends as many above.
+constexpr std::int64_t rows_of_vectors = longest_vector + most_spans + 4;
 constexpr int views_together = 8;
 
 std::int64_t mirrored(std::int64_t i, std::int64_t n) {
@@ -35,16 +38,17 @@ struct TableShape {
 TableShape shape_of(const FilteredScan& scan, int rate, const ConeMargins& margins) {
   const ParallelGeometry& g = scan.geometry;
   TableShape s{upsampled_columns(g.columns, rate, static_cast<double>(margins.columns)),
-               (g.rows - 1 + 2 * margins.rows) * rate + 1, 0};
+               (g.rows - 1 + 2 * (margins.rows + rows_of_vectors)) * rate + 1, 0};
   // Of each phase; vectors read past the last row.
   s.row_stride = rate * column_stride((s.rows + rate - 1) / rate + longest_vector);
   return s;
 }
 
 // Values straight from the detector's own pixels.
-void copy_pixels(const FilteredScan& scan, const ConeMargins& margins, ConeTable& table) {
+void copy_pixels(const FilteredScan& scan, ConeTable& table) {
   const ParallelGeometry& g = scan.geometry;
-  const auto first = static_cast<std::int64_t>(table.first_column);
+  const auto first = static_cast<std::int64_t>(table.first_column),
+             first_row = static_cast<std::int64_t>(table.first_row);
   table.values.write_mapped([&](std::span<float> mapped) {
     parallel_for(table.views, {}, "", [&](std::int64_t k) {
       for (std::int64_t c = 0; c < table.columns; ++c) {
@@ -52,7 +56,7 @@ void copy_pixels(const FilteredScan& scan, const ConeMargins& margins, ConeTable
                               ((table.first_view + k) * g.columns + mirrored(first + c, g.columns)) * g.rows;
         float* to = mapped.data() + (k * table.columns + c) * table.row_stride;
         for (std::int64_t r = 0; r < table.rows; ++r) {
-          const std::int64_t row = r - margins.rows;
+          const std::int64_t row = r + first_row;
           to[r] = column[row >= 0 && row < g.rows ? row : mirrored(row, g.rows)];
         }
         std::fill(to + table.rows, to + table.row_stride, 0.0f);
@@ -179,12 +183,12 @@ ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& 
                   s.rows,
                   s.row_stride,
                   s.columns.position(0),
-                  -static_cast<double>(margins.rows),
+                  -static_cast<double>(margins.rows + rows_of_vectors),
                   first,
                   views};
   table.values =
       opencl::DeviceArray<float>(state, count(views * s.columns.count * s.row_stride), "filtered views");
-  if (rate == 1) copy_pixels(scan, margins, table);
+  if (rate == 1) copy_pixels(scan, table);
   else copy_upsampled(state, upsampler, s.columns, table);
   return table;
 }

@@ -40,8 +40,6 @@ FdkWeights::FdkWeights(const ConeGeometry& cone, std::int64_t columns, std::int6
     // The plane of the orbit is that of the detector's rows, through the source.
     const Vec3 in_plane = sum(view.source, scaled(view.along_v, -dot(view.source, view.along_v)));
     to_axis_.push_back(scaled(in_plane, -1 / length(in_plane)));
-    const Vec3 far = projected_direction(matrix, view.normal);
-    foot_.push_back({far[0], far[1]});
     angles.push_back(view.angle());
     const double after = std::fmod(view.angle() - arc_.first_rad + 4 * pi, 2 * pi);
     // The first view's own angle may round to just before it.
@@ -61,14 +59,14 @@ FdkWeights::FdkWeights(const ConeGeometry& cone, std::int64_t columns, std::int6
 // Of the ray through a column, in the plane of the orbit: from the line to the axis towards high columns.
 double FdkWeights::fan_angle(std::size_t k, double column) const {
   const ConeView& view = views_[k];
-  const double across = (column - foot_[k][0]) * view.pitch_u;
+  const double across = (column - view.foot_u) * view.pitch_u;
   return std::atan2(across, view.source_to_axis) -
          std::atan2(dot(to_axis_[k], view.along_u), dot(to_axis_[k], view.normal));
 }
 
 double FdkWeights::cosine(std::size_t k, double column, double row) const {
   const ConeView& view = views_[k];
-  const double across = (column - foot_[k][0]) * view.pitch_u, along = (row - foot_[k][1]) * view.pitch_v;
+  const double across = (column - view.foot_u) * view.pitch_u, along = (row - view.foot_v) * view.pitch_v;
   const double dot_axis = view.source_to_axis * dot(to_axis_[k], view.normal) +
                           across * dot(to_axis_[k], view.along_u) + along * dot(to_axis_[k], view.along_v);
   return dot_axis / std::hypot(view.source_to_axis, across, along);

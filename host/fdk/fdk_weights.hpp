@@ -46,10 +46,9 @@ class FdkWeights {
   SourceArc arc_;
   std::vector<ConeView> views_;
   std::vector<Vec3> to_axis_;  // from the source to the axis, in the plane of the orbit; unit length
-  std::vector<std::array<double, 2>> foot_;  // column and row that the normal through the source hits
-  std::vector<double> view_, after_first_;   // the latter: angle since the first view of a short scan
-  double overlap_fan_ = 0;                   // of a displaced detector: the fan that all see on both sides
-  bool displaced_up_ = false;                // it reaches farther towards high columns
+  std::vector<double> view_, after_first_;  // the latter: angle since the first view of a short scan
+  double overlap_fan_ = 0;                  // of a displaced detector: the fan that all see on both sides
+  bool displaced_up_ = false;               // it reaches farther towards high columns
   bool limited_angle_ = false;
   int grouped_views_ = 0;
 };

@@ -53,6 +53,12 @@ std::optional<Redundancy> redundancy_of(const std::string& text) {
 
 double ConeView::angle() const { return std::atan2(source[1], source[0]); }
 
+Vec3 ConeView::ray(double column, double row_) const {
+  const Vec3 through = sum(scaled(normal, source_to_axis), sum(scaled(along_u, (column - foot_u) * pitch_u),
+                                                               scaled(along_v, (row_ - foot_v) * pitch_v)));
+  return scaled(through, 1 / length(through));
+}
+
 Vec3 projected(const ViewMatrix& m, const Vec3& p) {
   const auto of = [&](std::size_t i) { return m[i][0] * p[0] + m[i][1] * p[1] + m[i][2] * p[2] + m[i][3]; };
   const double lambda = of(2);
@@ -97,6 +103,9 @@ ConeView cone_view(const ViewMatrix& matrix) {
         std::acos(std::clamp(dot(view.along_u, view.along_v), -1.0, 1.0)) * 180 / std::numbers::pi));
   view.center = matrix[0][3] / matrix[2][3];
   view.row = matrix[1][3] / matrix[2][3];
+  const Vec3 foot = projected_direction(matrix, view.normal);
+  view.foot_u = foot[0];
+  view.foot_v = foot[1];
   return view;
 }
 

@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "host/simulate/simulate_band_limit.hpp"
+#include "host/simulate/simulate_cone.hpp"
 #include "host/simulate/simulate_detector.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
@@ -43,6 +44,7 @@ void check(const Phantom& phantom, const SimulateOptions& o) {
         fmt::format("simulate: phantom \"{}\" has the background {}, whose line integrals are infinite; set "
                     "\"background\" to 0 and add an ellipsoid of that density as large as the object",
                     phantom.name, phantom.background));
+  if (o.cone) check_cone(phantom, *o.cone);
   if (o.angles < 1) refuse("angles", o.angles, "at least 1");
   if (!positive(o.arc_deg) || o.arc_deg > 360) refuse("arc", o.arc_deg, "degrees above 0, up to 360");
   if (o.columns < 1 || o.rows < 1)
@@ -230,7 +232,11 @@ class Simulator {
   void integrate(std::int64_t k, std::span<const double> v, std::span<double> out) {
     const double theta = theta_[static_cast<std::size_t>(k)];
     const std::size_t n = detector_.u.size();
-    if (phantom_.view_integrals) phantom_.view_integrals(theta, detector_.u, v, out);
+    if (options_.cone) {
+      const ConeRays rays(phantom_, options_, static_cast<int>(k));
+      for (std::size_t j = 0; j < v.size(); ++j)
+        for (std::size_t i = 0; i < n; ++i) out[j * n + i] = rays(detector_.u[i], v[j]);
+    } else if (phantom_.view_integrals) phantom_.view_integrals(theta, detector_.u, v, out);
     else
       for (std::size_t j = 0; j < v.size(); ++j)
         for (std::size_t i = 0; i < n; ++i)
@@ -258,20 +264,28 @@ class Simulator {
 
 // Everything the numbers follow from, in one canonical text.
 std::string options_text(const Phantom& phantom, const SimulateOptions& o) {
-  return nlohmann::json{{"phantom", phantom.description.empty() ? phantom.name : phantom.description},
-                        {"angles", o.angles},
-                        {"arc_deg", o.arc_deg},
-                        {"columns", o.columns},
-                        {"rows", o.rows},
-                        {"pitch", {o.pitch_u, o.pitch_v}},
-                        {"unit", o.unit},
-                        {"band_limited", o.band_limited},
-                        {"noise_sigma", o.noise_sigma},
-                        {"seed", o.noise_sigma > 0 ? o.seed : 0},
-                        {"median", std::max(o.median, 1)},
-                        {"gaussian", {o.gaussian_u, o.gaussian_v}},
-                        {"binning", o.binning}}
-      .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  nlohmann::json text{{"phantom", phantom.description.empty() ? phantom.name : phantom.description},
+                      {"angles", o.angles},
+                      {"arc_deg", o.arc_deg},
+                      {"columns", o.columns},
+                      {"rows", o.rows},
+                      {"pitch", {o.pitch_u, o.pitch_v}},
+                      {"unit", o.unit},
+                      {"band_limited", o.band_limited},
+                      {"noise_sigma", o.noise_sigma},
+                      {"seed", o.noise_sigma > 0 ? o.seed : 0},
+                      {"median", std::max(o.median, 1)},
+                      {"gaussian", {o.gaussian_u, o.gaussian_v}},
+                      {"binning", o.binning}};
+  if (o.cone)
+    text["cone"] = {{"source_to_axis", o.cone->source_to_axis},
+                    {"source_to_detector", o.cone->source_to_detector},
+                    {"detector_offset", o.cone->detector_offset},
+                    {"tilt_deg", {o.cone->in_plane_deg, o.cone->out_of_plane_deg}},
+                    {"sense", o.cone->sense},
+                    {"focal_spot", o.cone->focal_spot},
+                    {"supersampling", o.cone->supersampling}};
+  return text.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
 InputReport make_report(const Phantom& phantom, const SimulateOptions& o, double noise,
@@ -307,6 +321,10 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
                      static_cast<double>(options.columns - 1) / 2,
                      options.unit,
                      simulator.theta()};
+    if (options.cone) {
+      scan.cone = cone_geometry_of(options);
+      scan.geometry = parallel_limit(*scan.cone, options.columns, options.rows, options.unit);
+    }
     const auto size = static_cast<std::size_t>(scan.size());
     scan.data =
         SampleArray(size, scratch_for(size * sizeof(float), options.max_memory_bytes, options.scratch),
@@ -315,6 +333,7 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
     const double noise = noisy ? options.noise_sigma * simulator.largest(progress) : 0;
     simulator.run(noise, noisy ? 0.5 : 0, progress, scan.data);
     scan.report = make_report(phantom, options, noise, simulator.truncated_views());
+    if (options.cone) scan.report.source_to_detector = options.cone->source_to_detector;
     return scan;
   } catch (const std::bad_alloc&) {
     throw ResourceError(

@@ -39,9 +39,12 @@ struct ConeView {
   double source_to_axis = 0;        ///< from the source to the isocentre, along the normal
   double pitch_u = 0, pitch_v = 0;  ///< at the isocentre
   double center = 0, row = 0;       ///< where the isocentre is seen
+  double foot_u = 0, foot_v = 0;    ///< where the normal through the source meets the detector
 
   /// Of the source about the z axis: atan2(y, x).
   [[nodiscard]] double angle() const;
+  /// The unit vector from the source through a pixel.
+  [[nodiscard]] Vec3 ray(double column, double row) const;
 };
 
 /// Throws InputError for a matrix that is not finite, that is singular, or whose rows and columns are not at

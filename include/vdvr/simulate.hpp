@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -39,6 +40,8 @@ struct Phantom {
   std::function<void(double theta_rad, std::span<const double> u, std::span<const double> v,
                      std::span<double> out)>
       view_integrals;
+  /// Along the whole line through a point in a direction of unit length, of cone-beam rays. May be empty.
+  std::function<double(const Vec3& point, const Vec3& direction)> ray_integral;
   std::string description;  ///< canonical text of everything that defines the object; hashed into the report
 };
 
@@ -62,6 +65,18 @@ VDVR_API Phantom read_phantom(const std::filesystem::path& path);
 /// axis, sizes that do not match).
 VDVR_API Phantom volume_phantom(Volume volume);
 
+/// A point source on a circle about the axis, and a flat detector opposite.
+struct ConeSetup {
+  double source_to_axis = 0, source_to_detector = 0;
+  double detector_offset = 0;  ///< columns by which the detector is moved towards higher ones
+  double in_plane_deg = 0, out_of_plane_deg = 0;  ///< tilts, as RTK's angles
+  int sense = 1;                                  ///< -1: the other way round
+  double focal_spot = 0;                          ///< side of a square source, along the detector's axes
+  /// Points along each axis of a pixel, and of the source where it has a side, whose mean is taken (midpoints
+  /// of equal parts).
+  int supersampling = 1;
+};
+
 struct SimulateOptions {
   int angles = 180;
   double arc_deg = 180;  ///< angles k * arc / angles
@@ -78,13 +93,16 @@ struct SimulateOptions {
   // pitch.
   int median = 1;                         ///< side of a square median window, odd; 0 or 1: none
   double gaussian_u = 0, gaussian_v = 0;  ///< standard deviations of a Gaussian blur; 0: none
+  std::optional<ConeSetup> cone;          ///< pitches are then those on the detector
+
   int binning = 1;  ///< fine pixels per detector pixel, both ways; their mean is the pixel
 
   std::uint64_t max_memory_bytes = 0;  ///< 0: no limit
   std::filesystem::path scratch;       ///< as ScanOptions::scratch
 };
 
-/// Views at k * arc / angles. Cost: angles * rows * columns (* binning^2, * 16 band-limited) line integrals
+/// Views at k * arc / angles. Cost: angles * rows * columns (* binning^2, * 16 band-limited, *
+/// supersampling^2, or ^4 with a focal spot) line integrals
 /// over all cores, twice with noise (its size needs the largest integral first), plus for the low-pass nine
 /// transforms of two to six times the columns for every two rows. Memory: the result, in a scratch file where
 /// it takes more than an eighth of the limit, and per core about one fine view in double. The same
@@ -92,5 +110,10 @@ struct SimulateOptions {
 /// may throw. Throws InputError, ResourceError.
 VDVR_API ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options,
                                 const Progress& progress = {});
+
+/// A folder that read_scan() reads: projections.h5, and scan.json with the geometry that `options` say. The
+/// folder must exist. Throws FileError.
+VDVR_API void write_cone_scan(const std::filesystem::path& folder, const ProjectionSet& scan,
+                              const SimulateOptions& options);
 
 }  // namespace vdvr

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
@@ -71,9 +72,15 @@ std::int64_t computed_samples(const Volume& volume) {
   return n[2] * std::count_if(middle, middle + n[1] * n[0], [](float s) { return s != 0; });
 }
 
-int bench_fbp(Arguments& args) {
+/// Only these cost updates, of columns that are computed plane by plane.
+std::int64_t nonzero_samples(const Volume& volume) {
+  return std::count_if(volume.samples.begin(), volume.samples.end(), [](float s) { return s != 0; });
+}
+
+/// FBP, or FDK of a full turn about a cone of that half angle, of a sphere.
+int bench_reconstruction(Arguments& args, const std::string& name, std::optional<double> half_cone_deg) {
   args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
-      .value("angles", "180", "views (default 180)")
+      .value("angles", half_cone_deg ? "360" : "180", "views")
       .value("repetitions", "N", "default 5");
   add_common(args);
   if (!args.parse()) return 0;
@@ -81,24 +88,31 @@ int bench_fbp(Arguments& args) {
   const std::int64_t size = args.integer_or("size", 256, 8, 4096);
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 5, 1, 1000));
   SimulateOptions simulated;
-  simulated.angles = static_cast<int>(args.integer_or("angles", 180, 2, 1 << 16));
+  simulated.angles = static_cast<int>(args.integer_or("angles", half_cone_deg ? 360 : 180, 2, 1 << 16));
   simulated.columns = simulated.rows = size;
   simulated.band_limited = false;
   const double radius = 0.375 * static_cast<double>(size);
+  if (half_cone_deg) {
+    const double distance =
+        0.5 * static_cast<double>(size) / std::tan(*half_cone_deg * std::numbers::pi / 180);
+    simulated.arc_deg = 360;
+    simulated.cone.emplace();
+    simulated.cone->source_to_axis = simulated.cone->source_to_detector = distance;
+  }
 
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = simulate(sphere(radius), simulated, progress.callback());
   GridOptions cells;
   cells.size = Index3{size - 1, size - 1, size - 1};
-  const Grid grid = make_grid(scan.geometry, cells);
+  const Grid grid = make_grid(scan, cells);
   ReconstructOptions options;
   options.upsampling = 1;
   const Volume checked = reconstruct(device, scan, grid, options, progress.callback());
   check_sphere(checked, radius);
 
   std::vector<double> seconds, gups;
-  const std::int64_t computed = computed_samples(checked);
+  const std::int64_t computed = half_cone_deg ? nonzero_samples(checked) : computed_samples(checked);
   const double updates = static_cast<double>(computed) * simulated.angles;
   for (std::size_t i = 0; i < repetitions; ++i) {
     const auto start = Clock::now();
@@ -114,7 +128,7 @@ int bench_fbp(Arguments& args) {
     for (const auto& [stage, s] : once) stages[stage] += s / static_cast<double>(repetitions);
   }
   progress.clear();
-  Json line = bench_line("fbp", device, repetitions);
+  Json line = bench_line(name, device, repetitions);
   line["samples"] = grid.samples();
   line["detector"] = {size, size};
   line["computed_samples"] = computed;
@@ -335,21 +349,22 @@ int bench_bounds(Arguments& args) {
 
 int bench_command(Arguments& args) {
   const std::string name = args.take_word();
-  if (name == "fbp") return bench_fbp(args);
+  if (name == "fbp") return bench_reconstruction(args, name, std::nullopt);
+  if (name == "fdk") return bench_reconstruction(args, name, 10.0);
   if (name == "build") return bench_build(args);
   if (name == "render") return bench_render(args);
   if (name == "bounds") return bench_bounds(args);
   if (name == "tune") return bench_tune(args);
   if (name == "paper") throw InputError("the paper's figures and tables are made by the program vdvr-paper");
   if (!name.empty())
-    throw InputError(
-        fmt::format("'{}' is not a case of this version; there are fbp, build, render, bounds, tune", name));
+    throw InputError(fmt::format(
+        "'{}' is not a case of this version; there are fbp, fdk, build, render, bounds, tune", name));
   args.group(
-          "Cases: fbp [--size N --angles K] | build IN --epsilon E | render FILE [--frames N] | bounds IN | "
-          "tune; each has its own --help")
+          "Cases: fbp [--size N --angles K] | fdk [--size N --angles K] | build IN --epsilon E | "
+          "render FILE [--frames N] | bounds IN | tune; each has its own --help")
       .flag("help,h", "this text");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, build, render, bounds or tune");
+  throw InputError("name a case: fbp, fdk, build, render, bounds or tune");
 }
 
 }  // namespace vdvr::cli

@@ -1,4 +1,4 @@
-// vdvr simulate: projections of a phantom or of a volume, as Data Exchange.
+// vdvr simulate: projections of a phantom or of a volume, as Data Exchange; of cone beam a folder.
 #include "vdvr/simulate.hpp"
 
 #include <fmt/format.h>
@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/common/output_folder.hpp"
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
@@ -35,7 +37,16 @@ void add_options(Arguments& args) {
       .value("gaussian", "SU,SV",
              "standard deviations of a blur on the fine detector, in fine pixels (default none)")
       .value("binning", "N", "fine pixels per detector pixel, both ways (default 1)")
-      .value("output,o", "FILE.h5", "the Data Exchange file to write");
+      .value("output,o", "FILE.h5", "the Data Exchange file to write; with --cone a folder");
+  args.group("Cone beam")
+      .value("cone", "R,D",
+             "distances from the source to the axis and to the detector; --arc is then 360 by default, and "
+             "--pitch that on the detector")
+      .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
+      .value("tilt", "IN,OUT", "of the detector in its plane and out of it, degrees (default 0,0)")
+      .value("sense", "1|-1", "of rotation (default 1)")
+      .value("focal-spot", "W", "side of a square source (default 0: a point)")
+      .value("supersampling", "N", "rays along each side of a pixel, and of the source (default 1)");
 }
 
 /// The object, and the scan that is usual for it; its size follows the detector.
@@ -79,7 +90,34 @@ Setup setup_for(const Arguments& args) {
   return setup;
 }
 
+void apply_cone_options(const Arguments& args, SimulateOptions& scan) {
+  const auto distances = args.numbers("cone", 2);
+  if (!distances) {
+    refuse(args, {"detector-offset", "tilt", "sense", "focal-spot", "supersampling"}, "goes with --cone");
+    return;
+  }
+  ConeSetup cone;
+  cone.source_to_axis = (*distances)[0];
+  cone.source_to_detector = (*distances)[1];
+  if (!(cone.source_to_axis > 0 && cone.source_to_detector > 0))
+    throw InputError(fmt::format("--cone: {} has a distance that is not above 0", args.text("cone")));
+  cone.detector_offset = args.number_or("detector-offset", 0);
+  if (const auto tilt = args.numbers("tilt", 2)) {
+    cone.in_plane_deg = (*tilt)[0];
+    cone.out_of_plane_deg = (*tilt)[1];
+  }
+  cone.sense = args.choice("sense", {"1", "-1"}, "1") == "1" ? 1 : -1;
+  cone.focal_spot = args.number_or("focal-spot", 0);
+  cone.supersampling = static_cast<int>(args.integer_or("supersampling", 1, 1, 16));
+  // As seen at the axis the defaults are those of parallel beam.
+  scan.arc_deg = 360;
+  scan.pitch_u *= cone.source_to_detector / cone.source_to_axis;
+  scan.pitch_v *= cone.source_to_detector / cone.source_to_axis;
+  scan.cone = cone;
+}
+
 void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
+  apply_cone_options(args, scan);
   scan.angles = static_cast<int>(args.integer_or("angles", scan.angles, 1, 1 << 20));
   scan.arc_deg = args.positive_or("arc", scan.arc_deg);
   if (const auto size = args.sizes("detector", 2)) {
@@ -118,8 +156,9 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
 /// Marschner-Lobb set-up and one unit of Shepp-Logan for its own (docs/phantoms.md).
 Phantom phantom_for(Setup& setup) {
   const SimulateOptions& s = setup.scan;
-  const double half_u = 0.5 * static_cast<double>(s.columns - 1) * s.pitch_u;
-  const double half_v = 0.5 * static_cast<double>(s.rows - 1) * s.pitch_v;
+  const double at_axis = s.cone ? s.cone->source_to_axis / s.cone->source_to_detector : 1;
+  const double half_u = 0.5 * static_cast<double>(s.columns - 1) * s.pitch_u * at_axis;
+  const double half_v = 0.5 * static_cast<double>(s.rows - 1) * s.pitch_v * at_axis;
   if (setup.volume) return volume_phantom(std::move(*setup.volume));
   const std::filesystem::path file(setup.name);
   if (file.extension() == ".json") return read_phantom(file);
@@ -142,28 +181,38 @@ int simulate_command(Arguments& args) {
   const auto output = args.path("output");
   std::vector<std::filesystem::path> inputs;
   if (args.has("volume")) inputs.push_back(args.path("volume"));
-  check_output(output, common.force, inputs);
-
-  ProgressLine progress(args.who(), common.quiet);
   Setup setup = setup_for(args);
   apply_scan_options(args, setup.scan);
+  std::optional<OutputFolder> folder;
+  if (setup.scan.cone)
+    folder.emplace(output, std::vector<std::string>{"projections.h5", "scan.json"}, common.force);
+  else check_output(output, common.force, inputs);
+
+  ProgressLine progress(args.who(), common.quiet);
   const Phantom phantom = phantom_for(setup);
   const ProjectionSet scan = simulate(phantom, setup.scan, progress.callback());
   throw_if_stopped();
-  write_data_exchange(output, scan);
+  if (folder) {
+    folder->begin();
+    write_cone_scan(output, scan, setup.scan);
+  } else {
+    write_data_exchange(output, scan);
+  }
   progress.clear();
 
   const auto [lo, hi] = std::minmax_element(scan.data.begin(), scan.data.end());
-  const Json json = {{"output", output.string()},
-                     {"object", phantom.name},
-                     {"geometry", geometry_json(scan.geometry)},
-                     {"band_limited", setup.scan.band_limited},
-                     {"noise_sigma", setup.scan.noise_sigma},
-                     {"range", {*lo, *hi}},
-                     {"notes", scan.report.notes}};
+  Json json = {{"output", output.string()},
+               {"object", phantom.name},
+               {"geometry", geometry_json(scan.geometry)},
+               {"band_limited", setup.scan.band_limited},
+               {"noise_sigma", setup.scan.noise_sigma},
+               {"range", {*lo, *hi}},
+               {"notes", scan.report.notes}};
+  if (scan.cone) json["cone"] = cone_json(scan);
   print_result(common, json, [&] {
     fmt::print("{}: {} views of {} x {} pixels of {}, line integrals {:.6g} to {:.6g}\n", output.string(),
                scan.geometry.views(), scan.geometry.columns, scan.geometry.rows, phantom.name, *lo, *hi);
+    if (scan.cone) print_cone(scan);
     print_notes(scan.report.notes);
   });
   return 0;

@@ -1,0 +1,287 @@
+// FDK on the device against its formulas and against F in double precision.
+#define BOOST_TEST_MODULE reconstruct_cone
+#include "host/fdk/reconstruct_cone.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include "host/fbp/cosine_series.hpp"
+#include "host/fdk/cone_back_project.hpp"
+#include "host/fdk/filter_cone.hpp"
+#include "tests/reference/fdk.hpp"
+#include "tests/support/cone_scans.hpp"
+#include "tests/support/device.hpp"
+#include "tests/support/tolerance.hpp"
+#include "vdvr/certify.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
+
+using namespace vdvr;
+using namespace vdvr::testing;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+struct Compared {
+  std::vector<Vec3> points;
+  std::vector<double> values;
+  double largest = 0;
+};
+
+// Covered samples of a volume, every `step`-th of them.
+Compared covered_samples(const Volume& volume, const ExactField& exact, std::size_t step) {
+  Compared out;
+  const Index3 n = volume.grid.samples();
+  std::size_t met = 0;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        const Vec3 p = volume.grid.position({x, y, z});
+        if (!exact.covered(p) || met++ % step != 0) continue;
+        out.points.push_back(p);
+        out.values.push_back(
+            static_cast<double>(volume.samples[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)]));
+        out.largest = std::max(out.largest, std::abs(out.values.back()));
+      }
+  return out;
+}
+
+Volume reconstructed(const ProjectionSet& scan, const Grid& grid, int upsampling) {
+  Device device;
+  ReconstructOptions options;
+  options.upsampling = upsampling;
+  return reconstruct(device, scan, grid, options);
+}
+
+// What fp32 may err, of samples whose value changes by at most `slope` times a view's largest from pixel to
+// pixel: the filter's products (samples of 1/2, and a kernel whose magnitudes add to 1/2), the sum over
+// views, and positions, which err by 14 u for each column of the block and 2 u, along both axes.
+double rounding(const FilteredScan& filtered, double nearest, double slope) {
+  double sum = 0;
+  for (const double q : filtered.view_max) sum += q / (nearest * nearest);
+  const double reach = static_cast<double>(std::max(filtered.geometry.columns, filtered.geometry.rows));
+  return tolerance::fp32_sum(filtered.geometry.views() + 40, sum) +
+         pi * tolerance::fp32_sum(filtered.geometry.columns + 2, 0.25) / (nearest * nearest) +
+         2 * slope * sum * (14 * reach + 2) * tolerance::unit_roundoff;
+}
+// Between neighbours of opposite sign; and, of the series between them, by Bernstein.
+constexpr double slope_of_pixels = 2;
+double slope_of_series(const FilteredScan& filtered) {
+  return pi * cosine_gain(filtered.geometry.columns) * cosine_gain(filtered.geometry.rows);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(fdk_is_what_its_formulas_say) {
+  for (const double distance : {40.0, 90.0, 400.0}) {
+    ConeShape shape;
+    shape.source_to_axis = distance;
+    const ProjectionSet scan = noisy_cone(shape);
+    GridOptions options;
+    options.spacing = 0.9;
+    const Grid grid = make_grid(scan, options);
+    const ExactField exact(scan, {});
+    const Compared ours = covered_samples(reconstructed(scan, grid, 1), exact, 7);
+    const reference::Fdk theirs(scan, distance);
+    Device device;
+    const double allowed =
+        rounding(filter_cone(device.state(), scan, {}), 1 - 13 / distance, slope_of_pixels);
+    BOOST_REQUIRE(ours.points.size() > 200u);
+    double worst = 0;
+    for (std::size_t i = 0; i < ours.points.size(); ++i)
+      worst = std::max(worst, std::abs(ours.values[i] - theirs.at(ours.points[i])));
+    BOOST_TEST(worst <= allowed);
+    BOOST_TEST(allowed < 0.01 * ours.largest);  // else it would prove nothing
+  }
+}
+
+BOOST_AUTO_TEST_CASE(finer_tables_are_as_near_to_the_field_as_linear_interpolation_can_be) {
+  ConeShape plain, tilted;
+  tilted.in_plane_deg = 2;
+  tilted.out_of_plane_deg = -3;
+  for (const ConeShape& shape : {plain, tilted}) {
+    const ProjectionSet scan = noisy_cone(shape);
+    GridOptions options;
+    options.spacing = 0.8;
+    const Grid grid = make_grid(scan, options);
+    const ExactField exact(scan, {});
+    Device device;
+    const FilteredScan filtered = filter_cone(device.state(), scan, {});
+    const double gain = cosine_gain(filtered.geometry.columns) * cosine_gain(filtered.geometry.rows);
+    double sum = 0;
+    for (const double q : filtered.view_max) sum += gain * q;
+    const double nearest = 1 - 13 / shape.source_to_axis;
+    for (const int rate : {2, 8}) {
+      const Compared ours = covered_samples(reconstructed(scan, grid, rate), exact, 29);
+      const std::vector<double> truth = exact.at(ours.points);
+      double worst = 0;
+      for (std::size_t i = 0; i < truth.size(); ++i)
+        worst = std::max(worst, std::abs(ours.values[i] - truth[i]));
+      // An eighth of the second derivative along each axis; Bernstein: pi^2 of the largest value.
+      const double linear = 2 * pi * pi / (8.0 * rate * rate) * sum / (nearest * nearest);
+      BOOST_TEST(worst <= linear + rounding(filtered, nearest, slope_of_series(filtered)));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_source_far_away_gives_the_parallel_field) {
+  ConeShape shape;
+  shape.source_to_axis = 1e6;
+  const ProjectionSet cone = noisy_cone(shape);
+  ProjectionSet parallel = noise_scan(shape.views, shape.rows, shape.columns, 1, 360);
+  const ExactField a(cone, {}), b(parallel, {});
+  std::vector<Vec3> points;
+  for (int i = 0; i < 60; ++i)
+    points.push_back({9 * std::sin(i * 1.7), 8 * std::cos(i * 2.3), 8 * std::sin(i * 0.9)});
+  const auto far = a.at(points), limit = b.at(points);
+  double worst = 0, low = limit[0], high = limit[0];
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    worst = std::max(worst, std::abs(far[i] - limit[i]));
+    low = std::min(low, limit[i]);
+    high = std::max(high, limit[i]);
+  }
+  // Positions move by r^2 / R, samples weigh (12 / R)^2 less, lambda differs from 1 by r / R: some 20 / R.
+  BOOST_TEST(worst <= 1e-4 * (high - low));
+}
+
+BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
+  for (const double tilt : {0.0, 2.0}) {
+    ConeShape shape;
+    shape.rows = 40;
+    shape.in_plane_deg = tilt;
+    const ProjectionSet scan = noisy_cone(shape);
+    Device device;
+    opencl::State& state = device.state();
+    const FilteredScan filtered = filter_cone(state, scan, {});
+    const Grid grid = make_grid(scan, {});
+    const Index3 n = grid.samples();
+    Upsampler upsampler(state, filtered);
+    std::vector<std::vector<float>> results;
+    for (const int rate : {1, 2}) {
+      const ConeTable table = cone_table(state, filtered, upsampler, rate, {4, 4}, 0, shape.views);
+      const ConeBand band{&grid,
+                          0,
+                          n[1],
+                          0,
+                          n[2],
+                          std::vector<std::array<std::int32_t, 2>>(static_cast<std::size_t>(n[0] * n[1]),
+                                                                   {0, static_cast<std::int32_t>(n[2] - 1)})};
+      std::vector<std::vector<float>> by_lanes;
+      for (const int lanes : {1, 4, 8, 16}) {
+        const std::int64_t stride = 16 * ((n[2] + 15) / 16 + 1);
+        opencl::DeviceArray<float> out(state, static_cast<std::uint64_t>(n[0] * n[1] * stride), "out");
+        out.fill(0.0f);
+        cone_back_project(state, filtered, table, band, out, lanes);
+        by_lanes.push_back(out.to_host());
+      }
+      const ConeCoverage coverage(filtered.views, filtered.geometry.columns, filtered.geometry.rows);
+      const std::int64_t chunks = (n[2] + 15) / 16, stride = 16 * (chunks % 2 == 0 ? chunks + 1 : chunks);
+      const double allowed = 2 * rounding(filtered, 0.75, slope_of_series(filtered));
+      double worst = 0;
+      for (std::int64_t y = 0; y < n[1]; ++y)
+        for (std::int64_t x = 0; x < n[0]; ++x)
+          for (std::int64_t z = 0; z < n[2]; ++z) {
+            if (coverage.margin(grid.position({x, y, z})) < 0) continue;
+            const auto i = static_cast<std::size_t>((y * n[0] + x) * stride + z);
+            for (const auto& other : by_lanes)
+              worst = std::max(worst,
+                               std::abs(static_cast<double>(other[i]) - static_cast<double>(by_lanes[0][i])));
+          }
+      BOOST_TEST(worst <= allowed);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(memory_decides_slabs_and_chunks_and_not_values) {
+  ConeShape shape;
+  shape.views = 60;
+  const ProjectionSet scan = noisy_cone(shape);
+  const Grid grid = make_grid(scan, {});
+  ReconstructOptions options;
+  options.upsampling = 2;
+  const auto planes_of = [&](std::uint64_t limit) {
+    Device device("", limit);
+    std::vector<float> all;
+    reconstruct_planes(device, scan, grid, options, [&](std::int64_t, std::span<const float> planes) {
+      all.insert(all.end(), planes.begin(), planes.end());
+    });
+    return all;
+  };
+  const auto wide = planes_of(0), narrow = planes_of(std::uint64_t{3} << 20);
+  BOOST_REQUIRE(wide.size() == narrow.size());
+  double worst = 0, largest = 0;
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    worst = std::max(worst, std::abs(static_cast<double>(wide[i]) - static_cast<double>(narrow[i])));
+    largest = std::max(largest, std::abs(static_cast<double>(wide[i])));
+  }
+  Device device;
+  const FilteredScan filtered = filter_cone(device.state(), scan, {});
+  BOOST_TEST(worst <= 2 * rounding(filtered, 0.75, slope_of_series(filtered)));
+  BOOST_TEST(largest > 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_detector_upside_down_sees_the_same_object) {
+  const ConeShape shape;
+  const ProjectionSet scan = noisy_cone(shape);
+  ProjectionSet turned = scan;
+  const auto last = static_cast<double>(shape.rows - 1);
+  for (ViewMatrix& m : turned.cone->views)
+    for (std::size_t j = 0; j < 4; ++j) m[1][j] = last * m[2][j] - m[1][j];
+  for (std::int64_t k = 0; k < shape.views; ++k)
+    for (std::int64_t v = 0; v < shape.rows; ++v)
+      for (std::int64_t u = 0; u < shape.columns; ++u)
+        turned.data[static_cast<std::size_t>((k * shape.rows + v) * shape.columns + u)] =
+            scan.data[static_cast<std::size_t>((k * shape.rows + shape.rows - 1 - v) * shape.columns + u)];
+  const Grid grid = make_grid(scan, {});
+  const Volume a = reconstructed(scan, grid, 1), b = reconstructed(turned, grid, 1);
+  Device device;
+  const double allowed = 2 * rounding(filter_cone(device.state(), scan, {}), 0.75, slope_of_pixels);
+  double worst = 0;
+  for (std::size_t i = 0; i < a.samples.size(); ++i)
+    worst = std::max(worst, std::abs(static_cast<double>(a.samples[i]) - static_cast<double>(b.samples[i])));
+  BOOST_TEST(worst <= allowed);
+}
+
+BOOST_AUTO_TEST_CASE(units_of_metres_change_nothing_but_units) {
+  ConeShape shape;
+  ProjectionSet scan = noisy_cone(shape), metres = scan;
+  constexpr double scale = 0x1p-20;
+  for (ViewMatrix& m : metres.cone->views)
+    for (auto& row : m)
+      for (std::size_t a = 0; a < 3; ++a) row[a] /= scale;
+  metres.geometry = parallel_limit(*metres.cone, shape.columns, shape.rows, "m");
+  const Volume a = reconstructed(scan, make_grid(scan, {}), 1),
+               b = reconstructed(metres, make_grid(metres, {}), 1);
+  BOOST_REQUIRE(a.samples.size() == b.samples.size());
+  for (std::size_t i = 0; i < a.samples.size(); ++i)
+    BOOST_REQUIRE(a.samples[i] == static_cast<float>(static_cast<double>(b.samples[i]) * scale));
+}
+
+BOOST_AUTO_TEST_CASE(covered_is_a_cylinder_with_two_cones_cut_into_it) {
+  ConeShape shape;
+  shape.views = 720;
+  const ProjectionSet scan = noisy_cone(shape);
+  const ExactField exact(noisy_cone(ConeShape{}), {});
+  const ConeCoverage coverage = cone_coverage(scan, {});
+  const double R = shape.source_to_axis, edge = 0.5 * static_cast<double>(shape.columns),
+               top = 0.5 * static_cast<double>(shape.rows - 1);
+  // Of a full circle; with finitely many views the region reaches out by less than 1 - cos of half a gap.
+  const double radius = R * std::sin(std::atan(edge / R)),
+               more = radius * (1 / std::cos(pi / 720) - 1) + 4e-9;
+  BOOST_TEST(coverage.inner_radius() >= radius - 4e-9);
+  BOOST_TEST(coverage.inner_radius() <= radius + more);
+  for (int i = 0; i < 200; ++i) {
+    const double r = radius * i / 200, angle = i * 2.4;
+    const auto [low, high] = coverage.heights(r * std::cos(angle), r * std::sin(angle), 0);
+    const double height = top * (1 - r / R);
+    BOOST_TEST(high >= height - 4e-9);
+    BOOST_TEST(high <= height + top * (r / R) * (1 - std::cos(pi / 720)) + 4e-9);
+    BOOST_TEST(std::abs(low + high) <= 4e-9 + top * (r / R) * (1 - std::cos(pi / 720)));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_is_for_parallel_beam_refuses_cone_beam) {
+  const ProjectionSet scan = noisy_cone({});
+  Device device;
+  BOOST_CHECK_THROW(make_plan(device, scan, Tolerance{.relative = 0.03}, {}), InputError);
+}

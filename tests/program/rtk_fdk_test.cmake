@@ -1,0 +1,10 @@
+# FDK of vdvr against RTK's. Skipped where RTK's Python package cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_python_with(rtk_fdk_test 540 itk-rtk numpy)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/rtk_fdk.py" "${VDVR}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "rtk_fdk.py failed with ${code}")
+endif()

@@ -1,0 +1,44 @@
+// Small cone-beam scans for tests.
+#pragma once
+
+#include <numbers>
+#include <random>
+
+#include "tests/support/scans.hpp"
+
+namespace vdvr::testing {
+
+struct ConeShape {
+  std::int64_t views = 24, rows = 20, columns = 24;
+  double source_to_axis = 60;  ///< the detector stands at the axis, with pitch 1
+  double arc_deg = 360, shift = 0, in_plane_deg = 0, out_of_plane_deg = 0;
+};
+
+inline CircularView cone_view_of(const ConeShape& s, std::int64_t k) {
+  constexpr double degree = std::numbers::pi / 180;
+  CircularView view;
+  view.theta_rad = s.arc_deg * degree * static_cast<double>(k) / static_cast<double>(s.views);
+  view.source_to_axis = view.source_to_detector = s.source_to_axis;
+  view.center = 0.5 * static_cast<double>(s.columns - 1) - s.shift;
+  view.row = 0.5 * static_cast<double>(s.rows - 1);
+  view.in_plane_rad = s.in_plane_deg * degree;
+  view.out_of_plane_rad = s.out_of_plane_deg * degree;
+  return view;
+}
+
+inline ConeGeometry cone_of(const ConeShape& s) {
+  ConeGeometry cone;
+  for (std::int64_t k = 0; k < s.views; ++k) cone.views.push_back(circular_view(cone_view_of(s, k)));
+  cone.redundancy = natural_redundancy(cone, s.columns);
+  return cone;
+}
+
+/// White noise.
+inline ProjectionSet noisy_cone(const ConeShape& s, unsigned seed = 1) {
+  ProjectionSet scan = noise_scan(s.views, s.rows, s.columns, seed, s.arc_deg);
+  scan.cone = cone_of(s);
+  scan.geometry = parallel_limit(*scan.cone, s.columns, s.rows, "pixel");
+  return scan;
+}
+
+}  // namespace vdvr::testing
