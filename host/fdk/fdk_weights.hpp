@@ -1,5 +1,5 @@
 // What cone-beam samples weigh before the ramp filter, and views in their sum (docs/geometry.md, "Cone
-// beam"). Called by filter_cone.cpp and exact_field.cpp.
+// beam"). Called by filter_cone.cpp, exact_field.cpp and reconstruct_scan.cpp.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 namespace vdvr {
 
 /// Weights of FDK (Feldkamp, Davis and Kress 1984), as RTK has them: the cosine of each ray's angle, Parker's
-/// or Wang's share of rays that are measured twice, half of the gaps between views.
+/// or Wang's share of rays that are measured twice, a quarter of the gaps to both neighbouring views.
 class FdkWeights {
  public:
   /// Throws InputError where views do not suffice: fewer than two, a short scan of less than 180 degrees and

@@ -1,4 +1,5 @@
-// The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam"). Called by reconstruct_cone.cpp.
+// The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam"). Called by reconstruct_cone.cpp
+// and exact_field.cpp.
 #pragma once
 
 #include "host/fdk/cone_coverage.hpp"

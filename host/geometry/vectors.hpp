@@ -1,5 +1,5 @@
-// Vectors of world space in double precision. Called by cone_geometry.cpp, fdk_weights.cpp and
-// cone_coverage.cpp.
+// Vectors of world space in double precision. Called by cone_geometry.cpp and
+// fdk_weights.cpp.
 #pragma once
 
 #include <cmath>

@@ -51,7 +51,8 @@ double largest_magnitude(std::span<const float> samples) {
 Units units_of(const ProjectionSet& scan) {
   Units units;
   units.across = exponent_of(scan.geometry.pitch_u, usual_pitch);
-  units.along = exponent_of(scan.geometry.pitch_v, usual_pitch);
+  // Slanted rays have one unit of length.
+  units.along = scan.cone ? units.across : exponent_of(scan.geometry.pitch_v, usual_pitch);
   units.line = exponent_of(largest_magnitude(scan.data), usual_line);
   return units;
 }

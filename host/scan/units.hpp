@@ -16,8 +16,8 @@
 
 namespace vdvr {
 
-/// World = 2^exponent times what is computed with. Heights have a length of their own: no formula of parallel
-/// beam adds one to a length across the axis.
+/// World = 2^exponent times what is computed with. In parallel beam heights have a length of their own: no
+/// formula of it adds one to a length across the axis.
 struct Units {
   int across = 0;  ///< of lengths in x and y
   int along = 0;   ///< of lengths in z

@@ -277,6 +277,7 @@ BOOST_AUTO_TEST_CASE(a_displaced_detector_is_read_where_its_columns_are) {
 
 BOOST_AUTO_TEST_CASE(units_of_metres_change_nothing_but_units) {
   ConeShape shape;
+  shape.in_plane_deg = 2;
   ProjectionSet scan = noisy_cone(shape), metres = scan;
   constexpr double scale = 0x1p-20;
   for (ViewMatrix& m : metres.cone->views)
