@@ -152,16 +152,16 @@ Spread spread_of(const FilteredScan& scan, const ConeTable& table, const ConeBan
     if (range.least > range.most) continue;
     const double least = std::max(range.least, 1e-3);
     const bool upright = is_upright(m);
-    const double sheared = std::abs(m[2][2]) * h * table.rate / least,
-                 rows = std::abs(m[1][2]) * h * table.rate,
+    const double sheared = std::abs(m[2][2]) * h * table.rate / least, rows = m[1][2] * h * table.rate,
+                 near = rows / least, far = rows / std::max(range.most, least),
                  reach = static_cast<double>(std::max(table.rows, table.columns)) / table.rate;
-    const double fastest = rows / least + sheared * reach,
-                 slowest = rows / std::max(range.most, least) - sheared * reach;
     out.upright = out.upright && upright;
-    out.rows = std::max(out.rows, lanes * std::max(fastest - table.rate, table.rate - slowest));
+    out.rows = std::max(out.rows, lanes * (std::max(std::abs(near - table.rate), std::abs(far - table.rate)) +
+                                           sheared * reach));
     out.columns =
         std::max(out.columns, lanes * (std::abs(m[0][2]) * h * table.rate / least + sheared * reach));
-    out.bend = std::max(out.bend, lanes * lanes / 4 * std::abs(m[2][2]) * h / least * fastest);
+    out.bend = std::max(
+        out.bend, lanes * lanes / 4 * std::abs(m[2][2]) * h / least * (std::abs(near) + sheared * reach));
   }
   return out;
 }

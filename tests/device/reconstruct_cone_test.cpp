@@ -148,7 +148,9 @@ BOOST_AUTO_TEST_CASE(a_source_far_away_gives_the_parallel_field) {
 BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
   for (const double tilt : {0.0, 2.0}) {
     ConeShape shape;
+    // At the rim a third of a vector lies below what is covered.
     shape.rows = 40;
+    shape.source_to_axis = 50;
     shape.in_plane_deg = tilt;
     const ProjectionSet scan = noisy_cone(shape);
     Device device;
@@ -159,7 +161,7 @@ BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
     Upsampler upsampler(state, filtered);
     std::vector<std::vector<float>> results;
     for (const int rate : {1, 2}) {
-      const ConeTable table = cone_table(state, filtered, upsampler, rate, {4, 4}, 0, shape.views);
+      const ConeTable table = cone_table(state, filtered, upsampler, rate, {1, 1}, 0, shape.views);
       const ConeBand band{&grid,
                           0,
                           n[1],
@@ -177,7 +179,8 @@ BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
       }
       const ConeCoverage coverage(filtered.views, filtered.geometry.columns, filtered.geometry.rows);
       const std::int64_t chunks = (n[2] + 15) / 16, stride = 16 * (chunks % 2 == 0 ? chunks + 1 : chunks);
-      const double allowed = 2 * rounding(filtered, 0.75, slope_of_series(filtered));
+      const double allowed =
+          2 * rounding(filtered, 0.6, rate == 1 ? slope_of_pixels : slope_of_series(filtered));
       double worst = 0;
       for (std::int64_t y = 0; y < n[1]; ++y)
         for (std::int64_t x = 0; x < n[0]; ++x)
