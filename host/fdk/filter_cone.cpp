@@ -6,6 +6,7 @@
 
 #include "host/fdk/fdk_weights.hpp"
 #include "host/fbp/ramp_kernel.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/huge_pages.hpp"
 #include "host/system/parallel.hpp"
@@ -81,12 +82,15 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
   const std::vector<double> kernel = ramp_kernel(field, 1.0, g.columns);
   std::unique_ptr<RowFilter> filter;
   std::vector<float> weighed;
+  HostMemory host(state);
   const std::int64_t step = std::clamp<std::int64_t>(together / (size * 4), 1, views);
   for (std::int64_t first = 0; first < views; first += step) {
     const std::int64_t n = std::min(step, views - first);
     if (!filter || chunk.views() != n) {
       chunk.theta_rad.assign(at(n), 0.0);
       filter = make_row_filter(state, chunk, kernel, FilterMethod::automatic, precision);
+      if (weighed.empty())
+        host.count(sizeof(float) * count(n * size) + 2 * sizeof(double) * count(size), "weighed projections");
       weighed.resize(at(n * size));
     }
     parallel_for(n, {}, "", [&](std::int64_t k) {

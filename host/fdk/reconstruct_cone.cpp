@@ -11,6 +11,7 @@
 #include "host/fdk/cone_back_project.hpp"
 #include "host/fdk/cone_coverage.hpp"
 #include "host/fdk/filter_cone.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "shared/cone_back_project.h"
@@ -120,6 +121,8 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
   const ConeMargins margins = margins_of(filtered, grid);
   const Index3 n = grid.samples();
   const Sizes sizes = sizes_for(state, filtered, rate, margins, n, planes.bytes);
+  HostMemory host(state);
+  host.count(filtered.samples.resident_bytes(), "the filtered projections");
   Upsampler upsampler(state, filtered);
   bool any = false;
   std::optional<ConeTable> table;  // the last one: of all views it serves all bands
