@@ -251,7 +251,7 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
                            .adds = band.adds ? 1 : 0,
                            .spans_v = spans(spread.rows, table.rows - 1),
                            .spans_u = spans(spread.columns, table.columns - 1)};
-  const std::int64_t carried = lanes * vectors_each;
+  const std::int64_t carried = std::int64_t{lanes} * vectors_each;
   const std::uint64_t vectors = count((band.nz + carried - 1) / carried);
   const auto tiles = [&](std::int64_t n) { return count((n + tile - 1) / tile); };
   kernel({{vectors, tiles(nx), tiles(band.ny)},

@@ -35,8 +35,8 @@ CircularView circular_view_of(const SimulateOptions& o, int k) {
 
 // Midpoints of `n` equal parts of -width/2 .. width/2.
 std::vector<double> midpoints(double width, int n) {
-  std::vector<double> out;
-  for (int i = 0; i < n; ++i) out.push_back(width * ((i + 0.5) / n - 0.5));
+  std::vector<double> out(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) out[static_cast<std::size_t>(i)] = width * ((i + 0.5) / n - 0.5);
   return out;
 }
 
@@ -127,6 +127,7 @@ void write_cone_scan(const std::filesystem::path& folder, const ProjectionSet& s
                                   {"row", view.row}};
   // Degrees as they were given: those of the HDF5 file have passed through radians.
   std::vector<double> angles;
+  angles.reserve(static_cast<std::size_t>(options.angles));
   for (int k = 0; k < options.angles; ++k) angles.push_back(k * options.arc_deg / options.angles);
   geometry["angles"] = angles;
   if (cone.in_plane_deg != 0 || cone.out_of_plane_deg != 0)
