@@ -139,8 +139,7 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
 std::vector<float> CloseBoundaries::tile_of(std::int64_t brick) const {
   if (closing_ == Closing::coarse) return tile_by_coarse(stored_, brick);
   if (closing_ == Closing::paper) return tile_by_paper(stored_, brick);
-  const std::span<const float> own = open_.samples[at(brick)];
-  return {own.begin(), own.end()};
+  return open_.samples.copy(at(brick));
 }
 
 void CloseBoundaries::for_each_tile(const std::function<void(std::int64_t)>& visit) const {

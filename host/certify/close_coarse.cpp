@@ -126,8 +126,7 @@ class Closer {
 }  // namespace
 
 std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick) {
-  const std::span<const float> own_samples = stored.open.samples[at(brick)];
-  std::vector<float> tile(own_samples.begin(), own_samples.end());
+  std::vector<float> tile = stored.open.samples.copy(at(brick));
   const Surroundings around(stored.open, brick);
   const TileView own(stored.open, around.position, stored.level[at(brick)]);
   for_each_part([&](const std::array<int, 3>& side) { Closer(stored, around, own, side, tile); });

@@ -39,8 +39,7 @@ std::vector<float> refined(const TileView& view, const std::vector<float>& coars
 
 // What a brick starts from: its own samples, those on the base lattice from the base.
 std::vector<float> own_tile(const OpenBricks& b, std::int64_t brick, const TileView& view) {
-  const std::span<const float> own_samples = b.samples[at(brick)];
-  std::vector<float> tile(own_samples.begin(), own_samples.end());
+  std::vector<float> tile = b.samples.copy(at(brick));
   tile.resize(view.size());
   Index3 i{};
   for (i[2] = 0; i[2] <= view.last[2]; i[2] += std::int64_t{1} << view.level[2])

@@ -31,6 +31,10 @@ class TileStore {
     if (p.size == 0) return {};
     return std::span<float>(parts_[p.part]).subspan(p.first, p.size);
   }
+  [[nodiscard]] std::vector<float> copy(std::size_t brick) const {
+    const std::span<const float> tile = (*this)[brick];
+    return {tile.begin(), tile.end()};
+  }
   /// The place of a tile that shrank or grew is lost until clear(). Throws ResourceError.
   void put(std::size_t brick, std::span<const float> tile) {
     Place& p = places_.at(brick);

@@ -81,8 +81,6 @@ std::int64_t cells_around(double length, double spacing) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing - 1e-9)));
 }
 
-}  // namespace
-
 void check_grid(const Grid& grid) {
   std::int64_t product = 1;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -99,22 +97,31 @@ void check_grid(const Grid& grid) {
   }
 }
 
-Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
-  const Coverage coverage(geometry);
+}  // namespace
+
+Grid grid_around(const ParallelGeometry& geometry, double radius, std::pair<double, double> heights,
+                 const GridOptions& options) {
   Grid grid;
   grid.unit = geometry.unit;
   const double d = options.spacing.value_or(geometry.pitch_u);
   grid.spacing = {d, d, options.spacing_z.value_or(options.spacing.value_or(geometry.pitch_v))};
   if (!(grid.spacing[0] > 0) || !(grid.spacing[2] > 0))
     throw InputError("`spacing` must be positive and finite");
-  const double radius = coverage.inner_radius(), height = coverage.half_height();
-  grid.cells = options.size.value_or(Index3{cells_around(2 * radius, d), cells_around(2 * radius, d),
-                                            cells_around(2 * height, grid.spacing[2])});
+  const std::int64_t across = cells_around(2 * radius, d),
+                     along = cells_around(heights.second - heights.first, grid.spacing[2]);
+  grid.cells = options.size.value_or(Index3{across, across, along});
+  const Vec3 middle{0, 0, 0.5 * (heights.first + heights.second)};
   for (std::size_t a = 0; a < 3; ++a)
-    grid.origin[a] =
-        options.origin ? (*options.origin)[a] : -0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a];
+    grid.origin[a] = options.origin ? (*options.origin)[a]
+                                    : middle[a] - 0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a];
   check_grid(grid);
   return grid;
+}
+
+Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
+  const Coverage coverage(geometry);
+  const double height = coverage.half_height();
+  return grid_around(geometry, coverage.inner_radius(), {-height, height}, options);
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {

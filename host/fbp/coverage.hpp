@@ -2,10 +2,10 @@
 // reconstruct.cpp, plan.cpp, gold_stream.cpp, build.cpp.
 #pragma once
 
+#include <utility>
 #include <vector>
 
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 
@@ -32,7 +32,9 @@ class Coverage {
   double t_min_, t_max_, inner_, half_height_, slack_, slack_z_;
 };
 
-/// Throws InputError for a grid that is empty, not finite, or too large.
-void check_grid(const Grid& grid);
+/// What the options say, else a box around a cylinder about the axis. Throws InputError for a grid that is
+/// empty, not finite, or too large.
+Grid grid_around(const ParallelGeometry& geometry, double radius, std::pair<double, double> heights,
+                 const GridOptions& options);
 
 }  // namespace vdvr

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host/fbp/back_project.hpp"
+#include "host/fbp/coverage.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/fdk/cone_back_project.hpp"
 #include "host/fdk/cone_coverage.hpp"
@@ -101,10 +102,6 @@ Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, 
   return s;
 }
 
-std::int64_t cells_around(double length, double spacing) {
-  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing - 1e-9)));
-}
-
 }  // namespace
 
 void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
@@ -169,23 +166,8 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
 }
 
 Grid make_cone_grid(const ProjectionSet& scan, const GridOptions& options) {
-  const ParallelGeometry& g = scan.geometry;
   const ConeCoverage coverage = cone_coverage(scan, {});
-  Grid grid;
-  grid.unit = g.unit;
-  const double d = options.spacing.value_or(g.pitch_u);
-  grid.spacing = {d, d, options.spacing_z.value_or(options.spacing.value_or(g.pitch_v))};
-  if (!(grid.spacing[0] > 0) || !(grid.spacing[2] > 0))
-    throw InputError("`spacing` must be positive and finite");
-  const double radius = coverage.inner_radius();
-  const auto [low, high] = coverage.heights(0, 0, 0);
-  const std::int64_t across = cells_around(2 * radius, d), along = cells_around(high - low, grid.spacing[2]);
-  grid.cells = options.size.value_or(Index3{across, across, along});
-  const Vec3 middle{0, 0, 0.5 * (low + high)};
-  for (std::size_t a = 0; a < 3; ++a)
-    grid.origin[a] = options.origin ? (*options.origin)[a]
-                                    : middle[a] - 0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a];
-  return grid;
+  return grid_around(scan.geometry, coverage.inner_radius(), coverage.heights(0, 0, 0), options);
 }
 
 }  // namespace vdvr

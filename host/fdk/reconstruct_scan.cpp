@@ -29,10 +29,7 @@ void reconstruct_scan(opencl::State& state, const ProjectionSet& scan, const Uni
 }  // namespace
 
 Grid make_grid(const ProjectionSet& scan, const GridOptions& options) {
-  if (!scan.cone) return make_grid(scan.geometry, options);
-  const Grid grid = make_cone_grid(scan, options);
-  check_grid(grid);
-  return grid;
+  return scan.cone ? make_cone_grid(scan, options) : make_grid(scan.geometry, options);
 }
 
 std::vector<std::string> check_scan(const ProjectionSet& scan) {

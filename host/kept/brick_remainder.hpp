@@ -1,5 +1,6 @@
-// What T leaves out, brick by brick, from fourth differences of gold at twice the rate of kept nodes
-// (docs/error-bounds.md, section 5). Called by gold_stream.cpp.
+// What T leaves out, brick by brick, from fourth differences of gold: at twice the rate of kept nodes with
+// six taps in u, at the kept nodes themselves with linear or cubic interpolation (docs/error-bounds.md,
+// section 5). Called by gold_stream.cpp.
 #pragma once
 
 #include <array>
@@ -21,7 +22,7 @@ class BrickRemainder {
                  const Grid& grid, int granularity);
 
   /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as
-  /// nobody has. Cost: gold at twice the rate of kept nodes, and six differences a node.
+  /// nobody has. Cost: gold at the rate of the differences, and six of these a node.
   void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
 
   /// Of cells of gold on `lattice` in a brick that was required.

@@ -1,0 +1,10 @@
+# Runs WHAT.py, which compares vdvr with RTK. Skipped where RTK's Python package cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_python_with(${WHAT}_test 540 itk-rtk numpy)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/${WHAT}.py" "${VDVR}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "${WHAT}.py failed with ${code}")
+endif()
