@@ -313,7 +313,7 @@ class Planner {
     preparation_ = seconds_of([&] {
       prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, sups_wanted(scan), Progress{});
     });
-    coverage_.emplace(prepared_->filtered.geometry);
+    coverage_.emplace(prepared_->filtered.geometry, prepared_->filtered.views);
   }
 
   Plan make(const RateOptions& wanted, const Tolerance& tolerance) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "host/fbp/view_weights.hpp"
@@ -15,43 +16,128 @@ namespace vdvr {
 namespace {
 
 constexpr std::int64_t sectors = 1024;
+constexpr int circles = 64;
 
 }  // namespace
 
 Coverage::Coverage(const ParallelGeometry& g)
-    : t_min_((-0.5 - g.center) * g.pitch_u),
-      t_max_((static_cast<double>(g.columns) - 0.5 - g.center) * g.pitch_u),
-      inner_(std::min(-t_min_, t_max_)),
-      half_height_(0.5 * static_cast<double>(g.rows - 1) * g.pitch_v),
-      // A point exactly on the detector's edge counts as covered whatever the rounding of its t.
-      slack_(1e-9 * g.pitch_u),
-      slack_z_(1e-9 * g.pitch_v) {
+    // A point exactly on the detector's edge counts as covered whatever the rounding of its t.
+    : slack_(1e-9 * g.pitch_u), slack_z_(1e-9 * g.pitch_v) {
+  const double below = (g.center + 0.5) * g.pitch_u,
+               above = (static_cast<double>(g.columns) - 0.5 - g.center) * g.pitch_u,
+               half_height = 0.5 * static_cast<double>(g.rows - 1) * g.pitch_v;
+  heights_ = {-half_height, half_height};
+  inner_ = std::min(below, above);
   if (!(inner_ > 0))
     throw InputError(fmt::format("the centre {} does not fall on the detector's {} columns; correct `center`",
                                  g.center, g.columns));
   for (const double theta : g.theta_rad) {
-    cosine_.push_back(std::cos(theta));
-    sine_.push_back(std::sin(theta));
+    const double c = std::cos(theta), s = std::sin(theta);
+    planes_.push_back({c, s, below});
+    planes_.push_back({-c, -s, above});
   }
+  index();
+}
+
+Coverage::Coverage(const ParallelGeometry& g, const std::vector<ViewMatrix>& views) {
+  if (views.empty()) {
+    *this = Coverage(g);
+    return;
+  }
+  slack_ = 1e-9 * g.pitch_u;
+  slack_z_ = 1e-9 * g.pitch_v;
+  // Of each view, four planes through the source bound what it sees: unit normals inwards, and what the axis'
+  // point has.
+  std::vector<std::array<double, 4>> planes;
+  for (const ViewMatrix& m : views) {
+    const auto add = [&](std::size_t row, double bound, double sign) {
+      std::array<double, 4> plane{};
+      for (std::size_t j = 0; j < 4; ++j) plane[j] = sign * (m[row][j] - bound * m[2][j]);
+      const double norm = std::hypot(plane[0], plane[1], plane[2]);
+      for (double& value : plane) value /= norm;
+      planes.push_back(plane);
+    };
+    add(0, -0.5, 1);
+    add(0, static_cast<double>(g.columns) - 0.5, -1);
+    add(1, 0, 1);
+    add(1, static_cast<double>(g.rows - 1), -1);
+  }
+  take_cylinder(planes);
+  index();
+}
+
+// Half-planes of the cylinder of largest volume among those whose heights are a share of the axis' own: what
+// a plane leaves of a height is affine in it, so that it is the less of both ends. Distances to a plane in
+// space are no larger along z = const, so margins are what they promise.
+void Coverage::take_cylinder(const std::vector<std::array<double, 4>>& planes) {
+  double low = -INFINITY, high = INFINITY;
+  for (const auto& p : planes) {
+    if (p[2] > 1e-14) low = std::max(low, -p[3] / p[2]);
+    if (p[2] < -1e-14) high = std::min(high, -p[3] / p[2]);
+    if (!(p[3] + slack_ >= 0))
+      throw InputError("the isocentre does not fall on the detector in every view; correct `center`");
+  }
+  const auto rest = [&](const std::array<double, 4>& p, double share) {
+    return p[3] + std::min(p[2] * low * share, p[2] * high * share);
+  };
+  constexpr int steps = 256;
+  double largest = -1, best = 1;
+  for (int i = steps; i > 0; --i) {
+    const double share = static_cast<double>(i) / steps;
+    double radius = INFINITY;
+    for (const auto& p : planes) {
+      const double across = std::hypot(p[0], p[1]);
+      if (across > 1e-14) radius = std::min(radius, rest(p, share) / across);
+    }
+    // A single row has no height, and the whole of its plane.
+    const double volume = radius > 0 ? radius * radius * (high > low ? share : 1.0) : 0.0;
+    if (volume > largest) {
+      largest = volume;
+      best = share;
+      inner_ = radius;
+    }
+  }
+  if (!(inner_ > 0))
+    throw InputError("the axis does not fall on the detector's columns in every view; correct `center`");
+  heights_ = {low * best, high * best};
+  for (const auto& p : planes) planes_.push_back({p[0], p[1], rest(p, best)});
+}
+
+void Coverage::index() {
+  const auto reach = [](const HalfPlane& p, double dx, double dy) {
+    const double towards = -(p.x * dx + p.y * dy);
+    return towards > 0 ? p.rest / towards : std::numeric_limits<double>::infinity();
+  };
   for (std::int64_t i = 0; i < sectors; ++i) {
     const double phi = 2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(sectors),
                  x = std::cos(phi), y = std::sin(phi);
-    const auto along = [&](std::size_t k) { return std::abs(x * cosine_[k] + y * sine_[k]); };
-    std::size_t best = 0;
-    for (std::size_t k = 1; k < cosine_.size(); ++k)
-      if (along(k) > along(best)) best = k;
-    nearest_.push_back(best);
+    nearest_.push_back(0);
+    double least = INFINITY;
+    for (std::size_t k = 0; k < planes_.size(); ++k)
+      if (const double r = reach(planes_[k], x, y); r < least) {
+        least = r;
+        nearest_.back() = k;
+      }
+  }
+  for (int i = 0; i <= circles; ++i) {
+    const double r = inner_ * static_cast<double>(i) / circles;
+    double least = INFINITY;
+    for (const HalfPlane& p : planes_) least = std::min(least, p.rest - r * std::hypot(p.x, p.y));
+    within_.push_back(least);
   }
 }
 
 double Coverage::margin(double x, double y) const {
   const double r = std::hypot(x, y);
-  if (r <= inner_) return inner_ - r;  // covered whatever the angles
-  double margin = INFINITY;
-  for (std::size_t k = 0; k < cosine_.size(); ++k) {
-    const double t = x * cosine_[k] + y * sine_[k];
-    margin = std::min(margin, std::min(t - t_min_, t_max_ - t));
+  if (r < inner_) {  // covered whatever the angles
+    // The least margin on a circle is concave in its radius: it lies above its chords.
+    const double place = r / inner_ * circles;
+    const auto i = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(circles - 1));
+    const double part = place - static_cast<double>(i);
+    return within_[i] + part * (within_[i + 1] - within_[i]) + slack_;
   }
+  double margin = INFINITY;
+  for (const HalfPlane& p : planes_) margin = std::min(margin, p.margin(x, y));
   return margin + slack_;
 }
 
@@ -59,13 +145,15 @@ double Coverage::margin_above(double x, double y, double floor) const {
   if (std::hypot(x, y) > inner_) {
     const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 1;
     const std::size_t k = nearest_[static_cast<std::size_t>(turn * sectors) % sectors];
-    const double t = x * cosine_[k] + y * sine_[k], far = std::min(t - t_min_, t_max_ - t) + slack_;
+    const double far = planes_[k].margin(x, y) + slack_;
     if (far < floor) return far;
   }
   return margin(x, y);
 }
 
-double Coverage::margin_z(double z) const { return half_height_ - std::abs(z) + slack_z_; }
+double Coverage::margin_z(double z) const {
+  return std::min(z - heights_.first, heights_.second - z) + slack_z_;
+}
 
 double coverage_margin(const ParallelGeometry& geometry, double center, const Vec3& point) {
   ParallelGeometry g = geometry;
@@ -120,8 +208,7 @@ Grid grid_around(const ParallelGeometry& geometry, double radius, std::pair<doub
 
 Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
   const Coverage coverage(geometry);
-  const double height = coverage.half_height();
-  return grid_around(geometry, coverage.inner_radius(), {-height, height}, options);
+  return grid_around(geometry, coverage.inner_radius(), coverage.heights(), options);
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {

@@ -1,20 +1,27 @@
-// The covered region of a scan: points all of whose projections fall on the detector. Called by
-// reconstruct.cpp, plan.cpp, gold_stream.cpp, build.cpp.
+// The covered region of a scan: points all of whose projections fall on the detector; of cone beam a cylinder
+// within it. Called by reconstruct.cpp, plan.cpp, gold_stream.cpp, build.cpp.
 #pragma once
 
+#include <array>
 #include <utility>
 #include <vector>
 
+#include "vdvr/cone_geometry.hpp"
 #include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 
-/// The region across z: the intersection of one strip per view, t_min <= t <= t_max; a convex polygon around
-/// the axis.
+/// The region across z is the intersection of half-planes, a convex polygon around the axis; along z it is an
+/// interval of heights.
 class Coverage {
  public:
-  /// `geometry.center` is the centre in use. Throws InputError when the axis does not fall on the detector.
+  /// Strips t_min <= t <= t_max. `geometry.center` is the centre in use. Throws InputError when the axis does
+  /// not fall on the detector.
   explicit Coverage(const ParallelGeometry& geometry);
+  /// Of cone beam, where `views` has matrices of the detector's columns and rows: what every view sees
+  /// narrows towards the top and the bottom, and what can be certified is the largest upright cylinder in it
+  /// (docs/geometry.md, "Cone beam"). Without views, that of parallel beam.
+  Coverage(const ParallelGeometry& geometry, const std::vector<ViewMatrix>& views);
 
   /// Distance-like margin across z: >= 0 inside; outside, minus a lower bound of the distance to the region.
   [[nodiscard]] double margin(double x, double y) const;
@@ -24,12 +31,23 @@ class Coverage {
   /// The same along z.
   [[nodiscard]] double margin_z(double z) const;
   [[nodiscard]] double inner_radius() const { return inner_; }
-  [[nodiscard]] double half_height() const { return half_height_; }
+  /// Along z, from .first to .second.
+  [[nodiscard]] const std::pair<double, double>& heights() const { return heights_; }
 
  private:
-  std::vector<double> cosine_, sine_;
-  std::vector<std::size_t> nearest_;  // by sectors of directions: the view that looks along the middle best
-  double t_min_, t_max_, inner_, half_height_, slack_, slack_z_;
+  // x * point_x + y * point_y + rest >= 0; (x, y) is at most of length 1.
+  struct HalfPlane {
+    double x = 0, y = 0, rest = 0;
+    [[nodiscard]] double margin(double px, double py) const { return x * px + y * py + rest; }
+  };
+  void index();
+  void take_cylinder(const std::vector<std::array<double, 4>>& planes);
+
+  std::vector<HalfPlane> planes_;
+  std::vector<std::size_t> nearest_;  // by sectors of directions: the half-plane that ends there first
+  std::vector<double> within_;        // of circles around the axis, the least margin on each
+  std::pair<double, double> heights_;
+  double inner_ = 0, slack_ = 0, slack_z_ = 0;
 };
 
 /// What the options say, else a box around a cylinder about the axis. Throws InputError for a grid that is

@@ -31,12 +31,33 @@ ViewMatrix padded(const ViewMatrix& matrix, const FdkWeights& weights) {
 
 }  // namespace
 
+namespace {
+
+// The matrices with the columns that a displaced detector is padded with, and how many these are.
+struct Padded {
+  Padded(const ProjectionSet& scan, const FieldOptions& field) : views(used_cone(scan, field).views) {
+    const FdkWeights weights({views, scan.cone->redundancy}, scan.geometry.columns, scan.geometry.rows);
+    for (ViewMatrix& matrix : views) matrix = padded(matrix, weights);
+    columns = scan.geometry.columns + weights.pad_before() + weights.pad_after();
+  }
+  std::vector<ViewMatrix> views;
+  std::int64_t columns = 0;
+};
+
+}  // namespace
+
 ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field) {
-  ConeGeometry cone = used_cone(scan, field);
-  const ParallelGeometry& g = scan.geometry;
-  const FdkWeights weights(cone, g.columns, g.rows);
-  for (ViewMatrix& matrix : cone.views) matrix = padded(matrix, weights);
-  return {cone.views, g.columns + weights.pad_before() + weights.pad_after(), g.rows};
+  const Padded detector(scan, field);
+  return {detector.views, detector.columns, scan.geometry.rows};
+}
+
+Coverage certified_coverage(const ProjectionSet& scan, const FieldOptions& field) {
+  ParallelGeometry g = scan.geometry;
+  if (field.center) g.center = *field.center;
+  if (!scan.cone) return Coverage(g);
+  const Padded detector(scan, field);
+  g.columns = detector.columns;
+  return {g, detector.views};
 }
 
 ViewMatrix from_world(ViewMatrix matrix, const Units& units) {

@@ -2,6 +2,7 @@
 // and exact_field.cpp.
 #pragma once
 
+#include "host/fbp/coverage.hpp"
 #include "host/fdk/cone_coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
 #include "host/scan/units.hpp"
@@ -12,6 +13,8 @@ namespace vdvr {
 ConeGeometry used_cone(const ProjectionSet& scan, const FieldOptions& field);
 /// Columns that a displaced detector is padded with count as seen: their rays weigh nothing.
 ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field);
+/// What is certified of a scan of either beam, in world units.
+Coverage certified_coverage(const ProjectionSet& scan, const FieldOptions& field);
 /// In units of computation.
 ViewMatrix from_world(ViewMatrix matrix, const Units& units);
 

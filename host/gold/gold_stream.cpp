@@ -45,7 +45,7 @@ class Stopwatch {
 
 GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
                        const GoldSettings& settings, std::shared_ptr<GoldSource> source)
-    : state_(state), settings_(settings), coverage_(scan.geometry), source_(std::move(source)) {
+    : state_(state), settings_(settings), coverage_(scan.geometry, scan.views), source_(std::move(source)) {
   const std::int64_t g = settings.granularity;
   if (!source_) source_ = std::make_shared<GoldSource>(state, scan, sups, settings);
   lattice_ = source_->kept.lattice(settings.grid, settings.rate);

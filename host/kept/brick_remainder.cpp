@@ -32,7 +32,7 @@ constexpr double difference_norm = 16;
 
 BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
                                const FieldSups& sups, const Grid& grid, int granularity)
-    : state_(state), kept_(kept), coverage_(scan.geometry), grid_(grid), granularity_(granularity) {
+    : state_(state), kept_(kept), coverage_(scan.geometry, scan.views), grid_(grid), granularity_(granularity) {
   // A quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times as large. But
   // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
   if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};

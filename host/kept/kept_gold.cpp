@@ -53,7 +53,7 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
       reach_(reach),
       heights_bytes_(heights_bytes),
       interpolation_(interpolation),
-      coverage_(scan.geometry) {
+      coverage_(scan.geometry, scan.views) {
   const ParallelGeometry& g = scan.geometry;
   const double across = std::max(grid.spacing[0], grid.spacing[1]);
   rates_ = {rate_of(across, g.pitch_u), rate_of(across, g.pitch_u), rate_of(grid.spacing[2], g.pitch_v)};

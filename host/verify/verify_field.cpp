@@ -150,7 +150,7 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
       field_(field),
       volume_(volume),
       unit_(std::ldexp(1.0, density)),
-      coverage_(field.geometry()),
+      coverage_(field.geometry(), field.views()),
       sups_(view_sups(field.coefficients(), field.geometry(), progress)),
       stored_(upload(state, volume, -density)),
       across_(nodes_across(volume.grid, field.geometry())),

@@ -66,7 +66,7 @@ void compare_range(Differences& out, Filtered& f, const ExactField& exact, const
                    const Certificate& c, const Progress& progress) {
   const Volume base =
       reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress);
-  const CoveredRange range = covered_range(base, Coverage(f.scan.geometry));
+  const CoveredRange range = covered_range(base, Coverage(f.scan.geometry, f.scan.views));
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2),
                rounding = arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps),
                found = range.high - range.low;
