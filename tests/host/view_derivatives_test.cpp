@@ -259,6 +259,53 @@ BOOST_AUTO_TEST_CASE(top_waves_of_a_cone_come_near_their_bounds) {
   BOOST_TEST(least >= 0.2);
 }
 
+// At one point, with all terms of the identity in step, which no single wave brings about.
+BOOST_AUTO_TEST_CASE(at_a_point_the_bound_is_the_sum_of_all_terms) {
+  Chance chance(4);
+  for (int trial = 0; trial < 20; ++trial) {
+    const ViewMatrix m = chance.matrix();
+    const std::array<double, 3> x{chance.number(-1, 1), chance.number(-1, 1), chance.number(-1, 1)};
+    const double lambda = row_of(m, 2, x), u = row_of(m, 0, x) / lambda, v = row_of(m, 1, x) / lambda;
+    const ViewBox box = view_box(m, x, x);
+    for (const auto& orders : orders_up_to_six()) {
+      const auto directions = axes_of(orders);
+      const int n = static_cast<int>(directions.size());
+      double sum = 0;
+      for (unsigned subset = 0; subset < 1U << n; ++subset) {
+        double product = 1;
+        int size = 0;
+        for (int i = 0; i < n; ++i) {
+          std::size_t e = 0;
+          while (directions[static_cast<std::size_t>(i)][e] == 0) ++e;
+          const double l = m[2][e], wave = pi * (std::abs(m[0][e] - l * u) + std::abs(m[1][e] - l * v));
+          product *= (subset >> i) % 2 == 1 ? wave : std::abs(l);
+          size += static_cast<int>((subset >> i) % 2);
+        }
+        sum += product * std::tgamma(n + 2) / std::tgamma(size + 2);
+      }
+      sum /= std::pow(lambda, n + 2);
+      const double bound = derivative_bound(box, orders, {1, pi * pi, pi * pi});
+      BOOST_TEST(std::abs(bound - sum) <= tolerance::fp64_sum(4000, sum));
+    }
+  }
+}
+
+// Along a ray nothing of q changes: what is left is the derivative of lambda^-2.
+BOOST_AUTO_TEST_CASE(along_a_ray_bounds_are_those_of_the_weight) {
+  const double l = -1.0 / 60;
+  ViewMatrix m{};
+  m[0] = {1, 11.5 * l, 0, 11.5};
+  m[1] = {0, 9.5 * l, 1, 9.5};
+  m[2] = {0, l, 0, 1};
+  const ViewBox box = view_box(m, {0, -4, 0}, {0, 7, 0});
+  double expected = 1 / std::pow(1 + 7 * l, 2);
+  for (int n = 0; n <= 6; ++n, expected *= (n + 1) * std::abs(l) / (1 + 7 * l)) {
+    const double bound = derivative_bound(box, {0, n, 0}, {1, 1, 1});
+    BOOST_TEST(expected <= bound);
+    BOOST_TEST(bound <= expected * (1 + 1e-9));  // rounding of X, which cancels
+  }
+}
+
 BOOST_AUTO_TEST_CASE(boxes_that_reach_the_sources_plane_have_no_bound) {
   ViewMatrix m{};
   m[0] = {1, 0, 0, 0};
