@@ -15,8 +15,10 @@
 #include <optional>
 #include <utility>
 
+#include "host/bounds/dense_values.hpp"
 #include "host/bounds/node_functional.hpp"
 #include "host/bounds/six_taps.hpp"
+#include "host/fdk/region_boxes.hpp"
 #include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
@@ -30,11 +32,13 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr double smallest_normal = 0x1p-126;
 
-// What two products may lose below the smallest normal number: relative bounds do not cover it, and devices
-// may flush, in each of the terms and in what is kept of each run.
-double underflow(const ParallelGeometry& g, double gain_u) {
+}  // namespace
+
+double product_underflow(const ParallelGeometry& g, double gain_u) {
   return 4 * (static_cast<double>(g.rows) * gain_u + static_cast<double>(g.columns)) * smallest_normal;
 }
+
+namespace {
 
 // No bound can be made of a sup that is no finite number.
 void require_finite(const std::vector<float>& sups, int order) {
@@ -116,17 +120,12 @@ const HalfColumnTaps& half_column_facts(int phases) {
 
 }  // namespace
 
-namespace {
-
-// What n samples of at most `largest` err once transforms have made them `rate` times finer.
 double transform_error(std::int64_t n, int rate, double largest, double sup) {
   const HalfColumnTaps& taps = half_column_facts(rate / 2);
   // Rounded once; before that in double precision, 32 products of the taps' magnitudes among them.
   const double half = half_column_error(n) * std::sqrt(static_cast<double>(n));
   return unit_roundoff * 1.001 * sup + (taps.sup + 0x1p-46) * sup + taps.norm * half * largest;
 }
-
-}  // namespace
 
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
                     double largest, double sup) {
@@ -149,7 +148,7 @@ double derivative_rounding(Upsampler& upsampler, const FilteredScan& scan, const
       order == 0 ? column_error(upsampler, g.columns, columns, row_max, gain * row_max)
                  : unit_roundoff * (product_error(g.columns, upsampler.run()) + 2) * gain * row_max;
   return unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * row_max + of_columns +
-         views * underflow(g, gain);
+         views * product_underflow(g, gain);
 }
 
 // Views per chunk so that slabs of derivatives stay near 64 MiB, and what is made on the way beside them
@@ -181,98 +180,65 @@ struct DenseGrid {
 
 namespace {
 
-// |q| on the dense grid, view by view, where rows are many: columns first, then rows by transforms as well,
-// which a product would take rows squared for.
-class DenseValues {
+// Rows from which on transforms along v are faster than a product, which takes rows squared.
+constexpr std::int64_t fewest_dense_rows = 96;
+
+// The largest |q| of each view: columns of the chunks are the dense rows.
+std::vector<double> dense_sups(opencl::State& state, DenseValues& dense, std::int64_t first,
+                               std::int64_t views) {
+  return view_sups(state, dense(first, views), views, dense.rows().count, dense.columns().count, 0);
+}
+
+// Sup |q| view by view: of every `step`-th, the others are 0.
+class ValuesByView {
  public:
-  // Rows from which on that is the faster.
-  static constexpr std::int64_t fewest_rows = 96;
-  static bool suit(const opencl::State& state, const ParallelGeometry& g) {
-    return g.rows >= fewest_rows && ColumnUpsampling::is_possible(state);
+  ValuesByView(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const DenseGrid& grid)
+      : state_(state), upsampler_(upsampler), scan_(scan), grid_(grid) {
+    const ParallelGeometry& g = scan.geometry;
+    if (DenseValues::suit(state, g, fewest_dense_rows))
+      dense_.emplace(state, upsampler, scan, grid.columns, upsampled_columns(g.rows, DenseGrid::density, 0));
   }
-
-  DenseValues(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, const DenseGrid& dense)
-      : state_(state),
-        upsampler_(upsampler),
-        scan_(scan),
-        columns_(dense.columns),
-        rows_(upsampled_columns(scan.geometry.rows, DenseGrid::density, 0)),
-        along_v_(state, scan.geometry.rows, DenseGrid::density) {
-    for (std::int64_t v = 0; v < scan.geometry.rows; ++v) own_rows_.push_back(static_cast<double>(v));
+  /// Without rounding.
+  std::vector<double> operator()(std::int64_t first, std::int64_t n) {
+    std::vector<double> sups =
+        dense_ ? dense_sups(state_, *dense_, first, n)
+               : view_sups(state_, upsampler_(grid_.columns, grid_.rows, 0, 0, DenseGrid::density, first, n), 0);
+    for (double& s : sups) s *= grid_.rise;
+    return sups;
   }
-
-  std::vector<double> sups(std::int64_t first, std::int64_t views) {
-    const std::int64_t V = scan_.geometry.rows,
-                       chunks = static_cast<std::int64_t>(opencl::round_up(count(columns_.count), 16)) / 16;
-    const UpsampledSlab slab = upsampler_(columns_, own_rows_, 0, 0, 1, first, views);
-    resize(turned_, count(chunks * views * V * 16), "columns of rows");
-    resize(values_, count(chunks * views * rows_.count * 16), "dense values");
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> turn(state_, "bounds/projection_bounds",
-                                                                        "turn");
-    turn({{count(V), count(chunks), count(views)}, {1, 1, 1}}, turned_.buffer(), slab.values.buffer(),
-         to_int(views), to_int(columns_.count), to_int(V));
-    along_v_(values_, {0, count(rows_.count * 16), count(views * rows_.count * 16)}, turned_,
-             {0, count(V * 16), count(views * V * 16)}, rows_, views, chunks);
-    return view_sups(state_, values_, views, rows_.count, columns_.count, 0);
-  }
-
-  // What the values err, of views whose samples sum up to `samples`: columns by a part of their own, which
-  // the series along v makes grow, and rows by theirs.
-  [[nodiscard]] double rounding(double samples) {
-    const ParallelGeometry& g = scan_.geometry;
-    const double gain_u = upsampler_.gain_u(), gain_v = lebesgue_constant(g.rows);
-    const double columns = column_error(upsampler_, g.columns, columns_, samples, gain_u * samples),
-                 largest = gain_u * samples + columns;
-    return gain_v * columns + transform_error(g.rows, DenseGrid::density, largest, gain_v * largest) +
-           static_cast<double>(g.views()) * gain_v * underflow(g, gain_u);
+  /// Of views whose samples sum up to `samples`.
+  [[nodiscard]] double rounding(double samples, double views) {
+    return dense_ ? grid_.rise * dense_->rounding(samples, upsampler_.gain_u() * samples)
+                  : derivative_rounding(upsampler_, scan_, grid_.columns, 0, samples, views);
   }
 
  private:
-  void resize(opencl::DeviceArray<float>& array, std::uint64_t size, const char* what) {
-    if (array.size() == size) return;
-    array = {};  // before the next one is allocated
-    array = opencl::DeviceArray<float>(state_, size, what);
-  }
-
   opencl::State& state_;
   Upsampler& upsampler_;
   const FilteredScan& scan_;
-  UpsampledColumns columns_, rows_;
-  ColumnUpsampling along_v_;
-  std::vector<double> own_rows_;
-  opencl::DeviceArray<float> turned_, values_;
+  const DenseGrid& grid_;
+  std::optional<DenseValues> dense_;
 };
 
-// The sum over views of sup |q| without its rounding, and that.
-std::pair<double, double> sum_of_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
-  const ParallelGeometry& g = scan.geometry;
-  const DenseGrid dense(scan);
-  double samples = 0, sum = 0;
+double sum_of_samples(const FilteredScan& scan) {
+  double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  std::optional<DenseValues> by_transforms;
-  if (DenseValues::suit(state, g)) by_transforms.emplace(state, upsampler, scan, dense);
-  const std::int64_t chunk =
-      view_chunk(state, scan, dense.columns.count, static_cast<std::int64_t>(dense.rows.size()));
-  for (std::int64_t first = 0; first < g.views(); first += chunk) {
-    const std::int64_t n = std::min(chunk, g.views() - first);
-    for (const double m :
-         by_transforms
-             ? by_transforms->sups(first, n)
-             : view_sups(state, upsampler(dense.columns, dense.rows, 0, 0, DenseGrid::density, first, n), 0))
-      sum += dense.rise * m;
-  }
-  return {sum, by_transforms ? dense.rise * by_transforms->rounding(samples)
-                             : derivative_rounding(upsampler, scan, dense.columns, 0, samples,
-                                                   static_cast<double>(g.views()))};
+  return samples;
 }
 
 }  // namespace
 
 FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan) {
   const ParallelGeometry& g = scan.geometry;
+  const DenseGrid grid(scan);
+  ValuesByView values(state, upsampler, scan, grid);
+  const std::int64_t chunk =
+      view_chunk(state, scan, grid.columns.count, static_cast<std::int64_t>(grid.rows.size()));
+  double sum = 0;
+  for (std::int64_t first = 0; first < g.views(); first += chunk)
+    for (const double m : values(first, std::min(chunk, g.views() - first))) sum += m;
   FieldSups sups;
-  const auto [sum, rounding] = sum_of_sups(state, upsampler, scan);
-  sups.value = sum + rounding;
+  sups.value = sum + values.rounding(sum_of_samples(scan), static_cast<double>(g.views()));
   sups.second_u = std::pow(pi / g.pitch_u, 2) * sups.value;
   if (g.rows > 1) sups.second_v = std::pow(pi / g.pitch_v, 2) * sups.value;
   return sups;
@@ -346,6 +312,60 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   return sups;
 }
 
+namespace {
+
+// The largest sum of lambda^-2 times the values on the covered region.
+double largest_sum(const FilteredScan& scan, const std::vector<double>& values) {
+  const Coverage coverage(scan.geometry, scan.views);
+  double largest = 0;
+  for (const RegionBox& box : region_boxes(coverage, 0, coverage.heights()))
+    largest = std::max(largest, sum_of_weights(scan.views, values, box.low, box.high, 2));
+  return largest;
+}
+
+}  // namespace
+
+FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, std::int64_t step) {
+  const ParallelGeometry& g = scan.geometry;
+  const DenseGrid grid(scan);
+  ValuesByView values(state, upsampler, scan, grid);
+  const double square_u = g.pitch_u * g.pitch_u, square_v = g.pitch_v * g.pitch_v;
+  FieldSups sups;
+  sups.by_view.resize(at(g.views()));
+  const std::int64_t chunk =
+      view_chunk(state, scan, grid.columns.count, static_cast<std::int64_t>(grid.rows.size()));
+  for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
+    const auto derivative = [&](int order_u, int order_v) {
+      return view_sups(
+          state, upsampler(grid.columns, grid.rows, order_u, order_v, DenseGrid::density, first, n), 2);
+    };
+    const std::vector<double> value = values(first, n), along_u = derivative(2, 0),
+                              along_v = g.rows > 1 ? derivative(0, 2) : std::vector<double>(at(n), 0.0);
+    for (std::int64_t i = 0; i < n; ++i) {
+      DetectorSups& view = sups.by_view[at(first + i)];
+      const double most = scan.view_max[at(first + i)];
+      view.value = value[at(i)] + values.rounding(most, 1);
+      view.second_u = square_u * (grid.rise * along_u[at(i)] +
+                                  derivative_rounding(upsampler, scan, grid.columns, 2, most, 1));
+      // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
+      if (g.rows > 1)
+        view.second_v = square_v * grid.rise * along_v[at(i)] +
+                        pi * pi * derivative_rounding(upsampler, scan, grid.columns, 0, most, 1);
+    }
+  });
+  // An estimate takes the views between for those that were looked at.
+  for (std::int64_t k = 0; k < g.views(); ++k) sups.by_view[at(k)] = sups.by_view[at(k - k % step)];
+  const auto sum = [&](auto member) {
+    std::vector<double> of_views;
+    for (const DetectorSups& view : sups.by_view) of_views.push_back(view.*member);
+    return largest_sum(scan, of_views);
+  };
+  sups.value = sum(&DetectorSups::value);
+  sups.second_u = sum(&DetectorSups::second_u) / square_u;
+  sups.second_v = sum(&DetectorSups::second_v) / square_v;
+  return sups;
+}
+
 double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan) {
   return scan.ramp_error * upsampler.gain_u() * lebesgue_constant(scan.geometry.rows);
 }
@@ -408,7 +428,7 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   // At a wrong position, too, the interpolant is that close to the signal, which moves by its slope
   // (Bernstein: of values alone, as six taps are). A position is in columns, and pi / pitch in world units.
   out.position = position_error(g, columns, blocks) / columns.rate * pi * sups.value;
-  out.underflow = views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
+  out.underflow = views * (2 * product_underflow(g, gain_u) + 8 * smallest_normal);
   return out;
 }
 
@@ -443,7 +463,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
                                : 0.0);
   const double views = static_cast<double>(g.views());
   return filter_error_bound(upsampler, scan) + weight_gain * upsampling + summation + position +
-         views * (2 * underflow(g, gain_u) + 8 * smallest_normal);
+         views * (2 * product_underflow(g, gain_u) + 8 * smallest_normal);
 }
 
 AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates,

@@ -7,6 +7,7 @@
 
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/filter_projections.hpp"
+#include "host/fdk/view_derivatives.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/grid.hpp"
 
@@ -20,6 +21,9 @@ struct FieldSups {
   double sampled_second_u =
       0;  ///< of the largest |q_uu| at the detector's own samples: what the paper's Eq. 7 takes
   double sampled_second_v = 0;
+  /// Of cone beam view by view; none of parallel beam. The sums above are then the largest of lambda^-2 times
+  /// these on the covered region, with lengths as at the axis.
+  std::vector<DetectorSups> by_view;
 };
 
 /// Throws InputError where a derivative's sup is no finite number: no bound can be made of it.
@@ -29,6 +33,8 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
                      std::int64_t step = 1);
 /// Derivatives by Bernstein's inequality, at a third of the cost: what rates of six taps and gold need.
 FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
+/// Of cone beam: values and second derivatives, view by view. Cost: as field_sups.
+FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, std::int64_t step = 1);
 /// Multiply-adds of field_sups.
 double cost_of_sups(const ParallelGeometry& geometry);
 
@@ -46,6 +52,14 @@ constexpr double unit_roundoff = 0x1p-24;
 /// `largest` at the detector's columns and its own is at most `sup` between them.
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
                     double largest, double sup);
+
+/// What n samples of at most `largest`, of a signal of at most `sup`, err once transforms have made them `rate`
+/// times finer (upsample_columns.hpp).
+double transform_error(std::int64_t n, int rate, double largest, double sup);
+
+/// What two products of a view may lose below the smallest normal number: relative bounds do not cover it, and
+/// devices may flush, in each of the terms and in what is kept of each run.
+double product_underflow(const ParallelGeometry& geometry, double gain_u);
 
 /// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes
 /// (kernels/fbp/batched_product.cl).

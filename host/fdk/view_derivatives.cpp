@@ -36,7 +36,7 @@ double factorial_ratio(int n, int m) {  // n! / m!
 
 // [p][r] = (n+1)! / (p+r+1)! sup |q_{u^p v^r}|, p + r <= n. Bernstein's inequality takes a factor of pi, the
 // Nyquist frequency, for each order; it may start from the value or from either second derivative.
-Table weighted_sups(const ViewSups& sups, int n) {
+Table weighted_sups(const DetectorSups& sups, int n) {
   constexpr double square = std::numbers::pi * std::numbers::pi;
   const double from_value = square * sups.value;
   const double from_u = std::min(from_value, sups.second_u), from_v = std::min(from_value, sups.second_v);
@@ -124,7 +124,7 @@ ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high) {
   return box;
 }
 
-double derivative_bound(const ViewBox& box, const std::array<int, 3>& orders, const ViewSups& sups) {
+double derivative_bound(const ViewBox& box, const std::array<int, 3>& orders, const DetectorSups& sups) {
   const int n = orders[0] + orders[1] + orders[2];
   if (*std::min_element(orders.begin(), orders.end()) < 0 || n > highest)
     throw std::logic_error("derivative_bound: orders below 0 or together above 6");
@@ -158,7 +158,7 @@ double SixthSups::along(int e, int f, int g) const {
   return at(orders);
 }
 
-SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const ViewSups> sups, const Vec3& low,
+SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups, const Vec3& low,
                      const Vec3& high) {
   if (views.size() != sups.size()) throw std::logic_error("sixth_sups: one set of sups for each view");
   SixthSups out;

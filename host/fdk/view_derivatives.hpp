@@ -17,7 +17,7 @@ namespace vdvr {
 
 /// Of one filtered view everywhere on the detector's plane, its mirror images included: pixels are the unit
 /// of length. Frequencies along u and along v must not exceed pi radians a pixel.
-struct ViewSups {
+struct DetectorSups {
   double value = 0;     ///< sup |q|
   double second_u = 0;  ///< sup |q_uu|
   double second_v = 0;  ///< sup |q_vv|
@@ -34,7 +34,7 @@ ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high);
 
 /// At least |derivative of lambda^-2 q| of `orders` along x, y and z, together at most 6, anywhere on the
 /// box, per powers of the world's unit of length. Infinite where the box reaches the source's plane.
-double derivative_bound(const ViewBox& box, const std::array<int, 3>& orders, const ViewSups& sups);
+double derivative_bound(const ViewBox& box, const std::array<int, 3>& orders, const DetectorSups& sups);
 
 /// Bounds of the sixth derivatives that have even orders along all axes.
 class SixthSups {
@@ -45,7 +45,7 @@ class SixthSups {
   [[nodiscard]] double along(int e, int f, int g) const;
 
  private:
-  friend SixthSups sixth_sups(std::span<const ViewMatrix>, std::span<const ViewSups>, const Vec3&,
+  friend SixthSups sixth_sups(std::span<const ViewMatrix>, std::span<const DetectorSups>, const Vec3&,
                               const Vec3&);
   static std::size_t place(const std::array<int, 3>& orders);
   std::array<double, 16> sums_{};  // [orders[0] / 2][orders[1] / 2]
@@ -53,7 +53,7 @@ class SixthSups {
 
 /// Sums of derivative_bound over the views. Infinite where the box reaches the source's plane of a view.
 /// Cost: some 800 operations a view.
-SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const ViewSups> sups, const Vec3& low,
+SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups, const Vec3& low,
                      const Vec3& high);
 
 /// At least sum_k lambda^-power values[k], values >= 0, anywhere on the box; infinite as above.

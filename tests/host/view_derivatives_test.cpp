@@ -27,7 +27,7 @@ constexpr double pi = std::numbers::pi;
 // q = amplitude cos(w_u u + w_v v + phase)
 struct Wave {
   double amplitude = 1, w_u = 0, w_v = 0, phase = 0;
-  [[nodiscard]] ViewSups sups() const {
+  [[nodiscard]] DetectorSups sups() const {
     return {std::abs(amplitude), std::abs(amplitude) * w_u * w_u, std::abs(amplitude) * w_v * w_v};
   }
 };
@@ -311,9 +311,9 @@ BOOST_AUTO_TEST_CASE(boxes_that_reach_the_sources_plane_have_no_bound) {
   m[0] = {1, 0, 0, 0};
   m[1] = {0, 0, 1, 0};
   m[2] = {0, 0.25, 0, 1};  // the source's plane: y = -4
-  const ViewSups sups{1, 1, 1};
+  const DetectorSups sups{1, 1, 1};
   const std::vector<ViewMatrix> views(1, m);
-  const std::vector<ViewSups> all(1, sups);
+  const std::vector<DetectorSups> all(1, sups);
   const std::vector<double> values(1, 2.0);
   for (const double reach : {-4.0, -4.1, -1e9}) {
     const Vec3 low{0, reach, 0}, high{1, 1, 1};
@@ -340,7 +340,7 @@ BOOST_AUTO_TEST_CASE(sums_are_those_of_the_views) {
   shape.out_of_plane_deg = 3;
   const ConeGeometry cone = cone_of(shape);
   Chance chance(3);
-  std::vector<ViewSups> sups;
+  std::vector<DetectorSups> sups;
   std::vector<double> values;
   for (std::size_t k = 0; k < cone.views.size(); ++k) {
     sups.push_back({chance.number(0.1, 1), chance.number(0.1, 9), chance.number(0.1, 9)});

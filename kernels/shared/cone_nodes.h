@@ -1,0 +1,31 @@
+// Tiles of kept nodes that are back-projected from cone-beam views. Passed by value from
+// host/kept/cone_tiles.cpp to cone_nodes.cl.
+#ifndef VDVR_CONE_NODES_H
+#define VDVR_CONE_NODES_H
+
+// Nodes of a tile's side, and heights that are computed together.
+#define VDVR_CONE_TILE 32
+#define VDVR_CONE_HEIGHTS 8
+
+#ifdef __OPENCL_VERSION__
+typedef ulong VdvrOffset;
+#else
+#include <cstdint>
+typedef std::uint64_t VdvrOffset;
+#endif
+
+typedef struct {
+  VdvrOffset plane;         // floats from one view of the table to the next
+  VdvrOffset tile;          // floats from one tile of nodes to the next
+  int views;                // of the table
+  int column_stride;        // floats from one column of the table to the next
+  int last_column;          // that six taps may begin at
+  int last_row;             // that eight values may be read from
+  int stride;               // floats from one column of nodes to the next
+  int first_group, groups;  // of heights
+  int tiles;
+  int block_side, block_groups;  // nodes across, and groups, that share a view's numbers
+  int blocks_across, blocks;     // along x, or y; of a tile
+} VdvrConeNodes;
+
+#endif
