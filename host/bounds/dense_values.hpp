@@ -17,7 +17,8 @@ class DenseValues {
               const UpsampledColumns& columns, const UpsampledColumns& rows);
 
   /// float values[column / 16][view][row][16] of these views, until the next call. Cost: that of the
-  /// upsampler's columns, and of transforms of their rows. Memory: the values, and a sixth of them on the way.
+  /// upsampler's columns, and of transforms of their rows. Memory: the values, and a sixth of them on the
+  /// way.
   const opencl::DeviceArray<float>& operator()(std::int64_t first, std::int64_t views);
   [[nodiscard]] std::uint64_t bytes(std::int64_t views) const;
 

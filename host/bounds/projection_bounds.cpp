@@ -201,8 +201,9 @@ class ValuesByView {
   /// Without rounding.
   std::vector<double> operator()(std::int64_t first, std::int64_t n) {
     std::vector<double> sups =
-        dense_ ? dense_sups(state_, *dense_, first, n)
-               : view_sups(state_, upsampler_(grid_.columns, grid_.rows, 0, 0, DenseGrid::density, first, n), 0);
+        dense_
+            ? dense_sups(state_, *dense_, first, n)
+            : view_sups(state_, upsampler_(grid_.columns, grid_.rows, 0, 0, DenseGrid::density, first, n), 0);
     for (double& s : sups) s *= grid_.rise;
     return sups;
   }
@@ -336,8 +337,8 @@ FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredSc
       view_chunk(state, scan, grid.columns.count, static_cast<std::int64_t>(grid.rows.size()));
   for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
     const auto derivative = [&](int order_u, int order_v) {
-      return view_sups(
-          state, upsampler(grid.columns, grid.rows, order_u, order_v, DenseGrid::density, first, n), 2);
+      return view_sups(state,
+                       upsampler(grid.columns, grid.rows, order_u, order_v, DenseGrid::density, first, n), 2);
     };
     const std::vector<double> value = values(first, n), along_u = derivative(2, 0),
                               along_v = g.rows > 1 ? derivative(0, 2) : std::vector<double>(at(n), 0.0);

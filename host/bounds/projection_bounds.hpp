@@ -34,7 +34,8 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
 /// Derivatives by Bernstein's inequality, at a third of the cost: what rates of six taps and gold need.
 FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan);
 /// Of cone beam: values and second derivatives, view by view. Cost: as field_sups.
-FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, std::int64_t step = 1);
+FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
+                    std::int64_t step = 1);
 /// Multiply-adds of field_sups.
 double cost_of_sups(const ParallelGeometry& geometry);
 
@@ -53,12 +54,12 @@ constexpr double unit_roundoff = 0x1p-24;
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
                     double largest, double sup);
 
-/// What n samples of at most `largest`, of a signal of at most `sup`, err once transforms have made them `rate`
-/// times finer (upsample_columns.hpp).
+/// What n samples of at most `largest`, of a signal of at most `sup`, err once transforms have made them
+/// `rate` times finer (upsample_columns.hpp).
 double transform_error(std::int64_t n, int rate, double largest, double sup);
 
-/// What two products of a view may lose below the smallest normal number: relative bounds do not cover it, and
-/// devices may flush, in each of the terms and in what is kept of each run.
+/// What two products of a view may lose below the smallest normal number: relative bounds do not cover it,
+/// and devices may flush, in each of the terms and in what is kept of each run.
 double product_underflow(const ParallelGeometry& geometry, double gain_u);
 
 /// How much a sum of n products in compensated runs errs, in units of u times the sum of magnitudes

@@ -44,6 +44,18 @@ struct Padded {
   std::int64_t columns = 0;
 };
 
+// The largest 2-norm of a row of a view, float [v][u].
+double largest_row_norm(std::span<const float> view, const ParallelGeometry& g) {
+  double largest = 0;
+  for (std::int64_t v = 0; v < g.rows; ++v) {
+    double sum = 0;
+    for (const float p : view.subspan(at(v * g.columns), at(g.columns)))
+      sum += static_cast<double>(p) * static_cast<double>(p);
+    largest = std::max(largest, std::sqrt(sum));
+  }
+  return largest;
+}
+
 }  // namespace
 
 ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field) {
@@ -101,6 +113,10 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
   constexpr std::int64_t together = std::int64_t{64} << 20;  // bytes of a chunk of weighed views
   ParallelGeometry chunk = g;
   const std::vector<double> kernel = ramp_kernel(field, 1.0, g.columns);
+  double kernel_norm = 0;
+  for (std::size_t d = 0; d < kernel.size(); ++d) kernel_norm += (d == 0 ? 1 : 2) * kernel[d] * kernel[d];
+  kernel_norm = std::sqrt(kernel_norm);
+  std::vector<double> errors(at(views));
   std::unique_ptr<RowFilter> filter;
   std::vector<float> weighed;
   HostMemory host(state);
@@ -130,10 +146,23 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
       if (!std::all_of(view.begin(), view.end(), [](float q) { return std::isfinite(q); }))
         throw not_finite(first + k);
       out.view_max[at(first + k)] = static_cast<double>(largest_magnitude(view));
+      // Weighed samples were rounded; the filter makes at most its norm times theirs of that.
+      const double norm = largest_row_norm(std::span<const float>(weighed).subspan(at(k * size), at(size)), g),
+                   weight = of_view[at(first + k)];
+      errors[at(first + k)] = filter->error(weight, norm, out.view_max[at(first + k)]) +
+                              weight * kernel_norm * norm * (0x1p-24 + 0x1p-48) + 0x1p-126;
     });
     report(progress, "filter", static_cast<double>(first + n) / static_cast<double>(views));
   }
+  for (const double e : errors) out.ramp_error += e;
   return out;
+}
+
+FilteredScan filter_scan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                         const Progress& progress, Precision precision, const Units& units) {
+  return scan.cone
+             ? filter_cone(state, scan, field, progress, precision, units)
+             : filter_projections(state, scan, field, progress, FilterMethod::automatic, precision, units);
 }
 
 }  // namespace vdvr

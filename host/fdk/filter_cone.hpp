@@ -25,4 +25,9 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
                          const Progress& progress = {}, Precision precision = Precision::fp64,
                          const Units& units = {});
 
+/// Of either beam: this, or filter_projections().
+FilteredScan filter_scan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                         const Progress& progress = {}, Precision precision = Precision::fp64,
+                         const Units& units = {});
+
 }  // namespace vdvr

@@ -7,14 +7,16 @@
 
 #include "host/fbp/back_project.hpp"
 #include "host/opencl/kernel.hpp"
+#include "host/fdk/view_derivatives.hpp"
 #include "host/system/casts.hpp"
+#include "host/system/parallel.hpp"
 #include "host/system/round_up.hpp"
 #include "host/volume/bricks.hpp"
 #include "shared/fourth_differences.h"
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrFourthDifferences) == 36);
+static_assert(sizeof(VdvrFourthDifferences) == 44);
 
 namespace {
 
@@ -32,34 +34,53 @@ constexpr double difference_norm = 16;
 
 BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
                                const FieldSups& sups, const Grid& grid, int granularity)
-    : state_(state), kept_(kept), coverage_(scan.geometry, scan.views), grid_(grid), granularity_(granularity) {
+    : state_(state),
+      kept_(kept),
+      scan_(scan),
+      sups_(sups),
+      coverage_(scan.geometry, scan.views),
+      grid_(grid),
+      granularity_(granularity) {
   // A quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times as large. But
   // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
   if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};
+  if (!scan.views.empty())  // fewer where nodes are denser than half a pixel already
+    for (std::size_t a = 0; a < 3; ++a) nodes_.phases[a] = kept.rates()[a] > 2 ? 1 : 2;
   for (std::size_t a = 0; a < 3; ++a) rates_[a] = kept.rates()[a] * nodes_.phases[a];
-  const ParallelGeometry& g = scan.geometry;
   bricks_ = Bricks(grid, granularity).along();
+  const GoldErrors errors = kept.errors(nodes_);
+  slack_ = difference_norm * (errors.interpolation + errors.rounding) +
+           difference_rounding * unit_roundoff * kept.sup();
+  if (scan.views.empty()) set_parallel(scan, sups);
+  else set_cone();
   Vec3 spacing{};
-  std::array<RemainderNorms, 3> norms;
-  Index3 stencil{};
   for (std::size_t a = 0; a < 3; ++a) {
     spacing[a] = grid.spacing[a] / static_cast<double>(rates_[a]);
-    const double pitch = a == 2 ? g.pitch_v : g.pitch_u;
-    norms[a] = a == 1 && spacing[1] == spacing[0]
-                   ? norms[0]
-                   : remainder_norms(std::min(pi / 2, pi * spacing[a] / pitch));
-    // The stencil of a point one step of gold, at 2x or finer, outside the brick.
     const std::int64_t side = granularity * rates_[a];
-    stencil[a] = norms[a].taps / 2 + std::max<std::int64_t>(1, rates_[a] / 2);
-    rings_[a] = (stencil[a] + side - 1) / side;
+    rings_[a] = (stencil_[a] + side - 1) / side;
   }
   const Index3 all{bricks_[0] + 2 * rings_[0], bricks_[1] + 2 * rings_[1], bricks_[2] + 2 * rings_[2]};
   maxima_.resize(at(all[0] * all[1] * all[2]));
   looked_at_.resize(maxima_.size());
+  // Columns that a stencil of a tested cell reads: the cell meets the covered region.
+  lowest_ = -(std::hypot(grid.spacing[0], grid.spacing[1]) +
+              static_cast<double>(stencil_[0]) * std::hypot(spacing[0], spacing[1])) *
+            (1 + 1e-6);
+  lowest_z_ = -(grid.spacing[2] + static_cast<double>(stencil_[2]) * spacing[2]) * (1 + 1e-6);
+}
 
-  const GoldErrors errors = kept.errors(nodes_);
-  const double node = errors.interpolation + errors.rounding;
-  const double slack = difference_norm * node + difference_rounding * unit_roundoff * sups.value;
+void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sups) {
+  const ParallelGeometry& g = scan.geometry;
+  std::array<RemainderNorms, 3> norms;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double spacing = grid_.spacing[a] / static_cast<double>(rates_[a]),
+                 pitch = a == 2 ? g.pitch_v : g.pitch_u;
+    norms[a] = a == 1 && grid_.spacing[1] == grid_.spacing[0] && rates_[1] == rates_[0]
+                   ? norms[0]
+                   : remainder_norms(std::min(pi / 2, pi * spacing / pitch));
+    // The stencil of a point one step of gold outside the brick.
+    stencil_[a] = norms[a].taps / 2 + step_of_gold(a);
+  }
   const std::array<std::array<std::size_t, 3>, 6> axes{
       {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}}};
   for (std::size_t d = 0; d < 6; ++d) {
@@ -69,12 +90,84 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
                  tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k])
                               : mixed_tail(norms[i], norms[j], norms[k]);
     factor_[d] = round_up(factor);
-    addend_[d] = round_up(factor * slack + tail * sups.value);
+    addend_[d] = round_up(factor * slack_ + tail * sups.value);
   }
-  // Columns that a stencil of a tested cell reads: the cell meets the covered region.
-  lowest_ = -(std::hypot(grid.spacing[0], grid.spacing[1]) +
-              static_cast<double>(stencil[0]) * std::hypot(spacing[0], spacing[1])) *
-            (1 + 1e-6);
+}
+
+// F has no band limit, but bounds of its sixth derivatives: a fourth derivative anywhere in a cell of nodes
+// is at most the largest at the cell's corners and what second derivatives of it allow between them; at a
+// corner a fourth difference errs by a sixth derivative (docs/error-bounds.md, section 16).
+void BrickRemainder::set_cone() {
+  for (std::size_t a = 0; a < 3; ++a) stencil_[a] = 1 + step_of_gold(a);
+  factor_.fill(1);
+  addend_.fill(round_up(slack_));
+}
+
+// What sixth derivatives add to X on some bricks and what X looks at around them.
+BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Index3& bricks) const {
+  Vec3 low{}, high{}, square{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double node = grid_.spacing[a] / static_cast<double>(rates_[a]),
+                 around = static_cast<double>(stencil_[a] + reach) * node,
+                 side = static_cast<double>(granularity_) * grid_.spacing[a];
+    low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side - around;
+    high[a] = grid_.origin[a] + static_cast<double>(first[a] + bricks[a]) * side + around;
+    square[a] = node * node;
+  }
+  const SixthSups sixth = sixth_sups(scan_.views, sups_.by_view, low, high);
+  // h_i^2 h_j^2 h_k^2 |F_iijjkk|, at least.
+  const auto sup = [&](std::size_t i, std::size_t j, std::size_t k) {
+    return square[i] * square[j] * square[k] *
+           sixth.along(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
+  };
+  constexpr std::array<std::array<std::size_t, 2>, 6> axes{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  Maxima out{};
+  for (std::size_t d = 0; d < 6; ++d) {
+    const auto& [i, j] = axes[d];
+    const double at_corner = i == j ? sup(i, i, i) / 6 : (sup(i, i, j) + sup(i, j, j)) / 12,
+                 between = (sup(i, j, 0) + sup(i, j, 1) + sup(i, j, 2)) / 8;
+    out[d] = round_up(at_corner + between);
+  }
+  return out;
+}
+
+// By brick, x fastest. Neighbours share theirs: a sum over all views takes a millisecond.
+std::vector<BrickRemainder::Maxima> BrickRemainder::addends_by_group(const Index3& first,
+                                                                     const Index3& bricks) const {
+  std::vector<Maxima> out(at(bricks[0] * bricks[1] * bricks[2]), Maxima{});
+  if (scan_.views.empty()) return out;
+  constexpr std::int64_t group = 4;
+  const Index3 groups{(bricks[0] + group - 1) / group, (bricks[1] + group - 1) / group,
+                      (bricks[2] + group - 1) / group};
+  parallel_for(groups[0] * groups[1] * groups[2], {}, "", [&](std::int64_t n) {
+    const Index3 begin{n % groups[0] * group, n / groups[0] % groups[1] * group,
+                       n / (groups[0] * groups[1]) * group};
+    Index3 size{}, place{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      size[a] = std::min(group, bricks[a] - begin[a]);
+      place[a] = first[a] + begin[a];
+    }
+    if (!is_read(place, size)) return;
+    const Maxima of_group = addends_of(place, size);
+    for (std::int64_t z = 0; z < size[2]; ++z)
+      for (std::int64_t y = 0; y < size[1]; ++y)
+        for (std::int64_t x = 0; x < size[0]; ++x)
+          out[at(((begin[2] + z) * bricks[1] + begin[1] + y) * bricks[0] + begin[0] + x)] = of_group;
+  });
+  return out;
+}
+
+// Whether a tested cell's stencil may reach these bricks.
+bool BrickRemainder::is_read(const Index3& first, const Index3& bricks) const {
+  Vec3 low{}, size{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double side = static_cast<double>(granularity_) * grid_.spacing[a];
+    low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side;
+    size[a] = static_cast<double>(bricks[a]) * side;
+  }
+  return coverage_.margin(low[0] + 0.5 * size[0], low[1] + 0.5 * size[1]) >=
+             lowest_ - 0.5 * std::hypot(size[0], size[1]) &&
+         coverage_.margin_z(low[2] + 0.5 * size[2]) >= lowest_z_ - 0.5 * size[2];
 }
 
 std::size_t BrickRemainder::slot(const Index3& p) const {
@@ -131,6 +224,22 @@ GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const 
   return box;
 }
 
+// Of the box' heights, two before the bricks not counted, the first and last that a tested cell's stencil
+// reads: of cone beam others are not kept.
+std::pair<int, int> BrickRemainder::heights_read(const GoldBox& box) const {
+  const std::int64_t last = box.nodes[2] - 1 - 2 * reach;
+  if (scan_.views.empty()) return {0, to_int(last)};
+  std::pair<int, int> read{to_int(last + 1), -1};
+  for (std::int64_t k = 0; k <= last; ++k) {
+    const double z = grid_.origin[2] + static_cast<double>(box.first[2] + reach + k) * grid_.spacing[2] /
+                                           static_cast<double>(rates_[2]);
+    if (coverage_.margin_z(z) < lowest_z_) continue;
+    read.first = std::min(read.first, to_int(k));
+    read.second = to_int(k);
+  }
+  return read;
+}
+
 void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
   const GoldBox box = box_of(first, bricks);
   // Room for eight lanes that begin at the last node of the last brick.
@@ -153,16 +262,22 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(
       state_, "kept/fourth_differences", "fourth_differences");
   const auto side = [&](std::size_t a) { return to_int(granularity_ * rates_[a]); };
+  const auto [first_z, last_z] = heights_read(box);
   kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
          margin.buffer(),
          VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
-                               side(2), to_int(box.nodes[0]), to_int(stride), static_cast<float>(lowest_)});
+                               side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
+                               static_cast<float>(lowest_)});
   const std::vector<float> found = out.to_host();
+  const std::vector<Maxima> addends = addends_by_group(first, bricks);
   for (std::int64_t z = 0; z < bricks[2]; ++z)
     for (std::int64_t y = 0; y < bricks[1]; ++y)
       for (std::int64_t x = 0; x < bricks[0]; ++x) {
         const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
-        std::copy_n(found.begin() + ((z * bricks[1] + y) * bricks[0] + x) * 6, 6, maxima_[i].begin());
+        const std::int64_t brick = (z * bricks[1] + y) * bricks[0] + x;
+        for (std::size_t d = 0; d < 6; ++d)
+          maxima_[i][d] = round_up(static_cast<double>(found[at(brick * 6) + d]) +
+                                   static_cast<double>(addends[at(brick)][d]));
         looked_at_[i] = 1;
       }
 }

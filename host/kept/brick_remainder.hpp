@@ -30,22 +30,36 @@ class BrickRemainder {
 
  private:
   using Maxima = std::array<float, 6>;  // xx, yy, zz, xy, xz, yz
+  /// Half a step of gold's, at 2x or finer, in nodes: how far from the brick X has to hold.
+  [[nodiscard]] std::int64_t step_of_gold(std::size_t axis) const {
+    return std::max<std::int64_t>(1, rates_[axis] / 2);
+  }
+  void set_parallel(const FilteredScan& scan, const FieldSups& sups);
+  void set_cone();
+  [[nodiscard]] std::vector<Maxima> addends_by_group(const Index3& first, const Index3& bricks) const;
+  [[nodiscard]] bool is_read(const Index3& first, const Index3& bricks) const;
+  [[nodiscard]] std::pair<int, int> heights_read(const GoldBox& box) const;
+  [[nodiscard]] Maxima addends_of(const Index3& first, const Index3& bricks) const;
   [[nodiscard]] std::size_t slot(const Index3& position) const;
   [[nodiscard]] GoldBox box_of(const Index3& first, const Index3& bricks) const;
   void look_at(const Index3& first, const Index3& bricks);
 
   opencl::State& state_;
   KeptGold& kept_;
+  const FilteredScan& scan_;
+  const FieldSups& sups_;
   Coverage coverage_;
   Grid grid_;
   int granularity_;
   GoldLattice nodes_;                    // at which differences are taken
   Index3 rates_{};                       // nodes to a cell
   Index3 bricks_{}, rings_{};            // of the grid, and of bricks around it
-  std::vector<Maxima> maxima_;           // with the rings
+  Index3 stencil_{};                     // nodes around the brick that X looks at
+  std::vector<Maxima> maxima_;           // with the rings; of cone beam with what sixth derivatives add
   std::vector<std::uint8_t> looked_at_;  // alike
   Maxima factor_{}, addend_{};           // of a difference, by which X is bounded
-  double lowest_ = 0;
+  double slack_ = 0;                     // what a difference of computed gold errs
+  double lowest_ = 0, lowest_z_ = 0;
 };
 
 }  // namespace vdvr

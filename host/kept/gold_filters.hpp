@@ -14,7 +14,7 @@ namespace vdvr {
 struct GoldFilter {
   int rate = 1;                // positions to a node, phase 0 included
   int taps = 2;                // even
-  double band = 0;             // radians a node, at most pi / 2
+  double band = 0;             // radians a node, at most 3/4 pi
   std::vector<float> weights;  // [phase][taps]
   /// E: largest error of a wave |kappa| <= band, of its amplitude.
   double error = 0;
@@ -34,7 +34,7 @@ struct GoldFilter {
 /// The weights add to 1 but for `error`. A band that fewer taps would do is widened to what these do with
 /// 1e-8, before rounding: then `error` is that of the rounding, some 3e-8, and fewer taps have a smaller
 /// norm. `rate` 1 is a copy: error and sup 0. Throws InputError unless rate is 1, 2, 4, 8, 16 or 32, 0 < band
-/// <= pi / 2, and taps is even, 2 .. 32 (a single tap could not be mirrored; two are about linear
+/// <= 3/4 pi, and taps is even, 2 .. 32 (a single tap could not be mirrored; two are about linear
 /// interpolation). Cost: some 2 ms a phase with 16 taps, of half the phases.
 GoldFilter design_gold_filter(int rate, double band, int taps = 16);
 

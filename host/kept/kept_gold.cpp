@@ -57,13 +57,64 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
   const ParallelGeometry& g = scan.geometry;
   const double across = std::max(grid.spacing[0], grid.spacing[1]);
   rates_ = {rate_of(across, g.pitch_u), rate_of(across, g.pitch_u), rate_of(grid.spacing[2], g.pitch_v)};
-  for (std::size_t a = 0; a < 3; ++a) spacing_[a] = grid.spacing[a] / static_cast<double>(rates_[a]);
+  set_spacing();
+  if (!scan.views.empty()) {
+    keep_heights(reach);
+    return;
+  }
   // Filters read across the edge of what is kept, and nowhere may a column be clamped.
   const double margin =
       reach + (static_cast<double>(taps_after) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
   reach_ = margin - g.pitch_u;
   columns_ = upsampled_columns(g.columns, upsampling, margin / g.pitch_u);
   stride_ = column_stride(g.rows);
+}
+
+void KeptGold::set_spacing() {
+  for (std::size_t a = 0; a < 3; ++a) spacing_[a] = grid_.spacing[a] / static_cast<double>(rates_[a]);
+}
+
+// Cone beam: where a view looks closest its frequencies are the highest, and half a pixel at the axis may be
+// too far. Heights are kept themselves: no two nodes see the same rows.
+void KeptGold::keep_heights(double reach) {
+  // Beyond it 16 taps err by more than some ten thousandths.
+  constexpr double highest = 0.66 * pi;
+  for (bool dense = false; !dense;) {
+    reach_ = reach + (static_cast<double>(taps_after) + 1) * std::hypot(spacing_[0], spacing_[1]);
+    cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, cone_lattice());
+    dense = true;
+    for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
+      const double band = a == 2 ? cone_->band(2) : std::max(cone_->band(0), cone_->band(1));
+      if (band <= highest) continue;
+      dense = false;
+      rates_[a] *= 2;
+      if (a == 0) rates_[1] *= 2;
+    }
+    set_spacing();
+  }
+  const ConeLattice& lattice = cone_->lattice();
+  run_.emplace();
+  run_->low = lattice.low;
+  run_->count = 8 * lattice.groups;
+  run_->stride = lattice.stride;
+  run_->a_page = std::max<std::size_t>(1, page_bytes / (4 * count(side * side * run_->stride)));
+}
+
+// Heights that cells at the covered region read, and no others: samples are fitted, and gold is filtered,
+// from some way around.
+ConeLattice KeptGold::cone_lattice() const {
+  constexpr double cells_around = 4, nodes_around = 2 * static_cast<double>(taps_after);
+  const double around = cells_around * grid_.spacing[2] + nodes_around * spacing_[2];
+  const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
+  const auto margin = static_cast<double>(2 * run_margin);
+  const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
+               high = std::clamp(node(coverage_.heights().second + around), low,
+                                 static_cast<double>(grid_.cells[2] * rates_[2]) + margin);
+  ConeLattice out{grid_.origin, spacing_, reach_, 0, 0, 0};
+  out.low = 8 * floor_div(static_cast<std::int64_t>(std::floor(low)), 8);
+  out.groups = floor_div(static_cast<std::int64_t>(std::ceil(high)) - out.low, 8) + 1;
+  out.stride = column_stride(8 * out.groups + 16);
+  return out;
 }
 
 GoldLattice KeptGold::lattice(const Grid& grid, int rate) const {
@@ -90,16 +141,49 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
   const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
-  return filters_.emplace(key, design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch)))
+  return filters_
+      .emplace(key, cone_ ? cone_->best_filter(phases, key.second)
+                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch)))
       .first->second;
 }
 
+namespace {
+
+// Second differences of what is not interpolated are those of nodes, each with an error of its own.
+double bend(const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; }
+// Three second differences of nodes that each err by themselves, an eighth of them.
+constexpr double curved_apart = 1.5;
+
+}  // namespace
+
+// Every kept node errs by itself.
+GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
+  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
+                   &z = filter_of(lattice.phases[2], 2);
+  const double S = cone_->sup(), nodes = x.norm * y.norm * z.norm,
+               curved =
+                   (bend(x) * y.norm * z.norm + x.norm * bend(y) * z.norm + x.norm * y.norm * bend(z)) / 8;
+  const ConeTiles::Errors kept = cone_->errors();
+  const double filters = cone_->filter_error(x, y, z);
+  // What the filters round: a product in runs along z, 17 roundings in either filter across z.
+  const double apart =
+      unit_roundoff * S *
+      (z.norm * (product_error(taps_before + taps_after + 9, AlongZ::run) + 2) * x.norm * y.norm +
+       (x.rate > 1 ? 17.0 : 0.0) * x.norm + (y.rate > 1 ? 17.0 : 0.0) * x.norm * y.norm);
+  GoldErrors out;
+  out.ramp = cone_->largest_weight() * filter_error_bound(upsampler_, scan_);
+  out.interpolation = nodes * kept.interpolation + filters;
+  out.curved_interpolation = curved * kept.interpolation + curved_apart * filters;
+  out.rounding = nodes * kept.rounding + apart;
+  out.curved_rounding = curved * kept.rounding + curved_apart * apart;
+  return out;
+}
+
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {
+  if (cone_) return cone_errors(lattice);
   const ParallelGeometry& g = scan_.geometry;
   const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
                    &z = filter_of(few_rows() ? 1 : lattice.phases[2], 2);
-  // Second differences of what is not interpolated are those of nodes, each with an error of its own.
-  const auto bend = [](const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; };
   const double S = sups_.value;
   // Along z, what the rows hold makes a band-limited function, whose second differences are at most (h pi /
   // pitch)^2 of its largest value (Bernstein).
@@ -107,8 +191,6 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   const double bend_z = g.rows > 1 ? std::min(4.0, std::pow(pi * hz / g.pitch_v, 2)) : 0.0;
   const double nodes = x.norm * y.norm;
   const double curved = (bend(x) * y.norm + x.norm * bend(y) + nodes * bend_z) / 8;
-  // Three second differences of nodes that each err by themselves, an eighth of them.
-  constexpr double curved_apart = 1.5;
 
   const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
   const double gain_v = cosine_gain(g.rows);
@@ -152,6 +234,11 @@ KeptGold::Span KeptGold::heights_span(const GoldLattice& lattice, const GoldBox&
   const std::int64_t low = floor_div(s.low, AlongZ::run) * AlongZ::run, last = s.low + s.count;
   s.count = (last - low + AlongZ::run - 1) / AlongZ::run * AlongZ::run;
   s.low = low;
+  if (cone_) {  // heights that are not kept are of nodes that nobody uses
+    const std::int64_t end = run_->low + run_->count;
+    s.low = std::clamp(low, run_->low, end - AlongZ::run);
+    s.count = std::clamp<std::int64_t>(low + s.count - s.low, AlongZ::run, end - s.low);
+  }
   return s;
 }
 
@@ -210,7 +297,27 @@ void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& b
     both.insert(all.begin(), all.end());
     tiles.assign(both.begin(), both.end());
   }
-  back_project_tiles(tiles, progress);
+  if (cone_) back_project_heights(tiles, progress);
+  else back_project_tiles(tiles, progress);
+}
+
+void KeptGold::back_project_heights(std::span<const TileAt> tiles, const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::uint64_t tile = count(side * side * run_->stride);
+  const std::size_t first_page = run_->pages.size();
+  std::vector<ConePage> pages;
+  for (std::size_t i = 0; i < tiles.size(); i += run_->a_page) {
+    const std::size_t n = std::min(run_->a_page, tiles.size() - i);
+    run_->pages.emplace_back(state_, scratch(), n * tile, "gold that is kept");
+    if (!scratch()) run_->pages.back().fill(0.0f);
+    const ColumnBlocks blocks = blocks_of(tiles.subspan(i, n));
+    pages.push_back({nullptr, blocks.first, wanted(blocks)});
+    for (std::size_t j = 0; j < n; ++j)
+      tiles_[tiles[i + j]] = run_->tiles[tiles[i + j]] = {run_->pages.size() - 1, j * tile};
+  }
+  for (std::size_t i = 0; i < pages.size(); ++i) pages[i].out = &run_->pages[first_page + i];
+  cone_->back_project(pages, progress);
+  tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // Rows in runs whose upsampled columns fit beside the tiles; every run serves all tiles.
@@ -292,7 +399,7 @@ std::vector<double> KeptGold::rows_of(double first, double step, std::int64_t he
 
 std::int64_t KeptGold::cells_together() const {
   const std::int64_t cells = grid_.cells[2];
-  if (few_rows()) return cells;
+  if (few_rows() || cone_) return cells;
   const auto heights = static_cast<std::int64_t>(heights_bytes_ / (4 * count(side * side)) /
                                                  std::max<std::size_t>(1, all_tiles().size()));
   if (heights >= cells * rates_[2] + 1 + 2 * run_margin) return cells;
@@ -300,7 +407,7 @@ std::int64_t KeptGold::cells_together() const {
 }
 
 void KeptGold::require_run(const Span& z) {
-  if (run_ && run_->low <= z.low && z.low + z.count <= run_->low + run_->count) return;
+  if (cone_ || (run_ && run_->low <= z.low && z.low + z.count <= run_->low + run_->count)) return;
   // Beyond the grid as far as halos and filters read.
   const std::int64_t all_low = -run_margin, all_high = grid_.cells[2] * rates_[2] + 1 + run_margin;
   Run run;
@@ -332,7 +439,7 @@ std::shared_ptr<Scratch> KeptGold::scratch() const {
 }
 
 std::uint64_t KeptGold::bytes() const {
-  return 4 * count(side * side * stride_) * tiles_.size() + run_bytes();
+  return (cone_ ? 0 : 4 * count(side * side * stride_) * tiles_.size()) + run_bytes();
 }
 
 std::uint64_t KeptGold::run_bytes() const {
@@ -384,11 +491,15 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
     for (std::int64_t n = 0; n < h.nodes; ++n) {
       const std::int64_t position = n + s.skipped, interval = position / h.phases,
                          phase = position % h.phases;
-      double* row = between.data() + n * s.count + before + interval * h.step;
-      if (phase == 0) row[taps_before] = 1;
+      double* row = between.data() + n * s.count;
+      const std::int64_t first = before + interval * h.step;
+      const auto put = [&](std::int64_t t, double weight) {
+        if (first + t >= 0 && first + t < s.count) row[first + t] = weight;
+      };
+      if (phase == 0) put(taps_before, 1);
       else
         for (std::int64_t t = 0; t < f.taps; ++t)
-          row[t] = static_cast<double>(f.weights[at(phase * f.taps + t)]);
+          put(t, static_cast<double>(f.weights[at(phase * f.taps + t)]));
     }
     weights = height_weights(between, h.nodes, s.count);
   }
@@ -433,7 +544,7 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
   };
   for (const GoldBox& box : boxes) {
     // Tiles that came later than the run were not foreseen by it: heights can be made again.
-    if (!few_rows() && !scratch() && run_bytes() > state_.memory.left() / 2) {
+    if (!few_rows() && !cone_ && !scratch() && run_bytes() > state_.memory.left() / 2) {
       resample();
       run_->tiles.clear();
       run_->pages.clear();

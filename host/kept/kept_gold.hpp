@@ -14,6 +14,7 @@
 #include "host/bounds/projection_bounds.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
+#include "host/kept/cone_tiles.hpp"
 #include "host/kept/gold_filters.hpp"
 #include "host/kept/interpolate_gold.hpp"
 #include "vdvr/grid.hpp"
@@ -53,6 +54,8 @@ class KeptGold {
 
   /// Kept nodes to a cell of the grid, by axis: powers of two, so that their spacing is at most half a pixel.
   [[nodiscard]] const Index3& rates() const { return rates_; }
+  /// At least |F| wherever nodes are kept.
+  [[nodiscard]] double sup() const { return cone_ ? cone_->sup() : sups_.value; }
   /// In u.
   [[nodiscard]] Interpolation interpolation() const { return interpolation_; }
   /// Of gold at `rate` of a grid with the same origin whose cells are powers of two of this one's. Throws
@@ -129,7 +132,12 @@ class KeptGold {
                      std::int64_t stride);
   [[nodiscard]] std::vector<double> rows_of(double first, double step, std::int64_t heights) const;
   [[nodiscard]] std::uint64_t run_bytes() const;
-  [[nodiscard]] bool few_rows() const { return scan_.geometry.rows <= most_few_rows; }
+  [[nodiscard]] bool few_rows() const { return !cone_ && scan_.geometry.rows <= most_few_rows; }
+  void set_spacing();
+  void keep_heights(double reach);
+  [[nodiscard]] ConeLattice cone_lattice() const;
+  GoldErrors cone_errors(const GoldLattice& lattice);
+  void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
   /// Where the scan lies there and the device computes in the host's memory; else none.
   [[nodiscard]] std::shared_ptr<Scratch> scratch() const;
@@ -160,7 +168,8 @@ class KeptGold {
     std::size_t a_page = 1;
     std::map<TileAt, Place> tiles;
   };
-  std::optional<Run> run_;
+  std::optional<Run> run_;  // of cone beam the kept nodes themselves, never made again
+  std::optional<ConeTiles> cone_;
   // How the last box's heights come of these, or of all rows where they are few: blocks of a slab share that.
   struct Heights {
     std::int64_t first = 0, nodes = 0, padded = 0;

@@ -9,8 +9,8 @@
 namespace vdvr {
 namespace {
 
-// Bands for which constants are known, evenly spaced; and moments t^0 .. t^6. Beyond these, magnitudes.
-constexpr std::size_t bands = 24, moments = 7;
+// Bands for which constants are known, evenly spaced; and moments t^0 .. t^16. Beyond these, magnitudes.
+constexpr std::size_t bands = 24, moments = 17;
 // Sums of fewer than a thousand products of numbers >= 0, in double precision.
 constexpr double rounding = 1 + 0x1p-40;
 

@@ -29,8 +29,8 @@ typedef struct {
 #define FIRST_OF(a, b, c) a
 #define SECOND_OF(a, b, c) b
 #define THIRD_OF(a, b, c) c
-#define APPLY(pick, list) pick(list)
-#define COEFFICIENTS(pick, A, B, C, sign)                                                  \
+#define APPLY(pick, ...) pick(__VA_ARGS__)
+#define COEFFICIENTS(pick, A, B, C, sign)                                                           \
   LANES(APPLY(pick, A), APPLY(pick, B), APPLY(pick, C), sign(APPLY(pick, C)), sign(APPLY(pick, B)), \
         sign(APPLY(pick, A)))
 #define SAME(x) (x)
@@ -50,32 +50,32 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
   return two.x + two.y;
 }
 
-#define COLUMN(j) vload8(0, from + (size_t)(j) * column_stride)
+#define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
 // What a view adds at one height: six columns of eight rows, by weights along u, then along v.
-#define ADD(n, at_u, weight, at_v, share_v)                                                             \
-  {                                                                                                     \
-    __global const float* from =                                                                        \
-        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row);     \
-    sum##n += taps(share_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) + weight.s2 * COLUMN(2) +  \
-                               weight.s3 * COLUMN(3) + weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5));  \
+#define ADD(n, at_u, weight, at_v, share_v)                                                            \
+  {                                                                                                    \
+    __global const float* from =                                                                       \
+        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row);    \
+    sum##n += taps(share_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) + weight.s2 * COLUMN(2) + \
+                               weight.s3 * COLUMN(3) + weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5)); \
   }
 
 #define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
 #define UPRIGHT_PART(n) ADD(n, column, weight_u, row.s##n, g_v.s##n)
-#define TILTED_PART(n)                                                                                   \
-  {                                                                                                      \
-    const float8 weight_u = (float)(inverse.s##n * inverse.s##n) * taps(g_u.s##n);                       \
-    ADD(n, column.s##n, weight_u, row.s##n, g_v.s##n)                                                    \
+#define TILTED_PART(n)                                                             \
+  {                                                                                \
+    const float8 weight_u = (float)(inverse.s##n * inverse.s##n) * taps(g_u.s##n); \
+    ADD(n, column.s##n, weight_u, row.s##n, g_v.s##n)                              \
   }
 #define PUT(n) to[n] += sum_of(sum##n);
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const View* views,
-                         __global const int2* wanted, VdvrConeNodes s) {
+                         __global const int2* wanted, ulong first, VdvrConeNodes s) {
   const int group = (int)get_global_id(0), y = (int)get_global_id(1), tile = (int)get_global_id(2);
   if (group >= s.groups || tile >= s.tiles) return;
   const int2 range = wanted[tile * VDVR_CONE_TILE + y];
-  const int column_stride = s.column_stride, views_all = s.views, height = (s.first_group + group) * VDVR_CONE_HEIGHTS,
+  const int column_stride = s.column_stride, views_all = s.views, height = group * VDVR_CONE_HEIGHTS,
             block_z = group / s.block_groups, block_y = y / s.block_side;
   const float half_side = 0.5f * (float)(s.block_side - 1),
               half_height = 0.5f * (float)(s.block_groups * VDVR_CONE_HEIGHTS - 1);
@@ -86,13 +86,15 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
     const int block_x = x / s.block_side;
     const REAL dx = (REAL)((float)(x - block_x * s.block_side) - half_side);
     __global const View* v =
-        views + ((size_t)tile * s.blocks + (size_t)(block_z * s.blocks_across + block_y) * s.blocks_across + block_x) *
+        views + ((size_t)tile * s.blocks + (size_t)(block_z * s.blocks_across + block_y) * s.blocks_across +
+                 block_x) *
                     views_all;
     __global const float* plane = table;
     FOR_HEIGHTS(CLEAR)
     for (int k = 0; k < views_all; ++k, ++v, plane += s.plane) {
       const REAL l_plane = v->step_lambda[0] * dx + v->step_lambda[1] * dy + v->lambda,
-                 u_plane = v->step_u[0] * dx + v->step_u[1] * dy, v_plane = v->step_v[0] * dx + v->step_v[1] * dy;
+                 u_plane = v->step_u[0] * dx + v->step_u[1] * dy,
+                 v_plane = v->step_v[0] * dx + v->step_v[1] * dy;
 #if VDVR_UPRIGHT
       const REAL inverse = (REAL)1 / l_plane, u = u_plane * inverse + v->part_u, whole_u = floor(u);
       const int column = (int)v->whole_u + (int)whole_u - 2;
@@ -114,16 +116,8 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
       FOR_HEIGHTS(TILTED_PART)
 #endif
     }
-    __global float* to = out + (size_t)tile * s.tile + ((size_t)y * VDVR_CONE_TILE + x) * s.stride + height;
+    __global float* to =
+        out + first + (size_t)tile * s.tile + ((size_t)y * VDVR_CONE_TILE + x) * s.stride + height;
     FOR_HEIGHTS(PUT)
   }
-}
-
-// float table[view][column][stride] of chunks of columns, float in[column / 16][view][row][16].
-__kernel void join_columns(__global float* table, __global const float* in, int views, int columns, int rows,
-                           int stride) {
-  const int row = (int)get_global_id(0), column = (int)get_global_id(1), k = (int)get_global_id(2);
-  if (row >= stride || column >= columns || k >= views) return;
-  table[((size_t)k * columns + column) * stride + row] =
-      row < rows ? in[(((size_t)(column / 16) * views + k) * rows + row) * 16 + column % 16] : 0.0f;
 }

@@ -32,7 +32,8 @@ __kernel void fourth_differences(__global float* out, __global const float* gold
       const size_t column = (size_t)(y + 2) * s.nx + x + 2;
       if (margin[column] < s.lowest) continue;
       for (int z = 0; z <= s.side_z; z += 8) {
-        const int8 inside = z + (int8)(0, 1, 2, 3, 4, 5, 6, 7) <= s.side_z;
+        const int8 lane = z + (int8)(0, 1, 2, 3, 4, 5, 6, 7), height = lane + bz * s.side_z;
+        const int8 inside = lane <= s.side_z && height >= s.first_z && height <= s.last_z;
         __global const float* c = gold + column * s.stride + bz * s.side_z + z + 2;
         const float8 v = AT(c);
         TAKE(xx, FOURTH(AT(c - 2 * to_x), AT(c - to_x), v, AT(c + to_x), AT(c + 2 * to_x)))

@@ -15,14 +15,14 @@ typedef std::uint64_t VdvrOffset;
 #endif
 
 typedef struct {
-  VdvrOffset plane;         // floats from one view of the table to the next
-  VdvrOffset tile;          // floats from one tile of nodes to the next
-  int views;                // of the table
-  int column_stride;        // floats from one column of the table to the next
-  int last_column;          // that six taps may begin at
-  int last_row;             // that eight values may be read from
-  int stride;               // floats from one column of nodes to the next
-  int first_group, groups;  // of heights
+  VdvrOffset plane;   // floats from one view of the table to the next
+  VdvrOffset tile;    // floats from one tile of nodes to the next
+  int views;          // of the table
+  int column_stride;  // floats from one column of the table to the next
+  int last_column;    // that six taps may begin at
+  int last_row;       // that eight values may be read from
+  int stride;         // floats from one column of nodes to the next
+  int groups;         // of heights
   int tiles;
   int block_side, block_groups;  // nodes across, and groups, that share a view's numbers
   int blocks_across, blocks;     // along x, or y; of a tile

@@ -8,6 +8,7 @@ typedef struct {
   int side_x, side_y, side_z;  // kept nodes from brick to brick
   int nx;                      // nodes of a row, two around the bricks included
   int stride;                  // floats from column to column
+  int first_z, last_z;         // heights that count, from the first brick on
   float lowest;                // columns of a smaller coverage margin do not count
 } VdvrFourthDifferences;
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "host/fdk/filter_cone.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/gold/gold_stream.hpp"
 #include "tests/support/device.hpp"
@@ -44,9 +45,9 @@ struct Chain {
   explicit Chain(const ProjectionSet& given)
       : scan(given),
         exact(scan, {}),
-        filtered(filter_projections(device().state(), scan, {})),
+        filtered(filter_scan(device().state(), scan, {})),
         upsampler(device().state(), filtered) {
-    sups = field_sups(device().state(), upsampler, filtered);
+    sups = (scan.cone ? cone_sups : field_sups)(device().state(), upsampler, filtered, 1);
   }
   const ProjectionSet& scan;
   ExactField exact;

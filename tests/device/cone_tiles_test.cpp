@@ -1,0 +1,149 @@
+// Gold of cone beam from kept nodes against F in double precision: orbits, cone angles, lattices, and nodes
+// around the covered region.
+#define BOOST_TEST_MODULE cone_tiles
+#include "host/kept/cone_tiles.hpp"
+
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "host/fbp/back_project.hpp"
+#include "host/kept/kept_gold.hpp"
+#include "host/system/casts.hpp"
+#include "tests/support/attack_chain.hpp"
+#include "tests/support/cone_scans.hpp"
+
+namespace vdvr {
+namespace {
+
+using attacks::Chain;
+using attacks::device;
+using testing::ConeShape;
+using testing::noisy_cone;
+
+struct Case {
+  std::string name;
+  ConeShape shape;
+  double spacing = 1;
+};
+
+ConeShape orbit(double source, std::int64_t rows = 20, std::int64_t columns = 24) {
+  ConeShape s;
+  s.source_to_axis = source;
+  s.rows = rows;
+  s.columns = columns;
+  return s;
+}
+
+std::vector<Case> cases() {
+  ConeShape tilted = orbit(70), displaced = orbit(90), arc = orbit(80);
+  tilted.in_plane_deg = 1;
+  tilted.out_of_plane_deg = 3;
+  displaced.shift = 4;
+  arc.arc_deg = 230;
+  return {{"5 degrees", orbit(137)},
+          {"15 degrees", orbit(45)},
+          {"30 degrees", orbit(42, 20, 48)},
+          {"few rows", orbit(60, 5)},
+          {"fan beam", orbit(60, 1)},
+          {"tilted", tilted},
+          {"displaced", displaced},
+          {"an arc", arc},
+          {"cells of .6 pixels", orbit(60), 0.6},
+          {"cells of two pixels", orbit(60), 2}};
+}
+
+// The covered cylinder and a little more.
+Grid grid_of(const Chain& chain, double spacing) {
+  const Coverage coverage(chain.filtered.geometry, chain.filtered.views);
+  const double r = coverage.inner_radius();
+  const auto [low, high] = coverage.heights();
+  Grid grid;
+  grid.spacing = {spacing, spacing, spacing};
+  const auto cells = [&](double length) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing)));
+  };
+  grid.cells = {cells(2 * r), cells(2 * r), cells(high - low)};
+  grid.origin = {-r + 0.01, -r - 0.02, low};
+  return grid;
+}
+
+struct Compared {
+  std::int64_t nodes = 0, beyond = 0;
+  double worst = 0;  // error over bound
+};
+
+// Nodes by chance that may be asked for.
+Compared compare(const Chain& chain, KeptGold& kept, const Grid& grid, int rate, double reach) {
+  const GoldLattice lattice = kept.lattice(grid, rate);
+  const GoldErrors e = kept.errors(lattice);
+  GoldBox box;
+  constexpr std::int64_t around = 2;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.first[a] = -around;
+    box.nodes[a] = grid.cells[a] * rate + 1 + 2 * around;
+  }
+  kept.prepare(lattice, {box}, {});
+  const std::int64_t stride = column_stride(box.nodes[2]);
+  const opencl::DeviceArray<float> out(device().state(), count(box.nodes[0] * box.nodes[1] * stride), "gold");
+  kept.fill(lattice, box, out, 0, stride);
+  const std::vector<float> gold = out.to_host();
+  const Coverage coverage(chain.filtered.geometry, chain.filtered.views);
+  std::mt19937 random(5);
+  std::vector<Vec3> points;
+  std::vector<double> found;
+  Compared r;
+  for (int tries = 0; tries < 4000 && points.size() < 400; ++tries) {
+    Index3 node{};
+    Vec3 p{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      node[a] = static_cast<std::int64_t>(random() % count(box.nodes[a]));
+      p[a] = grid.origin[a] + static_cast<double>(node[a] + box.first[a]) / rate * grid.spacing[a];
+    }
+    const double margin = coverage.margin(p[0], p[1]);
+    if (margin < -reach) continue;
+    points.push_back(p);
+    found.push_back(static_cast<double>(gold[at((node[1] * box.nodes[0] + node[0]) * stride + node[2])]));
+    r.beyond += margin < 0 || coverage.margin_z(p[2]) < 0;
+  }
+  r.nodes = static_cast<std::int64_t>(points.size());
+  const double bound = e.interpolation + e.rounding + e.ramp;
+  const auto F = chain.exact.at(points);
+  for (std::size_t i = 0; i < F.size(); ++i) {
+    const double ratio = std::abs(found[i] - F[i]) / (bound + chain.exact.rounding());
+    if (!(ratio <= r.worst)) r.worst = std::isnan(ratio) ? double{INFINITY} : ratio;
+  }
+  BOOST_TEST_MESSAGE("  " << rate << "x of kept " << kept.rates()[0] << ", " << kept.rates()[2] << ": P "
+                          << e.interpolation / kept.sup() << " S, rounding " << e.rounding / kept.sup()
+                          << " S, ramp " << e.ramp / kept.sup() << " S, curved "
+                          << (e.curved_interpolation + e.curved_rounding) / kept.sup() << " S; " << r.nodes
+                          << " nodes, " << r.beyond << " beyond, error / bound " << r.worst);
+  return r;
+}
+
+BOOST_AUTO_TEST_CASE(gold_of_cone_beam_is_within_its_errors_of_the_field) {
+  std::int64_t beyond = 0;
+  double closest = 0;
+  for (const Case& c : cases()) {
+    const ProjectionSet scan = noisy_cone(c.shape);
+    const Chain chain(scan);
+    const Grid grid = grid_of(chain, c.spacing);
+    constexpr double reach = 1.5;
+    KeptGold kept(device().state(), chain.filtered, chain.sups, grid, reach, 8, Interpolation::six_taps);
+    BOOST_TEST_MESSAGE(c.name << ": S " << kept.sup() << ", at the axis' lengths " << chain.sups.value);
+    for (const int rate : {1, 2, 4, 8}) {
+      const Compared r = compare(chain, kept, grid, rate, reach);
+      BOOST_TEST(r.nodes > 100, c.name);
+      BOOST_TEST(r.worst <= 1, c.name << ", " << rate << "x: error / bound " << r.worst);
+      beyond += r.beyond;
+      closest = std::max(closest, r.worst);
+    }
+  }
+  BOOST_TEST(beyond > 500);
+  BOOST_TEST_MESSAGE("closest " << closest);
+}
+
+}  // namespace
+}  // namespace vdvr
