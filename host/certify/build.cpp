@@ -99,7 +99,7 @@ struct Measured {
   std::int64_t repaired = 0;  // bricks that closing raised
 };
 
-GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const Lattice& lattice) {
+GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const Lattice& lattice, bool cone) {
   const Comparison& comparison = plan.settings.comparison;
   GoldSettings settings{plan.grid,
                         plan.layout.granularity,
@@ -112,6 +112,7 @@ GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const 
   settings.grid_only = comparison.terms == Terms::grid;
   settings.coarsening = plan.layout.coarsening;
   settings.lattice = lattice;
+  if (cone) settings.least_reach = reach_of_all(settings);
   return settings;
 }
 
@@ -336,7 +337,8 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {measured.slack.gold, "curvature: signed second differences of gold, with remainder"};
   c.budget.projection = {measured.slack.projection,
-                         plan.rates.interpolation == Interpolation::six_taps
+                         scan.cone ? "sups of |q|: six taps in u and v, 16 taps from kept gold"
+                         : plan.rates.interpolation == Interpolation::six_taps
                              ? "sups of |q|: six taps in u, 16 taps from kept gold"
                              : "sups of |q_uu| and of |q|: interpolation in u, 16 taps from kept gold"};
   c.budget.arithmetic = {in.arithmetic, "rounding in fp32 from the ramp filter to back-projection"};
@@ -353,7 +355,7 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
   c.rates = plan.rates;
   c.bounds = plan.bounds;
   c.field = plan.field;
-  c.field.center = filtered.geometry.center;
+  c.field.center = plan.field.center.value_or(scan.geometry.center);
   c.padding = filtered.fft_length;
   c.window = options.window;
   c.roi = options.roi;
@@ -422,7 +424,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
                                                          progress);
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
-  GoldSettings settings = gold_settings(plan, options, {});
+  GoldSettings settings = gold_settings(plan, options, {}, scan.cone.has_value());
   const FieldSlopes slopes = field_slopes(as_mixed(plan.base));
   const std::string digest = options.journal ? plan_digest(scan, plan) : "";
   const std::vector<float> base = fitted_base(state, *from, plan, settings, selected, progress);
@@ -470,7 +472,6 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 
 BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                   const Progress& progress) {
-  require_parallel(scan, "build");
   check_line_integrals(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
   const Units units = units_of(scan);

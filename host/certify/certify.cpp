@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/fdk/filter_cone.hpp"
 #include "host/gold/gold_settings.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
@@ -55,12 +56,10 @@ constexpr const char* of_region_note =
     "the grid is that part of the default one whose bricks meet `roi`: the range is the range there";
 
 // Of the default grid, what the region of interest meets.
-Grid grid_of_region(const ParallelGeometry& geometry, const FieldOptions& field,
-                    const std::array<double, 6>& roi, const Grid& whole, int granularity) {
+Grid grid_of_region(const ProjectionSet& scan, const FieldOptions& field, const std::array<double, 6>& roi,
+                    const Grid& whole, int granularity) {
   const Grid grid = cropped_to(roi, whole, fitting_granularity(granularity, whole));
-  ParallelGeometry used = geometry;
-  used.center = center_of(field, geometry);
-  const Coverage coverage(used);
+  const Coverage coverage = certified_coverage(scan, field);
   const std::vector<std::uint8_t> inside = covered_in_plane(grid, coverage);
   if (std::find(inside.begin(), inside.end(), 1) == inside.end())
     throw InputError(fmt::format(
@@ -70,9 +69,17 @@ Grid grid_of_region(const ParallelGeometry& geometry, const FieldOptions& field,
   return grid;
 }
 
+// Of cone beam the certified cylinder, which is less than what views see.
+Grid certified_grid(const ProjectionSet& scan, const FieldOptions& field, const GridOptions& options) {
+  if (!scan.cone) return make_grid(scan.geometry, options);
+  const Coverage coverage = certified_coverage(scan, field);
+  return grid_around(scan.geometry, coverage.inner_radius(), coverage.heights(), options);
+}
+
 // What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
 // covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, const ParallelGeometry& geometry) {
+std::string options_json(const Plan& plan, const BuildOptions& build, const ProjectionSet& scan) {
+  const ParallelGeometry& geometry = scan.geometry;
   const Comparison& comparison = plan.settings.comparison;
   const LevelTriple& c = plan.layout.coarsening;
   nlohmann::ordered_json j;
@@ -94,6 +101,12 @@ std::string options_json(const Plan& plan, const BuildOptions& build, const Para
                    {"center", center_of(plan.field, geometry)},
                    {"unit", geometry.unit},
                    {"theta_rad", geometry.theta_rad}};
+  if (!scan.cone) return j.dump();
+  nlohmann::ordered_json& cone = j["geometry"]["cone"];
+  cone["redundancy"] = vdvr::text_of(scan.cone->redundancy);
+  for (const ViewMatrix& matrix : scan.cone->views)
+    for (std::size_t row = 0; row < 3; ++row)
+      for (const double m : matrix[row]) cone["matrices"].push_back(m);  // one after another
   return j.dump();
 }
 
@@ -122,14 +135,13 @@ void refuse_empty_promise(const Certificate& c) {
 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                const CertifyOptions& options, const Progress& progress) {
-  require_parallel(scan, "plan");
   check_options(options);
   FieldOptions field = options.field;
   field.center = center_of(field, scan.geometry);
-  Grid grid = make_grid(scan.geometry, options.grid);
+  Grid grid = certified_grid(scan, field, options.grid);
   const bool cropped = options.build.roi && !options.grid.size;
   if (cropped)
-    grid = grid_of_region(scan.geometry, field, *options.build.roi, grid, options.plan.granularity);
+    grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
   Plan plan = make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
   if (cropped) plan.notes.emplace_back(of_region_note);
   return plan;
@@ -145,7 +157,7 @@ BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& 
 BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan, const CertifyOptions& options,
                     const Progress& progress) {
   check_options(options);
-  std::string noted = options_json(plan, options.build, scan.geometry);
+  std::string noted = options_json(plan, options.build, scan);
   BuildResult result = build_or_give_up(device, scan, std::move(plan), options.build, progress);
   Certificate& c = result.certificate;
   refuse_empty_promise(c);
@@ -154,12 +166,13 @@ BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan, const 
   return result;
 }
 
-std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate) {
+std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
   const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
   if (!options.is_object() || !options.contains("geometry")) return std::nullopt;
   try {
     const auto& g = options.at("geometry");
-    ParallelGeometry geometry;
+    ProjectionSet scan;
+    ParallelGeometry& geometry = scan.geometry;
     geometry.columns = g.at("columns").get<std::int64_t>();
     geometry.rows = g.at("rows").get<std::int64_t>();
     geometry.pitch_u = g.at("pitch_u").get<double>();
@@ -167,7 +180,18 @@ std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate) {
     geometry.center = g.at("center").get<double>();
     geometry.unit = g.at("unit").get<std::string>();
     geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
-    return geometry;
+    if (g.contains("cone")) {
+      const auto& cone = g.at("cone");
+      const auto redundancy = redundancy_of(cone.at("redundancy").get<std::string>());
+      if (!redundancy) throw FileError("certificate, options.geometry.cone: an unknown redundancy");
+      const auto numbers = cone.at("matrices").get<std::vector<double>>();
+      if (numbers.size() != 12 * geometry.theta_rad.size())
+        throw FileError("certificate, options.geometry.cone: 12 numbers are needed for each view");
+      scan.cone = ConeGeometry{std::vector<ViewMatrix>(geometry.theta_rad.size()), *redundancy};
+      for (std::size_t i = 0; i < numbers.size(); ++i)
+        scan.cone->views[i / 12][i % 12 / 4][i % 4] = numbers[i];
+    }
+    return scan;
   } catch (const nlohmann::json::exception& e) {
     throw FileError(fmt::format("certificate, options.geometry: {}", e.what()));
   }

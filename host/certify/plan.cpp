@@ -17,6 +17,7 @@
 #include "host/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/foresee.hpp"
+#include "host/gold/base_of_gold.hpp"
 #include "host/gold/prepared_scan.hpp"
 #include "host/certify/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
@@ -42,7 +43,12 @@ constexpr double linear_share = 0.1, cubic_share = 0.03;
 
 // Cheapest first: gold costs eight times per doubling. Six taps need columns at 8x; where fewer are asked
 // for, four.
-std::vector<Rates> candidates(const RateOptions& wanted) {
+std::vector<Rates> candidates(const RateOptions& wanted, bool cone) {
+  if (cone && ((wanted.upsampling && *wanted.upsampling != 8) ||
+               (wanted.interpolation && *wanted.interpolation != Interpolation::six_taps)))
+    throw InputError(
+        "cone beam: gold is interpolated by six taps both ways on projections at 8x; `upsampling` can only be "
+        "8, and `u_filter` six-taps");
   const auto interpolation =
       wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;
   std::vector<Rates> all;
@@ -302,8 +308,10 @@ class Planner {
     scan_bytes_ = scan.data.resident_bytes();
     host_.count(scan_bytes_, "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
-    ParallelGeometry used = scan.geometry;
-    if (field.center) used.center = *field.center;
+    ProjectionSet used;
+    used.geometry = scan.geometry;
+    used.cone = scan.cone;
+    if (field.center && !scan.cone) used.geometry.center = *field.center;
     plan_.notes = check_scan(used);
     plan_.grid = grid;
     plan_.field = field;
@@ -317,15 +325,19 @@ class Planner {
   }
 
   Plan make(const RateOptions& wanted, const Tolerance& tolerance) {
-    const std::vector<Rates> all = candidates(wanted);
-    reconstruct_reference();
+    const std::vector<Rates> all = candidates(wanted, is_cone());
+    if (is_cone()) take_reference(all.front());
+    else reconstruct_reference();
+    look_at_reference();
     set_epsilon(plan_, tolerance,
                 plan_.settings.comparison.epsilon_of_max
                     ? largest_of_gold(state_, prepared_->filtered, prepared_->sups, plan_.grid, all.front())
                     : 0);
     report(progress_, "plan", 0.3);
-    plan_.bounds = global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base,
-                                 plan_.settings.foresee, estimates_views_);
+    // They are made of derivatives along the axes of parallel beam.
+    if (!is_cone())
+      plan_.bounds = global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base,
+                                   plan_.settings.foresee, estimates_views_);
     report(progress_, "plan", 0.6);
     const Chosen chosen = choose_rates(all);
     take(chosen);
@@ -374,6 +386,15 @@ class Planner {
                                                       plan_.grid, 4, Interpolation::cubic, {})
                                   : reconstruct_field(state_, prepared_->filtered, prepared_->upsampler,
                                                       plan_.grid, 8, Interpolation::six_taps, {});
+  }
+
+  // Of cone beam from gold, which is kept whole.
+  void take_reference(const Rates& r) {
+    plan_.base = base_of_gold(state_, source_at(r)->kept, *coverage_, plan_.grid, kept_margin(plan_.grid, 1),
+                              progress_);
+  }
+
+  void look_at_reference() {
     check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
@@ -385,6 +406,7 @@ class Planner {
     plan_.reference_range = range.high - range.low;
   }
 
+  [[nodiscard]] bool is_cone() const { return !prepared_->filtered.views.empty(); }
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
   [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
     GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
@@ -392,6 +414,7 @@ class Planner {
     s.grid_only = grid_only();
     s.anisotropic = plan_.layout.levels == Levels::anisotropic;
     s.coarsening = plan_.layout.coarsening;
+    if (is_cone()) s.least_reach = reach_of_all(s);
     return s;
   }
 
@@ -447,7 +470,7 @@ class Planner {
     plan_.gold_samples = 1;
     for (const std::int64_t cells : plan_.grid.cells)
       plan_.gold_samples *= static_cast<std::uint64_t>(cells * r.gold + 1);
-    if (!estimates_views_ && (r.upsampling != 8 || r.interpolation != Interpolation::six_taps))
+    if (!is_cone() && !estimates_views_ && (r.upsampling != 8 || r.interpolation != Interpolation::six_taps))
       plan_.base = reconstruct_field(state_, prepared_->filtered, prepared_->upsampler, plan_.grid,
                                      r.upsampling, r.interpolation, {});
   }
@@ -559,8 +582,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
 Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, const FieldOptions& field,
                const RateOptions& rates, const Tolerance& tolerance, const PlanSettings& settings,
                const Progress& progress) {
-  require_parallel(scan, "plan");
-  if (settings.estimate)
+  if (settings.estimate && !scan.cone)
     if (const auto window = row_window(scan, grid, most_samples_planned))
       return of_all_rows(
           make_plan(device, window->scan, window->grid, field, rates, tolerance, settings, progress), *window,

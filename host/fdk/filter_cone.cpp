@@ -6,6 +6,7 @@
 
 #include "host/fdk/fdk_weights.hpp"
 #include "host/fbp/ramp_kernel.hpp"
+#include "host/opencl/fft.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/huge_pages.hpp"
@@ -90,6 +91,7 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
   out.geometry.pitch_u = std::ldexp(out.geometry.pitch_u, -units.across);
   out.geometry.pitch_v = std::ldexp(out.geometry.pitch_v, -units.along);
   out.limited_angle = weights.limited_angle();
+  out.fft_length = fft::good_length(2 * out.geometry.columns - 1);
   std::vector<double> of_view;
   std::vector<bool> flipped;
   for (std::size_t k = 0; k < cone.views.size(); ++k) {

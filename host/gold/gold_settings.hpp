@@ -42,6 +42,7 @@ struct GoldSettings {
   /// Of heights that blocks of kept gold share (kept_gold.hpp).
   std::uint64_t heights_bytes = std::uint64_t{1} << 30;
 
+  double least_reach = 0;  ///< of kept gold: what later settings will ask for
   /// How far outside the covered region samples are kept: as far as a base cell that meets it reaches.
   [[nodiscard]] double kept() const {
     return 0.5 * (kept_margin(grid, 1) + kept_margin(coarsened(grid, coarsening), 1));

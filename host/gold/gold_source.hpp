@@ -20,5 +20,7 @@ struct GoldSource {
 /// How far beyond the covered region nodes of gold are wanted, in world units: those that may be stored, and
 /// those around the cells that are tested.
 double gold_reach(const GoldSettings& settings);
+/// The same of every coarsening that these settings may be given: of cone beam all gold is made at once.
+double reach_of_all(GoldSettings settings);
 
 }  // namespace vdvr

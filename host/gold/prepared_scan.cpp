@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "host/fdk/filter_cone.hpp"
+
 namespace vdvr {
 namespace {
 
@@ -17,6 +19,12 @@ std::uint64_t checksum(const ProjectionSet& scan) {
   for (const double v : {g.pitch_u, g.pitch_v, g.center}) add(std::bit_cast<std::uint64_t>(v));
   add(static_cast<std::uint64_t>(g.rows));
   add(static_cast<std::uint64_t>(g.columns));
+  if (scan.cone) {
+    for (const ViewMatrix& matrix : scan.cone->views)
+      for (const auto& row : matrix)
+        for (const double m : row) add(std::bit_cast<std::uint64_t>(m));
+    add(static_cast<std::uint64_t>(scan.cone->redundancy));
+  }
   return sum;
 }
 
@@ -26,8 +34,13 @@ bool is_same_grid(const Grid& a, const Grid& b) {
 
 FieldSups sups_of(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
                   PreparedScan::Sups wanted) {
-  if (wanted == PreparedScan::Sups::of_values) return value_sups(state, upsampler, scan);
   const std::int64_t views = scan.geometry.views();
+  if (!scan.views.empty())
+    return cone_sups(state, upsampler, scan,
+                     wanted == PreparedScan::Sups::estimated
+                         ? std::max<std::int64_t>(1, views / PreparedScan::estimate_views)
+                         : 1);
+  if (wanted == PreparedScan::Sups::of_values) return value_sups(state, upsampler, scan);
   const bool all = wanted == PreparedScan::Sups::of_derivatives;
   return field_sups(state, upsampler, scan,
                     all ? 1 : std::max<std::int64_t>(1, views / PreparedScan::estimate_views));
@@ -39,8 +52,7 @@ PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, con
                            const Units& units, Sups wanted, const Progress& progress)
     : shared(device.shared_from_this()),
       state(device),
-      filtered(
-          filter_projections(device, scan, field, progress, FilterMethod::automatic, Precision::fp64, units)),
+      filtered(filter_scan(device, scan, field, progress, Precision::fp64, units)),
       upsampler(device, filtered, ColumnMethod::accurate),
       sups(sups_of(device, upsampler, filtered, wanted)),
       host_(device),

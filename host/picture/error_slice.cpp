@@ -1,3 +1,4 @@
+#include "vdvr/certified_region.hpp"
 #include "vdvr/error_slice.hpp"
 
 #include <fmt/format.h>
@@ -121,8 +122,8 @@ ErrorSlice empty_slice(const ErrorSliceOptions& o) {
 
 /// Compares every pixel and colours it.
 void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, const Volume& f,
-             const ParallelGeometry& geometry, const MixedVolume& volume, const Certificate& c) {
-  const double center = c.field.center.value_or(geometry.center);
+             const ProjectionSet& scan, const MixedVolume& volume, const Certificate& c) {
+  const CertifiedRegion region(scan, c.field);
   const Index3 samples = pixels.grid.samples();
   const std::int64_t left = (result.image.width - pixels.width) / 2;
   const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
@@ -135,7 +136,7 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
       const Vec3 point = pixels.grid.position(at);
       const double truth = static_cast<double>(
           f.samples[static_cast<std::size_t>((at[2] * samples[1] + at[1]) * samples[0] + at[0])]);
-      const bool compared = is_covered(geometry, center, point) && is_inside(c.roi, point) &&
+      const bool compared = region.contains(point) && is_inside(c.roi, point) &&
                             (!c.window || (truth >= c.window->first && truth <= c.window->second));
       if (!compared) {
         put(result.image, left + x, top + y, kNotCompared);
@@ -160,10 +161,11 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress) {
   const PixelGrid pixels = pixel_grid(volume.grid, options);
-  const ReconstructOptions exact{certificate.field, 16, Interpolation::cubic};
+  const ReconstructOptions exact{certificate.field, 16,
+                                 scan.cone ? Interpolation::linear : Interpolation::cubic};
   const Volume f = reconstruct(device, scan, pixels.grid, exact, progress);
   ErrorSlice result = empty_slice(options);
-  compare(result, pixels, axes_of(options.axis), f, scan.geometry, volume, certificate);
+  compare(result, pixels, axes_of(options.axis), f, scan, volume, certificate);
   draw_caption(result.image, certificate.epsilon_abs,
                fmt::format("largest |V - F| = {} = {:.1f} % of epsilon, at {} = {}", number(result.max_error),
                            100 * result.max_error / certificate.epsilon_abs, "xyz"[options.axis],

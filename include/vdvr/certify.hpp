@@ -46,10 +46,10 @@ VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const To
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan,
                              const CertifyOptions& options = {}, const Progress& progress = {});
 
-/// The scan's geometry as certify() noted it in the certificate, with which is_covered tells the points that
-/// the certificate speaks of; none where another program wrote the file without. Throws FileError where it is
-/// ill-formed.
-VDVR_API std::optional<ParallelGeometry> noted_geometry(const Certificate& certificate);
+/// The scan without its projections, as certify() noted it in the certificate, with which CertifiedRegion
+/// tells the points that the certificate speaks of; none where another program wrote the file without. Throws
+/// FileError where it is ill-formed.
+VDVR_API std::optional<ProjectionSet> noted_geometry(const Certificate& certificate);
 
 /// The centre that defines F: the field's, else the scan's.
 inline double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {

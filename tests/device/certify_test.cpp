@@ -53,8 +53,9 @@ BOOST_AUTO_TEST_CASE(a_certificate_is_complete) {
   BOOST_TEST(c.holds_buffer);
   BOOST_TEST(c.content_sha256 == content_sha256(certified().volume));
   BOOST_TEST(contradiction(c) == "");
-  const auto geometry = noted_geometry(c);
-  BOOST_REQUIRE(geometry.has_value());
+  const auto noted = noted_geometry(c);
+  BOOST_REQUIRE(noted.has_value());
+  const ParallelGeometry* geometry = &noted->geometry;
   const ParallelGeometry& wanted = scan().geometry;
   BOOST_TEST(geometry->columns == wanted.columns);
   BOOST_TEST(geometry->rows == wanted.rows);

@@ -10,6 +10,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
@@ -103,19 +104,18 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
   const VdvrFile file = open_certified(path, args);
   const MixedVolume& volume = file.volume;
   const Certificate& c = file.certificate;
-  std::optional<ParallelGeometry> geometry = noted_geometry(c);
-  if (args.has("projections"))
-    geometry = load_scan(args.path("projections"), args, c.field, progress).geometry;
-  if (!geometry)
+  std::optional<ProjectionSet> scan = noted_geometry(c);
+  if (args.has("projections")) scan = load_scan(args.path("projections"), args, c.field, progress);
+  if (!scan)
     throw InputError(
         fmt::format("{}: does not say which points are covered; give --projections", path.string()));
-  const double center = center_of(c.field, *geometry);
+  const CertifiedRegion region(*scan, c.field);
   const Index3 bricks = volume.bricks();
   std::vector<Probe> probes;
   probes.reserve(points.size());
   for (const Vec3& p : points) {
     Probe& probe = probes.emplace_back();
-    probe.covered = in_box(volume.grid, p) && is_covered(*geometry, center, p);
+    probe.covered = in_box(volume.grid, p) && region.contains(p);
     if (!probe.covered) continue;
     const Index3 b = brick_at(volume, p);
     probe.value = static_cast<double>(sample_at(volume, p));

@@ -1,0 +1,27 @@
+// The points that certificates speak of.
+#pragma once
+
+#include <memory>
+
+#include "vdvr/export.hpp"
+#include "vdvr/field_options.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+class Coverage;
+
+/// Of parallel beam all points whose projections fall on the detector in every view; of cone beam the largest
+/// upright cylinder among them (docs/geometry.md, "Cone beam").
+class VDVR_API CertifiedRegion {
+ public:
+  /// The scan's projections are not looked at. Throws InputError where the region is empty.
+  explicit CertifiedRegion(const ProjectionSet& scan, const FieldOptions& field = {});
+  [[nodiscard]] bool contains(const Vec3& point) const;
+  [[nodiscard]] double inner_radius() const;
+
+ private:
+  std::shared_ptr<const Coverage> coverage_;
+};
+
+}  // namespace vdvr
