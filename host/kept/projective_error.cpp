@@ -41,11 +41,9 @@ ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest)
   });
 }
 
-double ProjectiveError::constant(std::size_t moment, double band) const {
-  const double magnitude = norm_ * std::pow(reach_, static_cast<double>(moment));
+double ProjectiveError::constant(std::size_t moment, std::size_t band, double magnitude) const {
   if (moment >= moments) return magnitude;
-  const auto place = static_cast<std::size_t>(std::max(0.0, std::ceil(band / highest_ * bands - 1)));
-  const double known = constants_[moment][std::min(place, bands - 1)];
+  const double known = constants_[moment][band];
   return moment == 0 ? known : std::min(known, magnitude);
 }
 
@@ -56,19 +54,21 @@ double ProjectiveError::at(double band, double rho) const {
   // Terms fall at last like those of exp(band reach growth / (1 - growth)) (1 - growth)^-2, which all of
   // them, by magnitudes, add up to.
   const double exponent = band * reach_ * growth / (1 - growth);
-  const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth));
+  const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-60 * all;
+  const auto place = static_cast<std::size_t>(
+      std::clamp(std::ceil(band / highest_ * bands - 1), 0.0, static_cast<double>(bands - 1)));
   double sum = 0, magnitudes = 0;
-  constexpr int most = 24;
-  double of_m = 1;  // (|rho| band)^m / m!
-  for (int m = 0; m < most; ++m) {
-    double of_i = of_m;  // times C(m + 1 + i, i) |rho|^i
-    for (int i = 0; i < most; ++i) {
-      const auto moment = static_cast<std::size_t>(2 * m + i);
-      sum += of_i * constant(moment, band);
-      magnitudes += of_i * norm_ * std::pow(reach_, static_cast<double>(moment));
+  double of_m = 1, power_m = norm_;  // (|rho| band)^m / m!, and norm reach^2m
+  for (int m = 0; of_m * power_m > negligible; ++m) {
+    double of_i = of_m, power = power_m;  // times C(m + 1 + i, i) |rho|^i, and reach^i
+    for (int i = 0; of_i * power > negligible; ++i) {
+      sum += of_i * constant(static_cast<std::size_t>(2 * m + i), place, power);
+      magnitudes += of_i * power;
       of_i *= std::abs(rho) * (m + 2 + i) / (i + 1);
+      power *= reach_;
     }
     of_m *= std::abs(rho) * band / (m + 1);
+    power_m *= reach_ * reach_;
   }
   // What is left; the difference rounds by some u of `all`.
   return (sum + std::max(0.0, all - magnitudes) + all * 0x1p-44) * rounding;

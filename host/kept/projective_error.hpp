@@ -23,7 +23,8 @@ class ProjectiveError {
   [[nodiscard]] double at(double band, double rho) const;
 
  private:
-  [[nodiscard]] double constant(std::size_t moment, double band) const;
+  // `magnitude`: what it is at most whatever the band.
+  [[nodiscard]] double constant(std::size_t moment, std::size_t band, double magnitude) const;
 
   double highest_ = 0, reach_ = 0, norm_ = 0;
   std::vector<std::vector<double>> constants_;  // [moment][band]; none of a copy
