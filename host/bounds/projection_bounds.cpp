@@ -18,7 +18,7 @@
 #include "host/bounds/dense_values.hpp"
 #include "host/bounds/node_functional.hpp"
 #include "host/bounds/six_taps.hpp"
-#include "host/fdk/region_boxes.hpp"
+#include "host/fdk/region_parts.hpp"
 #include "host/opencl/column_tuning.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
@@ -319,8 +319,8 @@ namespace {
 double largest_sum(const FilteredScan& scan, const std::vector<double>& values) {
   const Coverage coverage(scan.geometry, scan.views);
   double largest = 0;
-  for (const RegionBox& box : region_boxes(coverage, 0, coverage.heights()))
-    largest = std::max(largest, sum_of_weights(scan.views, values, box.low, box.high, 2));
+  for (const Corners& part : RegionOutline(coverage, 0).parts(coverage.heights()))
+    largest = std::max(largest, sum_of_weights(scan.views, values, part, 2));
   return largest;
 }
 

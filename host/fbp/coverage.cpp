@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "host/fbp/view_weights.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 
@@ -149,6 +150,38 @@ double Coverage::margin_above(double x, double y, double floor) const {
     if (far < floor) return far;
   }
   return margin(x, y);
+}
+
+namespace {
+
+// What of a convex polygon lies where x * px + y * py + rest >= 0.
+std::vector<std::array<double, 2>> clipped(const std::vector<std::array<double, 2>>& polygon, double x,
+                                           double y, double rest) {
+  std::vector<std::array<double, 2>> out;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const auto &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+    const double at_p = x * p[0] + y * p[1] + rest, at_q = x * q[0] + y * q[1] + rest;
+    if (at_p >= 0) out.push_back(p);
+    if ((at_p < 0) == (at_q < 0)) continue;
+    const double part = at_p / (at_p - at_q);
+    out.push_back({p[0] + part * (q[0] - p[0]), p[1] + part * (q[1] - p[1])});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::array<double, 2>> Coverage::outline(double reach) const {
+  constexpr std::int64_t directions = 64;
+  // Where some direction has no end, at least farther out than any source.
+  const double far = 1e3 * (inner_ + reach);
+  std::vector<std::array<double, 2>> polygon{{far, far}, {-far, far}, {-far, -far}, {far, -far}};
+  for (std::int64_t d = 0; d < directions; ++d) {
+    const HalfPlane& p = planes_[nearest_[at(d * sectors / directions)]];
+    // Corners are rounded: 1e-9 of the radius lies far above that.
+    polygon = clipped(polygon, p.x, p.y, p.rest + reach + slack_ + 1e-9 * (inner_ + reach));
+  }
+  return polygon;
 }
 
 double Coverage::margin_z(double z) const {

@@ -28,7 +28,10 @@ class Coverage {
   /// The same where it is at least `floor`; where not, something below `floor`. Cost: far outside, that of
   /// one view, where margin() looks at all.
   [[nodiscard]] double margin_above(double x, double y, double floor) const;
-  /// The same along z.
+  /// Corners, one after another, of a convex polygon that holds every point of margin() >= -`reach`, and
+  /// little more.
+  [[nodiscard]] std::vector<std::array<double, 2>> outline(double reach) const;
+  /// The same as margin() along z.
   [[nodiscard]] double margin_z(double z) const;
   [[nodiscard]] double inner_radius() const { return inner_; }
   /// Along z, from .first to .second.

@@ -59,15 +59,26 @@ Square square_of(const ViewBox& box, std::size_t e) {
   return {{{l * l, 2 * b * l, b * b}, {2 * a * l, 2 * a * b, 0}, {a * a, 0, 0}}};
 }
 
-// lambda is affine: least at the corner that each axis chooses by itself.
-double least_lambda(const ViewMatrix& matrix, const Vec3& low, const Vec3& high) {
-  double sum = matrix[2][3], magnitude = std::abs(matrix[2][3]);
+// A row of the matrix times (x, y, z, 1), and the largest sum of magnitudes.
+double row_at(const ViewMatrix& matrix, std::size_t row, const Vec3& x, double& magnitude) {
+  double sum = matrix[row][3], terms = std::abs(matrix[row][3]);
   for (std::size_t e = 0; e < 3; ++e) {
-    const double at_low = matrix[2][e] * low[e], at_high = matrix[2][e] * high[e];
-    sum += std::min(at_low, at_high);
-    magnitude += std::max(std::abs(at_low), std::abs(at_high));
+    sum += matrix[row][e] * x[e];
+    terms += std::abs(matrix[row][e] * x[e]);
   }
-  return sum - row_rounding * magnitude;
+  magnitude = std::max(magnitude, terms);
+  return sum;
+}
+
+// lambda is affine: least at a corner. No number where a corner is none.
+double least_lambda(const ViewMatrix& matrix, std::span<const Vec3> corners) {
+  double least = HUGE_VAL, magnitude = 0;
+  for (const Vec3& x : corners) {
+    const double lambda = row_at(matrix, 2, x, magnitude);
+    if (!(lambda >= least)) least = lambda;
+    if (std::isnan(lambda)) return lambda;
+  }
+  return least - row_rounding * magnitude;
 }
 
 // The sum over i, j of square[i][j] table[p + i][r + j], for p + r <= left: multiplying polynomials by
@@ -83,33 +94,33 @@ void contract(const Square& square, const Table& table, Table& out) {
 
 }  // namespace
 
-// u and v are quotients of affine functions whose denominator, lambda, is positive on the box: on a segment
-// they rise all along, or fall. So their extremes over the box lie at corners, and the largest |X_e|,
+Corners box_corners(const Vec3& low, const Vec3& high) {
+  Corners corners;
+  for (std::size_t c = 0; c < 8; ++c)
+    corners.push_back({(c & 1) != 0 ? high[0] : low[0], (c & 2) != 0 ? high[1] : low[1],
+                       (c & 4) != 0 ? high[2] : low[2]});
+  return corners;
+}
+
+// u and v are quotients of affine functions whose denominator, lambda, is positive on the piece: on a segment
+// they rise all along, or fall. So their extremes over the piece lie at corners, and the largest |X_e|,
 // X_e being affine in u and v, where u and v are extreme.
-ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high) {
+ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners) {
   ViewBox box;
-  box.lambda_min = least_lambda(matrix, low, high);
+  box.lambda_min = least_lambda(matrix, corners);
   if (!(box.lambda_min > 0)) return box;
-  std::array<std::array<Vec3, 2>, 3> product{};  // [row][low, high][axis]
-  Vec3 magnitude{};                              // of the terms of each row
-  for (std::size_t i = 0; i < 3; ++i) {
-    magnitude[i] = std::abs(matrix[i][3]);
-    for (std::size_t e = 0; e < 3; ++e) {
-      product[i][0][e] = matrix[i][e] * low[e];
-      product[i][1][e] = matrix[i][e] * high[e];
-      magnitude[i] += std::max(std::abs(product[i][0][e]), std::abs(product[i][1][e]));
+  Vec3 magnitude{};  // of the terms of each row
+  std::array<double, 2> lowest{HUGE_VAL, HUGE_VAL}, highest_at{-HUGE_VAL, -HUGE_VAL};  // u and v
+  for (const Vec3& x : corners) {
+    const double lambda = row_at(matrix, 2, x, magnitude[2]);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double place = row_at(matrix, i, x, magnitude[i]) / lambda;
+      lowest[i] = std::min(lowest[i], place);
+      highest_at[i] = std::max(highest_at[i], place);
     }
   }
-  std::array<Vec3, 8> corner{};
-  for (std::size_t c = 0; c < 8; ++c)
-    for (std::size_t i = 0; i < 3; ++i)
-      corner[c][i] = product[i][c & 1][0] + product[i][c >> 1 & 1][1] + product[i][c >> 2][2] + matrix[i][3];
   for (std::size_t i = 0; i < 2; ++i) {
-    double least = HUGE_VAL, most = -HUGE_VAL;
-    for (const Vec3& at : corner) {
-      least = std::min(least, at[i] / at[2]);
-      most = std::max(most, at[i] / at[2]);
-    }
+    const double least = lowest[i], most = highest_at[i];
     const double largest = std::max(std::abs(least), std::abs(most));
     const double error = row_rounding * (magnitude[i] + largest * magnitude[2]) / box.lambda_min;
     for (std::size_t e = 0; e < 3; ++e) {
@@ -158,13 +169,13 @@ double SixthSups::along(int e, int f, int g) const {
   return at(orders);
 }
 
-SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups, const Vec3& low,
-                     const Vec3& high) {
+SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups,
+                     std::span<const Vec3> corners) {
   if (views.size() != sups.size()) throw std::logic_error("sixth_sups: one set of sups for each view");
   SixthSups out;
   constexpr std::array<std::size_t, 3> step{4, 1, 0};  // to a place with one more square along an axis
   for (std::size_t k = 0; k < views.size(); ++k) {
-    const ViewBox box = view_box(views[k], low, high);
+    const ViewBox box = view_box(views[k], corners);
     if (!(box.lambda_min > 0)) {
       out.sums_.fill(HUGE_VAL);
       return out;
@@ -189,12 +200,12 @@ SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const Detector
   return out;
 }
 
-double sum_of_weights(std::span<const ViewMatrix> views, std::span<const double> values, const Vec3& low,
-                      const Vec3& high, int power_of_lambda) {
+double sum_of_weights(std::span<const ViewMatrix> views, std::span<const double> values,
+                      std::span<const Vec3> corners, int power_of_lambda) {
   if (views.size() != values.size()) throw std::logic_error("sum_of_weights: one value for each view");
   double sum = 0;
   for (std::size_t k = 0; k < views.size(); ++k) {
-    const double lambda = least_lambda(views[k], low, high);
+    const double lambda = least_lambda(views[k], corners);
     if (!(lambda > 0)) return HUGE_VAL;
     sum += values[k] / power(lambda, power_of_lambda);
   }

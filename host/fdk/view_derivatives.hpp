@@ -10,6 +10,7 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "vdvr/cone_geometry.hpp"
 
@@ -23,17 +24,24 @@ struct DetectorSups {
   double second_v = 0;  ///< sup |q_vv|
 };
 
-/// What bounds of derivatives need of a view and an axis-aligned box, by axis e of the world. In pixels and
-/// the world's unit of length; rounded so that bounds hold.
+/// A convex piece of space, by its corners in any order.
+using Corners = std::vector<Vec3>;
+Corners box_corners(const Vec3& low, const Vec3& high);
+
+/// What bounds of derivatives need of a view and a convex piece of space, by axis e of the world. In pixels
+/// and the world's unit of length; rounded so that bounds hold.
 struct ViewBox {
-  double lambda_min = 0;      ///< <= 0, or not a number: the box reaches the source's plane
-  Vec3 along_u{}, along_v{};  ///< largest |X_e,u| and |X_e,v| on the box
+  double lambda_min = 0;      ///< <= 0, or not a number: the piece reaches the source's plane
+  Vec3 along_u{}, along_v{};  ///< largest |X_e,u| and |X_e,v| on the piece
   Vec3 growth{};              ///< |lambda_e|
 };
-ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high);
+ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners);
+inline ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high) {
+  return view_box(matrix, box_corners(low, high));
+}
 
 /// At least |derivative of lambda^-2 q| of `orders` along x, y and z, together at most 6, anywhere on the
-/// box, per powers of the world's unit of length. Infinite where the box reaches the source's plane.
+/// piece, per powers of the world's unit of length. Infinite where it reaches the source's plane.
 double derivative_bound(const ViewBox& box, const std::array<int, 3>& orders, const DetectorSups& sups);
 
 /// Bounds of the sixth derivatives that have even orders along all axes.
@@ -45,19 +53,27 @@ class SixthSups {
   [[nodiscard]] double along(int e, int f, int g) const;
 
  private:
-  friend SixthSups sixth_sups(std::span<const ViewMatrix>, std::span<const DetectorSups>, const Vec3&,
-                              const Vec3&);
+  friend SixthSups sixth_sups(std::span<const ViewMatrix>, std::span<const DetectorSups>,
+                              std::span<const Vec3>);
   static std::size_t place(const std::array<int, 3>& orders);
   std::array<double, 16> sums_{};  // [orders[0] / 2][orders[1] / 2]
 };
 
-/// Sums of derivative_bound over the views. Infinite where the box reaches the source's plane of a view.
+/// Sums of derivative_bound over the views. Infinite where the piece reaches the source's plane of a view.
 /// Cost: some 800 operations a view.
-SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups, const Vec3& low,
-                     const Vec3& high);
+SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups,
+                     std::span<const Vec3> corners);
+inline SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const DetectorSups> sups,
+                            const Vec3& low, const Vec3& high) {
+  return sixth_sups(views, sups, box_corners(low, high));
+}
 
-/// At least sum_k lambda^-power values[k], values >= 0, anywhere on the box; infinite as above.
-double sum_of_weights(std::span<const ViewMatrix> views, std::span<const double> values, const Vec3& low,
-                      const Vec3& high, int power);
+/// At least sum_k lambda^-power values[k], values >= 0, anywhere on the piece; infinite as above.
+double sum_of_weights(std::span<const ViewMatrix> views, std::span<const double> values,
+                      std::span<const Vec3> corners, int power);
+inline double sum_of_weights(std::span<const ViewMatrix> views, std::span<const double> values,
+                             const Vec3& low, const Vec3& high, int power) {
+  return sum_of_weights(views, values, box_corners(low, high), power);
+}
 
 }  // namespace vdvr

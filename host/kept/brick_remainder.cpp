@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "host/fbp/back_project.hpp"
 #include "host/opencl/kernel.hpp"
-#include "host/fdk/view_derivatives.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/system/round_up.hpp"
@@ -67,6 +67,13 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
               static_cast<double>(stencil_[0]) * std::hypot(spacing[0], spacing[1])) *
             (1 + 1e-6);
   lowest_z_ = -(grid.spacing[2] + static_cast<double>(stencil_[2]) * spacing[2]) * (1 + 1e-6);
+  if (scan.views.empty()) return;
+  const double read = static_cast<double>(reach) * std::hypot(spacing[0], spacing[1]) - lowest_,
+               read_z = static_cast<double>(reach) * spacing[2] - lowest_z_;
+  if (read > kept.claimed()[0] || read_z > kept.claimed()[2])
+    throw std::logic_error("BrickRemainder: reads gold beyond its bounds");
+  read_.emplace(coverage_, read);
+  read_z_ = {coverage_.heights().first - read_z, coverage_.heights().second + read_z};
 }
 
 void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sups) {
@@ -103,18 +110,23 @@ void BrickRemainder::set_cone() {
   addend_.fill(round_up(slack_));
 }
 
-// What sixth derivatives add to X on some bricks and what X looks at around them.
+// What sixth derivatives add to X at places of some bricks that a tested cell's stencil reaches: those of the
+// differences' own stencils count.
 BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Index3& bricks) const {
   Vec3 low{}, high{}, square{};
   for (std::size_t a = 0; a < 3; ++a) {
     const double node = grid_.spacing[a] / static_cast<double>(rates_[a]),
-                 around = static_cast<double>(stencil_[a] + reach) * node,
+                 around = static_cast<double>(reach) * node,
                  side = static_cast<double>(granularity_) * grid_.spacing[a];
     low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side - around;
     high[a] = grid_.origin[a] + static_cast<double>(first[a] + bricks[a]) * side + around;
     square[a] = node * node;
   }
-  const SixthSups sixth = sixth_sups(scan_.views, sups_.by_view, low, high);
+  low[2] = std::max(low[2], read_z_.first);
+  high[2] = std::min(high[2], read_z_.second);
+  const Corners part = read_->part(low, high);
+  if (part.empty()) return {};
+  const SixthSups sixth = sixth_sups(scan_.views, sups_.by_view, part);
   // h_i^2 h_j^2 h_k^2 |F_iijjkk|, at least.
   const auto sup = [&](std::size_t i, std::size_t j, std::size_t k) {
     return square[i] * square[j] * square[k] *
@@ -131,12 +143,14 @@ BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Ind
   return out;
 }
 
-// By brick, x fastest. Neighbours share theirs: a sum over all views takes a millisecond.
+// By brick, x fastest. Neighbours share theirs, since a sum over all views takes milliseconds: but no more of
+// them than an eighth of the region, whose lambda differs.
 std::vector<BrickRemainder::Maxima> BrickRemainder::addends_by_group(const Index3& first,
                                                                      const Index3& bricks) const {
   std::vector<Maxima> out(at(bricks[0] * bricks[1] * bricks[2]), Maxima{});
   if (scan_.views.empty()) return out;
-  constexpr std::int64_t group = 4;
+  const std::int64_t group =
+      std::clamp<std::int64_t>(*std::max_element(bricks_.begin(), bricks_.end()) / 8, 1, 4);
   const Index3 groups{(bricks[0] + group - 1) / group, (bricks[1] + group - 1) / group,
                       (bricks[2] + group - 1) / group};
   parallel_for(groups[0] * groups[1] * groups[2], {}, "", [&](std::int64_t n) {

@@ -5,10 +5,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
-#include "host/kept/kept_gold.hpp"
 #include "host/bounds/remainder_norms.hpp"
+#include "host/fdk/region_parts.hpp"
+#include "host/kept/kept_gold.hpp"
 
 namespace vdvr {
 
@@ -60,6 +63,9 @@ class BrickRemainder {
   Maxima factor_{}, addend_{};           // of a difference, by which X is bounded
   double slack_ = 0;                     // what a difference of computed gold errs
   double lowest_ = 0, lowest_z_ = 0;
+  // Of cone beam, what the stencils of tested cells read.
+  std::optional<RegionOutline> read_;
+  std::pair<double, double> read_z_{};
 };
 
 }  // namespace vdvr

@@ -8,7 +8,7 @@
 
 #include "host/bounds/six_taps.hpp"
 #include "host/fbp/back_project.hpp"
-#include "host/fdk/region_boxes.hpp"
+#include "host/fdk/region_parts.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -73,6 +73,13 @@ bool is_upright(const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; }
 
 }  // namespace
 
+InputError source_too_close(std::size_t view) {
+  return InputError(fmt::format(
+      "cone beam: nodes around the covered region reach the plane of the source of view {}; the source stands "
+      "too close to what all views see: no certificate can be made",
+      view));
+}
+
 ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
                      const FieldSups& sups, const Coverage& coverage, const ConeLattice& lattice)
     : state_(state), scan_(scan), upsampler_(upsampler), sups_(sups), lattice_(lattice) {
@@ -85,37 +92,27 @@ ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& 
   views_together_ = views_together();
 }
 
-// Places, frequencies and weights of all views, box by box.
+// Places, frequencies and weights of all views, part by part of the region.
 void ConeTiles::look_at_views(const Coverage& coverage) {
   const ParallelGeometry& g = scan_.geometry;
-  const auto height = [&](std::int64_t group) {
-    return lattice_.origin[2] + static_cast<double>(lattice_.low + group * heights) * lattice_.spacing[2];
-  };
-  const auto boxes = region_boxes(coverage, lattice_.reach, {height(0), height(lattice_.groups)});
   const Blocks blocks(in_double_, lattice_.groups);
   const Vec3 half{0.5 * static_cast<double>(blocks.across) * lattice_.spacing[0],
                   0.5 * static_cast<double>(blocks.across) * lattice_.spacing[1],
                   0.5 * static_cast<double>(blocks.groups * heights) * lattice_.spacing[2]};
   double beyond_u = 0, beyond_v = 0;
-  for (const RegionBox& box : boxes) {
-    std::vector<ViewAtBox> at_box;
+  for (const Corners& part : RegionOutline(coverage, lattice_.claimed).parts(lattice_.claimed_z)) {
+    std::vector<ViewAtPart> at_part;
     double sum = 0;
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
-      const ViewBox seen = view_box(scan_.views[k], box.low, box.high);
-      if (!(seen.lambda_min > 0))
-        throw InputError(fmt::format(
-            "cone beam: nodes around the covered region reach the plane of the source of view {}; the source "
-            "stands too close to what all views see: no certificate can be made",
-            k));
-      for (std::size_t c = 0; c < 8; ++c) {
-        const Vec3 corner{(c & 1) != 0 ? box.high[0] : box.low[0], (c & 2) != 0 ? box.high[1] : box.low[1],
-                          (c & 4) != 0 ? box.high[2] : box.low[2]};
+      const ViewBox seen = view_box(scan_.views[k], part);
+      if (!(seen.lambda_min > 0)) throw source_too_close(k);
+      for (const Vec3& corner : part) {
         const Vec3 place = projected(scan_.views[k], corner);
         beyond_u = std::max({beyond_u, -0.5 - place[0], place[0] - static_cast<double>(g.columns) + 0.5});
         beyond_v = std::max({beyond_v, -0.5 - place[1], place[1] - static_cast<double>(g.rows) + 0.5});
       }
       const double weight = 1 / (seen.lambda_min * seen.lambda_min);
-      ViewAtBox view{weight * sups_.by_view[k].value, {}, {}};
+      ViewAtPart view{weight * sups_.by_view[k].value, {}, {}};
       double reach_u = 0, reach_v = 0;
       for (std::size_t e = 0; e < 3; ++e) {
         const double of_v = g.rows > 1 ? seen.along_v[e] : 0.0;
@@ -128,10 +125,10 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
       block_reach_ = std::max({block_reach_, reach_u, reach_v});
       largest_weight_ = std::max(largest_weight_, weight);
       sum += view.weight;
-      at_box.push_back(view);
+      at_part.push_back(view);
     }
     sup_ = std::max(sup_, sum * (1 + 1e-12));
-    at_boxes_.push_back(std::move(at_box));
+    at_parts_.push_back(std::move(at_part));
   }
   columns_ = upsampled_columns(g.columns, density, std::ceil(beyond_u) + 1);
   rows_ = upsampled_columns(g.rows, density, std::ceil(beyond_v) + 1);
@@ -168,11 +165,11 @@ ConeTiles::Table ConeTiles::table(std::int64_t first, std::int64_t views) {
   std::vector<double> rows;
   for (std::int64_t r = 0; r < rows_.count; ++r) rows.push_back(rows_.position(r));
   const UpsampledSlab slab = upsampler_(columns_, rows, 0, 0, density, first, views);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> join(state_, "fdk/join_rows",
-                                                                              "join_rows");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> join(state_, "kept/join_rows",
+                                                                      "join_kept_rows");
   const std::int64_t lines = views * columns_.count;
-  join({{count(column_stride_), count(lines), 1}, {64, 1, 1}}, out.values.buffer(), slab.values.buffer(),
-       to_int(lines), to_int(rows_.count), 1, to_int(column_stride_));
+  join({{count(column_stride_), count(lines), 1}, {16, 1, 1}}, out.values.buffer(), slab.values.buffer(),
+       to_int(lines), to_int(rows_.count), to_int(column_stride_));
   opencl::finish(state_, "dense views");  // before the slab goes
   return out;
 }
@@ -288,27 +285,26 @@ const ProjectiveError& ConeTiles::error_of(std::size_t axis, const GoldFilter& f
 // The largest sum over the views of what a filter errs along an axis.
 double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
   double most = 0;
-  for (const auto& views : at_boxes_) {
+  for (const auto& views : at_parts_) {
     double sum = 0;
-    for (const ViewAtBox& view : views) sum += view.weight * error.at(view.band[axis], view.rho[axis]);
+    for (const ViewAtPart& view : views) sum += view.weight * error.at(view.band[axis], view.rho[axis]);
     most = std::max(most, sum);
   }
   return most * (1 + 1e-12);
 }
 
-GoldFilter ConeTiles::best_filter(int phases, std::size_t axis) const {
-  if (phases == 1) return design_gold_filter(1, highest(axis));
-  std::optional<GoldFilter> best;
-  double least = HUGE_VAL;
+ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis) const {
+  BestFilter best{std::nullopt, HUGE_VAL};
+  if (highest(axis) > highest_gold_band) return best;
+  if (phases == 1) return {design_gold_filter(1, highest(axis)), 0};
   for (const double share : {0.8, 0.85, 0.9, 0.95, 1.0}) {
     GoldFilter filter = design_gold_filter(phases, share * highest(axis));
     const ProjectiveError error(filter, highest(axis));
     const double errs = axis == 2 ? largest(2, error) : std::max(largest(0, error), largest(1, error));
-    if (best && errs >= least) continue;
-    least = errs;
-    best = std::move(filter);
+    if (best.filter && errs >= best.error) continue;
+    best = {std::move(filter), errs};
   }
-  return *best;
+  return best;
 }
 
 // I_x I_y I_z - 1 = (I_x - 1) + I_x (I_y - 1) + I_x I_y (I_z - 1).

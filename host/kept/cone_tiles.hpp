@@ -17,6 +17,7 @@
 #include "host/kept/gold_filters.hpp"
 #include "host/kept/projective_error.hpp"
 #include "shared/cone_nodes.h"
+#include "vdvr/error.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 
@@ -25,7 +26,9 @@ namespace vdvr {
 /// Which nodes are kept: node (0, 0, 0) is the grid's first sample.
 struct ConeLattice {
   Vec3 origin{}, spacing{};
-  double reach = 0;                  ///< across z, beyond the covered region
+  double reach = 0;    ///< of nodes, across z, beyond the covered region
+  double claimed = 0;  ///< alike, at most `reach`: as far as bounds hold; beyond it nodes are finite
+  std::pair<double, double> claimed_z{};  ///< the heights between which they hold
   std::int64_t low = 0, groups = 0;  ///< the lowest height, and how many groups of eight
   std::int64_t stride = 0;           ///< floats from column to column of a tile, at least all heights
 };
@@ -37,9 +40,12 @@ struct ConePage {
   std::vector<std::array<std::int32_t, 2>> wanted;  ///< [tile][y]: first and last column
 };
 
+[[nodiscard]] InputError source_too_close(std::size_t view);
+
 class ConeTiles {
  public:
-  /// Everything is referred to but the lattice. Throws InputError where nodes reach a source's plane.
+  /// Everything is referred to but the lattice. Throws InputError where nodes with bounds reach a source's
+  /// plane; others must not.
   ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
             const Coverage& coverage, const ConeLattice& lattice);
 
@@ -47,10 +53,10 @@ class ConeTiles {
   /// tables of all views. Memory: tables of some views, at most a quarter of what is left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
 
-  /// At least sum_k lambda^-2 sup |q_k| wherever nodes are kept.
+  /// At least sum_k lambda^-2 sup |q_k| wherever bounds hold.
   [[nodiscard]] double sup() const { return sup_; }
   [[nodiscard]] double largest_weight() const { return largest_weight_; }  ///< at least lambda^-2, alike
-  /// At least the frequency of any view's part at kept nodes, radians a node.
+  /// At least the frequency of any view's part at such nodes, radians a node.
   [[nodiscard]] double band(std::size_t axis) const { return band_[axis]; }
   [[nodiscard]] const ConeLattice& lattice() const { return lattice_; }
 
@@ -60,8 +66,12 @@ class ConeTiles {
   };
   [[nodiscard]] Errors errors();
   /// Of an axis, x and y alike: designed for the band with which it errs least, most views being below the
-  /// highest.
-  [[nodiscard]] GoldFilter best_filter(int phases, std::size_t axis) const;
+  /// highest. Where a band exceeds what filters are designed for, none; `error` is infinite.
+  struct BestFilter {
+    std::optional<GoldFilter> filter;
+    double error = 0;  ///< at least |filtered - F| where exact nodes are filtered along the axis
+  };
+  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis) const;
   /// At least |filtered - F| where exact nodes are filtered along z, then y, then x.
   [[nodiscard]] double filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
 
@@ -70,9 +80,9 @@ class ConeTiles {
     opencl::DeviceArray<float> values;
     std::int64_t first = 0, views = 0;
   };
-  // Of a view at the places of a box: lambda^-2 sup |q|, and by axis the band and rho of
+  // Of a view at the places of a part of the region: lambda^-2 sup |q|, and by axis the band and rho of
   // projective_error.hpp.
-  struct ViewAtBox {
+  struct ViewAtPart {
     double weight = 0;
     Vec3 band{}, rho{};
   };
@@ -100,7 +110,7 @@ class ConeTiles {
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
-  std::vector<std::vector<ViewAtBox>> at_boxes_;
+  std::vector<std::vector<ViewAtPart>> at_parts_;
   std::map<const GoldFilter*, ProjectiveError> filters_;
 };
 

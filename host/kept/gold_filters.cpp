@@ -19,7 +19,7 @@ namespace {
 void check(int rate, double band, int taps) {
   if (rate < 1 || rate > 32 || (rate & (rate - 1)) != 0)
     throw InputError(fmt::format("a filter of rate {}: it must be 1, 2, 4, 8, 16 or 32", rate));
-  if (!(band > 0) || band > 0.75 * std::numbers::pi)
+  if (!(band > 0) || band > highest_gold_band)
     throw InputError(fmt::format("a filter for the band {}: it must be above 0, at most 3/4 pi", band));
   if (taps < 2 || taps > 32 || taps % 2 != 0)
     throw InputError(fmt::format("a filter of {} taps: it must be an even number, 2 to 32", taps));

@@ -2,9 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 namespace vdvr {
+
+/// Radians a node: filters are designed for no more.
+inline constexpr double highest_gold_band = 0.75 * std::numbers::pi;
 
 /// One filter of `taps` weights for each position phase / rate between two nodes: the value there is
 ///   sum_i weights[phase * taps + i] f(first() + i),  nodes counted from the node on the left.
@@ -14,7 +18,7 @@ namespace vdvr {
 struct GoldFilter {
   int rate = 1;                // positions to a node, phase 0 included
   int taps = 2;                // even
-  double band = 0;             // radians a node, at most 3/4 pi
+  double band = 0;             // radians a node, at most highest_gold_band
   std::vector<float> weights;  // [phase][taps]
   /// E: largest error of a wave |kappa| <= band, of its amplitude.
   double error = 0;

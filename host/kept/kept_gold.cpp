@@ -14,6 +14,7 @@
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/cosine_series.hpp"
 #include "host/fbp/reconstruct.hpp"
+#include "host/fdk/region_parts.hpp"
 #include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
@@ -77,15 +78,20 @@ void KeptGold::set_spacing() {
 // Cone beam: where a view looks closest its frequencies are the highest, and half a pixel at the axis may be
 // too far. Heights are kept themselves: no two nodes see the same rows.
 void KeptGold::keep_heights(double reach) {
-  // Beyond it 16 taps err by more than some ten thousandths.
-  constexpr double highest = 0.66 * pi;
+  // Of the largest value that F can have, what filters along an axis may err: the remainder sees it 16 times.
+  constexpr double most_error = 3e-4;
   for (bool dense = false; !dense;) {
-    reach_ = reach + (static_cast<double>(taps_after) + 1) * std::hypot(spacing_[0], spacing_[1]);
-    cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, cone_lattice());
+    const ConeLattice lattice = cone_lattice(reach);
+    if (lattice.reach < lattice.claimed) {  // tiles whose middle reaches a source: smaller ones
+      rates_[0] = rates_[1] *= 2;
+      set_spacing();
+      continue;
+    }
+    reach_ = lattice.reach;
+    cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, lattice);
     dense = true;
     for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
-      const double band = a == 2 ? cone_->band(2) : std::max(cone_->band(0), cone_->band(1));
-      if (band <= highest) continue;
+      if (cone_->best_filter(2, a).error <= most_error * cone_->sup()) continue;
       dense = false;
       rates_[a] *= 2;
       if (a == 0) rates_[1] *= 2;
@@ -100,9 +106,32 @@ void KeptGold::keep_heights(double reach) {
   run_->a_page = std::max<std::size_t>(1, page_bytes / (4 * count(side * side * run_->stride)));
 }
 
+// What tests read of gold beyond the region: a cell that meets it and what the remainder's stencils reach.
+Vec3 KeptGold::claimed() const {
+  constexpr double cells = 2.5;
+  const double across = cells * std::hypot(grid_.spacing[0], grid_.spacing[1]);
+  return {across, across, cells * grid_.spacing[2]};
+}
+
+// How much farther than `from` nodes may lie so that lambda stays positive there and at the middles of their
+// tiles: the nearest source counts. Negative where tiles are too large.
+double KeptGold::room_to_sources(double from, const std::pair<double, double>& heights) const {
+  const double half_tile = 0.5 * static_cast<double>(side) * std::hypot(spacing_[0], spacing_[1]);
+  double room = HUGE_VAL;
+  for (const Corners& part : RegionOutline(coverage_, from).parts(heights))
+    for (std::size_t k = 0; k < scan_.views.size(); ++k)
+      for (const Vec3& corner : part) {
+        const ViewMatrix& m = scan_.views[k];
+        const double lambda = projected(m, corner)[2];
+        if (!(lambda > 0)) throw source_too_close(k);
+        room = std::min(room, 0.75 * lambda / std::hypot(m[2][0], m[2][1]) - half_tile);
+      }
+  return room;
+}
+
 // Heights that cells at the covered region read, and no others: samples are fitted, and gold is filtered,
 // from some way around.
-ConeLattice KeptGold::cone_lattice() const {
+ConeLattice KeptGold::cone_lattice(double reach) const {
   constexpr double cells_around = 4, nodes_around = 2 * static_cast<double>(taps_after);
   const double around = cells_around * grid_.spacing[2] + nodes_around * spacing_[2];
   const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
@@ -110,10 +139,17 @@ ConeLattice KeptGold::cone_lattice() const {
   const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
                high = std::clamp(node(coverage_.heights().second + around), low,
                                  static_cast<double>(grid_.cells[2] * rates_[2]) + margin);
-  ConeLattice out{grid_.origin, spacing_, reach_, 0, 0, 0};
+  ConeLattice out{grid_.origin, spacing_};
   out.low = 8 * floor_div(static_cast<std::int64_t>(std::floor(low)), 8);
   out.groups = floor_div(static_cast<std::int64_t>(std::ceil(high)) - out.low, 8) + 1;
   out.stride = column_stride(8 * out.groups + 16);
+  // Filters read around nodes with bounds.
+  const double taps = static_cast<double>(taps_after) + 1, diagonal = std::hypot(spacing_[0], spacing_[1]);
+  out.claimed = claimed()[0] + taps * diagonal;
+  const double claimed_z = claimed()[2] + taps * spacing_[2];
+  out.claimed_z = {coverage_.heights().first - claimed_z, coverage_.heights().second + claimed_z};
+  out.reach =
+      std::min(reach + taps * diagonal, out.claimed + room_to_sources(out.claimed, out.claimed_z));
   return out;
 }
 
@@ -142,7 +178,7 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
   return filters_
-      .emplace(key, cone_ ? cone_->best_filter(phases, key.second)
+      .emplace(key, cone_ ? cone_->best_filter(phases, key.second).filter.value()
                           : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch)))
       .first->second;
 }

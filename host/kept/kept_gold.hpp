@@ -56,6 +56,9 @@ class KeptGold {
   [[nodiscard]] const Index3& rates() const { return rates_; }
   /// At least |F| wherever nodes are kept.
   [[nodiscard]] double sup() const { return cone_ ? cone_->sup() : sups_.value; }
+  /// How far outside the covered region gold of cone beam has the bounds of errors(), by axis. Farther out,
+  /// where a view's source may be near, it is only finite.
+  [[nodiscard]] Vec3 claimed() const;
   /// In u.
   [[nodiscard]] Interpolation interpolation() const { return interpolation_; }
   /// Of gold at `rate` of a grid with the same origin whose cells are powers of two of this one's. Throws
@@ -135,7 +138,8 @@ class KeptGold {
   [[nodiscard]] bool few_rows() const { return !cone_ && scan_.geometry.rows <= most_few_rows; }
   void set_spacing();
   void keep_heights(double reach);
-  [[nodiscard]] ConeLattice cone_lattice() const;
+  [[nodiscard]] ConeLattice cone_lattice(double reach) const;
+  [[nodiscard]] double room_to_sources(double from, const std::pair<double, double>& heights) const;
   GoldErrors cone_errors(const GoldLattice& lattice);
   void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
