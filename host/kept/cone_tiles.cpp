@@ -293,12 +293,12 @@ double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const 
   return most * (1 + 1e-12);
 }
 
-ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis) const {
+ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps) const {
   BestFilter best{std::nullopt, HUGE_VAL};
   if (highest(axis) > highest_gold_band) return best;
-  if (phases == 1) return {design_gold_filter(1, highest(axis)), 0};
+  if (phases == 1) return {design_gold_filter(1, highest(axis), taps), 0};
   for (const double share : {0.8, 0.85, 0.9, 0.95, 1.0}) {
-    GoldFilter filter = design_gold_filter(phases, share * highest(axis));
+    GoldFilter filter = design_gold_filter(phases, share * highest(axis), taps);
     const ProjectiveError error(filter, highest(axis));
     const double errs = axis == 2 ? largest(2, error) : std::max(largest(0, error), largest(1, error));
     if (best.filter && errs >= best.error) continue;

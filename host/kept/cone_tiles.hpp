@@ -71,7 +71,7 @@ class ConeTiles {
     std::optional<GoldFilter> filter;
     double error = 0;  ///< at least |filtered - F| where exact nodes are filtered along the axis
   };
-  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis) const;
+  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps) const;
   /// At least |filtered - F| where exact nodes are filtered along z, then y, then x.
   [[nodiscard]] double filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
 

@@ -15,12 +15,13 @@ static_assert(sizeof(VdvrColumns) == 24 && sizeof(VdvrAlongZ) == 56 && sizeof(Vd
 
 namespace {
 
-constexpr std::int64_t taps = taps_before + 1 + taps_after, lanes_of_group = 16;
+constexpr std::int64_t lanes_of_group = 16;
 
-opencl::Defines defines(int lanes, int phases) {
+opencl::Defines defines(int lanes, int phases, int taps) {
   return {{"VDVR_LANES", std::to_string(lanes)},
           {"VDVR_RUN", std::to_string(AlongZ::run)},
-          {"VDVR_PHASES", std::to_string(phases)}};
+          {"VDVR_PHASES", std::to_string(phases)},
+          {"VDVR_TAPS", std::to_string(taps)}};
 }
 
 // Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
@@ -31,7 +32,7 @@ int lanes_along_z(opencl::State& state) {
 }
 
 // Whole groups of the phases that a work-item makes together.
-std::vector<float> padded(int phases, std::span<const float> weights) {
+std::vector<float> padded(int phases, int taps, std::span<const float> weights) {
   const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
   std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
                          0.0f);
@@ -91,21 +92,23 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   const opencl::DeviceArray<VdvrColumns> on_device(state, parts, "columns to interpolate");
   const int lanes = lanes_along_z(state);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "kept/interpolate", "along_z", defines(lanes, 1));
+      state, "kept/interpolate", "along_z", defines(lanes, 1, 2));
   kernel({{count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
            count(std::int64_t{shape.columns_y} * shape.parts)},
           {1, 4, 1}},
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
 }
 
-Across::Across(opencl::State& state, int phases, std::span<const float> weights)
-    : phases_(phases), weights_(state, std::span<const float>(padded(phases, weights)), "weights of gold") {}
+Across::Across(opencl::State& state, int phases, int taps, std::span<const float> weights)
+    : phases_(phases),
+      taps_(taps),
+      weights_(state, std::span<const float>(padded(phases, taps, weights)), "weights of gold") {}
 
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
   const int lanes = column_tuning(state.info).lanes;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
-                                                                        defines(lanes, phases_));
+                                                                        defines(lanes, phases_, taps_));
   kernel({{count(shape.z / lanes), count(shape.others), count(std::int64_t{shape.intervals} * shape.boxes)},
           {1, 4, 4}},
          out.buffer(), in.buffer(), weights_.buffer(), shape);

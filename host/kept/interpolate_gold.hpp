@@ -45,20 +45,17 @@ class AlongZ {
   std::int64_t terms_ = 0, groups_ = 0;
 };
 
-/// Inputs of `across` before and after the interval that it fills.
-constexpr std::int64_t taps_before = 7, taps_after = 8;
-
-/// Filters across z. `weights` float[phase - 1][16] as gold_filters.hpp has them; `phases` outputs an
-/// interval.
+/// Filters across z. `weights` float[phase - 1][taps] as gold_filters.hpp has them; `phases` outputs an
+/// interval, which half of the taps lie before.
 class Across {
  public:
-  Across(opencl::State& state, int phases, std::span<const float> weights);
-  /// Enqueues. Cost: 16 multiply-adds an output; error: 17 roundings of sum |weight| |input|.
+  Across(opencl::State& state, int phases, int taps, std::span<const float> weights);
+  /// Enqueues. Cost: `taps` multiply-adds an output; error: taps + 1 roundings of sum |weight| |input|.
   void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                   const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const;
 
  private:
-  int phases_ = 1;
+  int phases_ = 1, taps_ = 2;
   opencl::DeviceArray<float> weights_;
 };
 

@@ -54,6 +54,8 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
       reach_(reach),
       heights_bytes_(heights_bytes),
       interpolation_(interpolation),
+      // Where a view looks closest, half a pixel at the axis is more than half of its own.
+      half_taps_(scan.views.empty() ? 8 : 10),
       coverage_(scan.geometry, scan.views) {
   const ParallelGeometry& g = scan.geometry;
   const double across = std::max(grid.spacing[0], grid.spacing[1]);
@@ -65,7 +67,7 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
   }
   // Filters read across the edge of what is kept, and nowhere may a column be clamped.
   const double margin =
-      reach + (static_cast<double>(taps_after) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
+      reach + (static_cast<double>(half_taps_) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
   reach_ = margin - g.pitch_u;
   columns_ = upsampled_columns(g.columns, upsampling, margin / g.pitch_u);
   stride_ = column_stride(g.rows);
@@ -79,7 +81,7 @@ void KeptGold::set_spacing() {
 // too far. Heights are kept themselves: no two nodes see the same rows.
 void KeptGold::keep_heights(double reach) {
   // Of the largest value that F can have, what filters along an axis may err: the remainder sees it 16 times.
-  constexpr double most_error = 3e-4;
+  constexpr double most_error = 5e-5;
   for (bool dense = false; !dense;) {
     const ConeLattice lattice = cone_lattice(reach);
     if (lattice.reach < lattice.claimed) {  // tiles whose middle reaches a source: smaller ones
@@ -91,7 +93,7 @@ void KeptGold::keep_heights(double reach) {
     cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, lattice);
     dense = true;
     for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
-      if (cone_->best_filter(2, a).error <= most_error * cone_->sup()) continue;
+      if (cone_->best_filter(2, a, to_int(2 * half_taps_)).error <= most_error * cone_->sup()) continue;
       dense = false;
       rates_[a] *= 2;
       if (a == 0) rates_[1] *= 2;
@@ -132,8 +134,8 @@ double KeptGold::room_to_sources(double from, const std::pair<double, double>& h
 // Heights that cells at the covered region read, and no others: samples are fitted, and gold is filtered,
 // from some way around.
 ConeLattice KeptGold::cone_lattice(double reach) const {
-  constexpr double cells_around = 4, nodes_around = 2 * static_cast<double>(taps_after);
-  const double around = cells_around * grid_.spacing[2] + nodes_around * spacing_[2];
+  constexpr double cells_around = 4;
+  const double around = cells_around * grid_.spacing[2] + 2 * static_cast<double>(half_taps_) * spacing_[2];
   const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
   const auto margin = static_cast<double>(2 * run_margin);
   const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
@@ -144,7 +146,7 @@ ConeLattice KeptGold::cone_lattice(double reach) const {
   out.groups = floor_div(static_cast<std::int64_t>(std::ceil(high)) - out.low, 8) + 1;
   out.stride = column_stride(8 * out.groups + 16);
   // Filters read around nodes with bounds.
-  const double taps = static_cast<double>(taps_after) + 1, diagonal = std::hypot(spacing_[0], spacing_[1]);
+  const double taps = static_cast<double>(half_taps_) + 1, diagonal = std::hypot(spacing_[0], spacing_[1]);
   out.claimed = claimed()[0] + taps * diagonal;
   const double claimed_z = claimed()[2] + taps * spacing_[2];
   out.claimed_z = {coverage_.heights().first - claimed_z, coverage_.heights().second + claimed_z};
@@ -178,8 +180,8 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
   return filters_
-      .emplace(key, cone_ ? cone_->best_filter(phases, key.second).filter.value()
-                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch)))
+      .emplace(key, cone_ ? cone_->best_filter(phases, key.second, to_int(2 * half_taps_)).filter.value()
+                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch), to_int(2 * half_taps_)))
       .first->second;
 }
 
@@ -201,11 +203,12 @@ GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
                    (bend(x) * y.norm * z.norm + x.norm * bend(y) * z.norm + x.norm * y.norm * bend(z)) / 8;
   const ConeTiles::Errors kept = cone_->errors();
   const double filters = cone_->filter_error(x, y, z);
-  // What the filters round: a product in runs along z, 17 roundings in either filter across z.
+  // What the filters round: a product in runs along z, one more than taps in either filter across z.
+  const double sums = 2 * static_cast<double>(half_taps_) + 1;
   const double apart =
       unit_roundoff * S *
-      (z.norm * (product_error(taps_before + taps_after + 9, AlongZ::run) + 2) * x.norm * y.norm +
-       (x.rate > 1 ? 17.0 : 0.0) * x.norm + (y.rate > 1 ? 17.0 : 0.0) * x.norm * y.norm);
+      (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
+       (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
   GoldErrors out;
   out.ramp = cone_->largest_weight() * filter_error_bound(upsampler_, scan_);
   out.interpolation = nodes * kept.interpolation + filters;
@@ -237,13 +240,14 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
 
   // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
-  // height by itself, product and filter; of each node by itself, 17 roundings in either filter across z.
+  // height by itself, product and filter; of each node by itself, one more than taps in either filter across z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
-  const double between = !few_rows() ? product_error(taps_before + taps_after + 9, AlongZ::run) + 2 : 0.0;
+  const double between = !few_rows() ? product_error(2 * half_taps_ + 8, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *
                          ((g.rows > 1 ? (product_error(g.rows, AlongZ::run) + 2) * gain_v : 0.0) + between);
-  const double apart = (x.rate > 1 ? 17.0 : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
-                       (y.rate > 1 ? 17.0 : 0.0) * unit_roundoff * x.norm * y.norm * S;
+  const double sums = 2 * static_cast<double>(half_taps_) + 1;
+  const double apart = (x.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
+                       (y.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * y.norm * S;
   const double curved_heights = (bend(x) * y.norm + x.norm * bend(y) + 4 * nodes) / 8;
   out.rounding = nodes * (shared + rows + heights) + apart + chain.underflow * nodes * gain_v;
   out.curved_rounding = curved * (shared + rows) + curved_heights * heights + curved_apart * apart;
@@ -259,8 +263,8 @@ KeptGold::Span KeptGold::span(const GoldLattice& lattice, std::size_t axis, cons
   const std::int64_t begin = phases > 1 ? floor_div(first, phases) : first * step;
   s.intervals = phases > 1 ? floor_div(last, phases) - begin + 1 : box.nodes[axis];
   s.skipped = phases > 1 ? first - begin * phases : 0;
-  s.low = begin - taps_before;
-  s.count = (s.intervals - 1) * step + taps_before + 1 + taps_after;
+  s.low = begin - half_taps_ + 1;
+  s.count = (s.intervals - 1) * step + 2 * half_taps_;
   return s;
 }
 
@@ -532,7 +536,7 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
       const auto put = [&](std::int64_t t, double weight) {
         if (first + t >= 0 && first + t < s.count) row[first + t] = weight;
       };
-      if (phase == 0) put(taps_before, 1);
+      if (phase == 0) put(half_taps_ - 1, 1);
       else
         for (std::int64_t t = 0; t < f.taps; ++t)
           put(t, static_cast<double>(f.weights[at(phase * f.taps + t)]));
@@ -559,7 +563,7 @@ const Across& KeptGold::across_of(int phases, std::size_t axis) {
   if (const auto known = across_.find(key); known != across_.end()) return known->second;
   const GoldFilter& f = filter_of(phases, axis);
   return across_
-      .emplace(key, Across(state_, phases,
+      .emplace(key, Across(state_, phases, f.taps,
                            std::span<const float>(f.weights).subspan(
                                at(std::min(f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
       .first->second;

@@ -1,5 +1,5 @@
 // Gold from the nodes that determine it (docs/error-bounds.md, section 3): along z a product with few rows or
-// with a band of them, across z filters of 16 taps. Layouts: columns of contiguous heights, anywhere
+// with a band of them, across z filters of VDVR_TAPS taps. Layouts: columns of contiguous heights, anywhere
 // (shared/interpolate_gold.h). Called by host/kept/interpolate_gold.cpp.
 #pragma OPENCL FP_CONTRACT ON
 
@@ -60,7 +60,9 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 
 // --- across z ---
 
-#define TAPS 16
+#ifndef VDVR_TAPS
+#error "VDVR_TAPS must be the taps of the filters across z"
+#endif
 // Outputs that share what they read.
 #if VDVR_PHASES == 2
 #define FOR_SUMS(M) M(0)
@@ -70,15 +72,15 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 #define SUMS 3
 #endif
 #define BEGIN_SUM(i) VEC phase##i = (VEC)(0.0f);
-#define ADD_TAP(i) phase##i = fma((VEC)(w[(i)*TAPS + t]), v, phase##i);
+#define ADD_TAP(i) phase##i = fma((VEC)(w[(i)*VDVR_TAPS + t]), v, phase##i);
 #define PUT_PHASE(i)                                                                                       \
   {                                                                                                        \
     const int n = interval * VDVR_PHASES + p + i - s.skipped;                                              \
     if (p + i < VDVR_PHASES && n >= 0 && n < s.outputs) STORE(phase##i, target + (size_t)n * s.out_along); \
   }
 
-// The nodes of an interval, which lies between its 8th and 9th of 16 inputs: the 8th itself, and the others
-// by weights[phase - 1][16], in whole groups of SUMS phases.
+// The nodes of an interval, which lies between the two middle ones of VDVR_TAPS inputs: the first of these
+// itself, and the others by weights[phase - 1][tap], in whole groups of SUMS phases.
 __kernel void across(__global float* out, __global const float* in, __global const float* weights,
                      VdvrAcross s) {
   const int z = (int)get_global_id(0) * VDVR_LANES;
@@ -90,11 +92,11 @@ __kernel void across(__global float* out, __global const float* in, __global con
   __global float* target = out + s.out_first + (size_t)box * s.out_box + (size_t)other * s.out_other + z;
   const int node = interval * VDVR_PHASES - s.skipped;
   if (node >= 0 && node < s.outputs)
-    STORE(LOAD(from + (TAPS / 2 - 1) * s.in_along), target + (size_t)node * s.out_along);
+    STORE(LOAD(from + (VDVR_TAPS / 2 - 1) * s.in_along), target + (size_t)node * s.out_along);
   for (int p = 1; p < VDVR_PHASES; p += SUMS) {
-    __global const float* w = weights + (p - 1) * TAPS;
+    __global const float* w = weights + (p - 1) * VDVR_TAPS;
     FOR_SUMS(BEGIN_SUM)
-    for (int t = 0; t < TAPS; ++t) {
+    for (int t = 0; t < VDVR_TAPS; ++t) {
       const VEC v = LOAD(from + (size_t)t * s.in_along);
       FOR_SUMS(ADD_TAP)
     }
