@@ -219,7 +219,7 @@ Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, doubl
 
 void add_trial_bounds(std::vector<Bound>& bounds, const Rates& r, const Trial& t) {
   bounds.push_back({"projection",
-                    fmt::format("sups, {} in u, 16 taps between kept gold", text_of(r.interpolation)),
+                    fmt::format("sups, {} in u, filters between kept gold", text_of(r.interpolation)),
                     r.upsampling, t.projection, true});
   bounds.push_back({"gold",
                     fmt::format("second differences, node by node, u {}x {} (trial)", r.upsampling,

@@ -150,8 +150,8 @@ ConeLattice KeptGold::cone_lattice(double reach) const {
   out.claimed = claimed()[0] + taps * diagonal;
   const double claimed_z = claimed()[2] + taps * spacing_[2];
   out.claimed_z = {coverage_.heights().first - claimed_z, coverage_.heights().second + claimed_z};
-  out.reach =
-      std::min(reach + taps * diagonal, out.claimed + room_to_sources(out.claimed, out.claimed_z));
+  out.reach = std::min(std::max(reach + taps * diagonal, out.claimed),
+                       out.claimed + room_to_sources(out.claimed, out.claimed_z));
   return out;
 }
 
