@@ -12,6 +12,7 @@
 #include "host/bounds/covered_range.hpp"
 #include "host/fdk/filter_cone.hpp"
 #include "host/gold/gold_settings.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -67,13 +68,6 @@ Grid grid_of_region(const ProjectionSet& scan, const FieldOptions& field, const 
         "disc of radius {:.6g} around the axis",
         roi[0], roi[1], roi[3], roi[4], coverage.inner_radius()));
   return grid;
-}
-
-// Of cone beam the certified cylinder, which is less than what views see.
-Grid certified_grid(const ProjectionSet& scan, const FieldOptions& field, const GridOptions& options) {
-  if (!scan.cone) return make_grid(scan.geometry, options);
-  const Coverage coverage = certified_coverage(scan, field);
-  return grid_around(scan.geometry, coverage.inner_radius(), coverage.heights(), options);
 }
 
 // What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
@@ -140,8 +134,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& toler
   field.center = center_of(field, scan.geometry);
   Grid grid = certified_grid(scan, field, options.grid);
   const bool cropped = options.build.roi && !options.grid.size;
-  if (cropped)
-    grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
+  if (cropped) grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
   Plan plan = make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
   if (cropped) plan.notes.emplace_back(of_region_note);
   return plan;

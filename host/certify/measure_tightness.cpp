@@ -7,7 +7,9 @@
 #include <random>
 
 #include "host/fbp/reconstruct.hpp"
+#include "host/gold/base_of_gold.hpp"
 #include "host/gold/gold_batch.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
@@ -15,7 +17,7 @@
 namespace vdvr {
 namespace {
 
-constexpr int granularity = 4, finer = 4;
+constexpr int granularity = 4;
 constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
 
 // What T may be in every brick that may hold a covered node; negative elsewhere.
@@ -75,7 +77,7 @@ BrickGold brick_gold(GoldStream& stream, std::int64_t brick, std::size_t bricks)
 
 // The largest |trilinear interpolation of every finer-th node - fine| over cells whose corners are all
 // tested.
-double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
+double interpolation_error(const BrickGold& fine, const BrickGold& coarse, int finer) {
   double worst = 0;
   for (std::int64_t z = 0; z < fine.side[2]; ++z)
     for (std::int64_t y = 0; y < fine.side[1]; ++y)
@@ -102,20 +104,28 @@ double interpolation_error(const BrickGold& fine, const BrickGold& coarse) {
   return worst;
 }
 
+// The largest rate of gold there is.
+constexpr int finest_gold = 32;
+
 // All but the scan in `units`.
 Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
                            const FieldOptions& field, const Rates& rates, const Progress& progress) {
   opencl::State& state = device.state();
-  const FilteredScan filtered =
-      filter_projections(state, scan, field, {}, FilterMethod::automatic, Precision::fp64, units);
-  Upsampler upsampler(state, filtered);
-  const FieldSups sups = field_sups(state, upsampler, filtered);
+  PreparedScan prepared(state, scan, field, units, PreparedScan::Sups::of_derivatives, progress);
+  const bool cone = scan.cone.has_value();
   const auto stream_at = [&](const Rates& r) {
-    return GoldStream(state, filtered, sups, {grid, granularity, r.gold, r.upsampling, r.interpolation, {}});
+    const GoldSettings settings{grid, granularity, r.gold, r.upsampling, r.interpolation, {}};
+    return GoldStream(state, prepared.filtered, prepared.sups, settings, prepared.source(settings));
   };
-  const Volume base = reconstruct_field(state, filtered, upsampler, grid, 8, Interpolation::cubic, {});
-  GoldStream sharp = stream_at({16, Interpolation::six_taps, rates.gold}), given = stream_at(rates),
-             truth = stream_at({16, Interpolation::six_taps, rates.gold * finer});
+  // Of cone beam there is one way to gold.
+  const int upsampling = cone ? rates.upsampling : 16, finer = std::min(4, finest_gold / rates.gold);
+  GoldStream sharp = stream_at({upsampling, Interpolation::six_taps, rates.gold}), given = stream_at(rates),
+             truth = stream_at({upsampling, Interpolation::six_taps, rates.gold * finer});
+  const Coverage coverage(prepared.filtered.geometry, prepared.filtered.views);
+  const Volume base =
+      cone ? base_of_gold(state, given.source()->kept, coverage, grid, kept_margin(grid, 1), {})
+           : reconstruct_field(state, prepared.filtered, prepared.upsampler, grid, 8, Interpolation::cubic,
+                               {});
   const std::vector<float> t = brick_bounds(state, sharp, base, progress);
 
   Tightness out;
@@ -140,7 +150,7 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
     const std::int64_t id = chosen[i];
     const BrickGold fine = brick_gold(truth, id, t.size()), exact = brick_gold(sharp, id, t.size()),
                     computed = brick_gold(given, id, t.size());
-    out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact));
+    out.gold_error = std::max(out.gold_error, interpolation_error(fine, exact, finer));
     for (std::int64_t z = 0; z < computed.side[2]; ++z)
       for (std::int64_t y = 0; y < computed.side[1]; ++y)
         for (std::int64_t x = 0; x < computed.side[0]; ++x) {

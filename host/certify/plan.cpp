@@ -47,7 +47,8 @@ std::vector<Rates> candidates(const RateOptions& wanted, bool cone) {
   if (cone && ((wanted.upsampling && *wanted.upsampling != 8) ||
                (wanted.interpolation && *wanted.interpolation != Interpolation::six_taps)))
     throw InputError(
-        "cone beam: gold is interpolated by six taps both ways on projections at 8x; `upsampling` can only be "
+        "cone beam: gold is interpolated by six taps both ways on projections at 8x; `upsampling` can only "
+        "be "
         "8, and `u_filter` six-taps");
   const auto interpolation =
       wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;

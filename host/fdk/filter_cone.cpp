@@ -149,7 +149,8 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
         throw not_finite(first + k);
       out.view_max[at(first + k)] = static_cast<double>(largest_magnitude(view));
       // Weighed samples were rounded; the filter makes at most its norm times theirs of that.
-      const double norm = largest_row_norm(std::span<const float>(weighed).subspan(at(k * size), at(size)), g),
+      const double norm =
+                       largest_row_norm(std::span<const float>(weighed).subspan(at(k * size), at(size)), g),
                    weight = of_view[at(first + k)];
       errors[at(first + k)] = filter->error(weight, norm, out.view_max[at(first + k)]) +
                               weight * kernel_norm * norm * (0x1p-24 + 0x1p-48) + 0x1p-126;

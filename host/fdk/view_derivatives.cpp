@@ -97,8 +97,8 @@ void contract(const Square& square, const Table& table, Table& out) {
 Corners box_corners(const Vec3& low, const Vec3& high) {
   Corners corners;
   for (std::size_t c = 0; c < 8; ++c)
-    corners.push_back({(c & 1) != 0 ? high[0] : low[0], (c & 2) != 0 ? high[1] : low[1],
-                       (c & 4) != 0 ? high[2] : low[2]});
+    corners.push_back(
+        {(c & 1) != 0 ? high[0] : low[0], (c & 2) != 0 ? high[1] : low[1], (c & 4) != 0 ? high[2] : low[2]});
   return corners;
 }
 

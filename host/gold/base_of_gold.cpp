@@ -23,7 +23,8 @@ Volume base_of_gold(opencl::State& state, KeptGold& kept, const Coverage& covera
   out.grid = grid;
   out.samples.assign(at(n[0] * n[1] * n[2]), 0.0f);
   const std::int64_t stride = column_stride(n[2]);
-  const auto rows = std::clamp<std::int64_t>(static_cast<std::int64_t>(band_bytes / 4) / (n[0] * stride), 1, n[1]);
+  const auto rows =
+      std::clamp<std::int64_t>(static_cast<std::int64_t>(band_bytes / 4) / (n[0] * stride), 1, n[1]);
   const opencl::DeviceArray<float> band(state, count(rows * n[0] * stride), "base samples");
   for (std::int64_t y0 = 0; y0 < n[1]; y0 += rows) {
     const std::int64_t ny = std::min(rows, n[1] - y0);

@@ -74,10 +74,11 @@ bool is_upright(const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; }
 }  // namespace
 
 InputError source_too_close(std::size_t view) {
-  return InputError(fmt::format(
-      "cone beam: nodes around the covered region reach the plane of the source of view {}; the source stands "
-      "too close to what all views see: no certificate can be made",
-      view));
+  return InputError(
+      fmt::format("cone beam: nodes around the covered region reach the plane of the source of view {}; the "
+                  "source stands "
+                  "too close to what all views see: no certificate can be made",
+                  view));
 }
 
 ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,

@@ -29,8 +29,8 @@ struct ConeLattice {
   double reach = 0;    ///< of nodes, across z, beyond the covered region
   double claimed = 0;  ///< alike, at most `reach`: as far as bounds hold; beyond it nodes are finite
   std::pair<double, double> claimed_z{};  ///< the heights between which they hold
-  std::int64_t low = 0, groups = 0;  ///< the lowest height, and how many groups of eight
-  std::int64_t stride = 0;           ///< floats from column to column of a tile, at least all heights
+  std::int64_t low = 0, groups = 0;       ///< the lowest height, and how many groups of eight
+  std::int64_t stride = 0;                ///< floats from column to column of a tile, at least all heights
 };
 
 /// Tiles of 32 x 32 columns of nodes on the device, one after another: float [tile][y][x][stride].

@@ -181,7 +181,8 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
   return filters_
       .emplace(key, cone_ ? cone_->best_filter(phases, key.second, to_int(2 * half_taps_)).filter.value()
-                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch), to_int(2 * half_taps_)))
+                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch),
+                                               to_int(2 * half_taps_)))
       .first->second;
 }
 
@@ -205,10 +206,9 @@ GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
   const double filters = cone_->filter_error(x, y, z);
   // What the filters round: a product in runs along z, one more than taps in either filter across z.
   const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double apart =
-      unit_roundoff * S *
-      (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
-       (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
+  const double apart = unit_roundoff * S *
+                       (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
+                        (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
   GoldErrors out;
   out.ramp = cone_->largest_weight() * filter_error_bound(upsampler_, scan_);
   out.interpolation = nodes * kept.interpolation + filters;
@@ -240,7 +240,8 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
 
   // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
-  // height by itself, product and filter; of each node by itself, one more than taps in either filter across z.
+  // height by itself, product and filter; of each node by itself, one more than taps in either filter across
+  // z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
   const double between = !few_rows() ? product_error(2 * half_taps_ + 8, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *

@@ -5,7 +5,9 @@
 
 #include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
+#include "vdvr/grid.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 
@@ -23,5 +25,10 @@ class VDVR_API CertifiedRegion {
  private:
   std::shared_ptr<const Coverage> coverage_;
 };
+
+/// The grid that a volume has by default: around the certified region, with cells of a pixel at the axis.
+/// Throws InputError as make_grid does.
+VDVR_API Grid certified_grid(const ProjectionSet& scan, const FieldOptions& field,
+                             const GridOptions& options);
 
 }  // namespace vdvr

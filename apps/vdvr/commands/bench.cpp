@@ -16,6 +16,7 @@
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/measure_tightness.hpp"
 #include "vdvr/simulate.hpp"
 
@@ -316,13 +317,19 @@ int bench_bounds(Arguments& args) {
   const CommonOptions common = common_options(args);
   FieldOptions field = field_options(args);
   const RateOptions rates = rate_options(args);
-  const Rates measured{rates.upsampling.value_or(8), rates.interpolation.value_or(Interpolation::linear),
-                       rates.gold.value_or(8)};
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
   field.center = center_of(field, scan.geometry);
-  const Grid grid = make_grid(scan.geometry, grid_options(args));
+  const Grid grid = certified_grid(scan, field, grid_options(args));
+  const Rates measured{
+      rates.upsampling.value_or(8),
+      rates.interpolation.value_or(scan.cone ? Interpolation::six_taps : Interpolation::linear),
+      rates.gold.value_or(8)};
+  if (scan.cone && (measured.upsampling != 8 || measured.interpolation != Interpolation::six_taps))
+    throw InputError(
+        "cone beam: gold is made of projections at 8x by six taps both ways; leave out `upsampling` and "
+        "`u-filter`");
   const auto start = Clock::now();
   const Tightness t = measure_tightness(device, scan, grid, field, measured, progress.callback());
   const double seconds = since(start);
