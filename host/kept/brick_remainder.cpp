@@ -27,8 +27,6 @@ constexpr std::int64_t block_bricks = 8;
 constexpr std::int64_t reach = 2;
 // fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
 constexpr double difference_rounding = 64;
-// Magnitudes of a fourth difference's weights, pure or mixed.
-constexpr double difference_norm = 16;
 
 }  // namespace
 
@@ -45,12 +43,11 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
   // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
   if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};
   if (!scan.views.empty())  // fewer where nodes are denser than half a pixel already
-    for (std::size_t a = 0; a < 3; ++a) nodes_.phases[a] = kept.rates()[a] > 2 ? 1 : 2;
+    for (std::size_t a = 0; a < 3; ++a) nodes_.phases[a] = kept.rates()[a] > 2 ? 2 : 4;
   for (std::size_t a = 0; a < 3; ++a) rates_[a] = kept.rates()[a] * nodes_.phases[a];
   bricks_ = Bricks(grid, granularity).along();
-  const GoldErrors errors = kept.errors(nodes_);
-  slack_ = difference_norm * (errors.interpolation + errors.rounding) +
-           difference_rounding * unit_roundoff * kept.sup();
+  slack_ = kept.fourth_errors(nodes_);
+  for (double& slack : slack_) slack += difference_rounding * unit_roundoff * kept.sup();
   if (scan.views.empty()) set_parallel(scan, sups);
   else set_cone();
   Vec3 spacing{};
@@ -97,7 +94,7 @@ void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sup
                  tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k])
                               : mixed_tail(norms[i], norms[j], norms[k]);
     factor_[d] = round_up(factor);
-    addend_[d] = round_up(factor * slack_ + tail * sups.value);
+    addend_[d] = round_up(factor * slack_[d] + tail * sups.value);
   }
 }
 
@@ -107,7 +104,7 @@ void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sup
 void BrickRemainder::set_cone() {
   for (std::size_t a = 0; a < 3; ++a) stencil_[a] = 1 + step_of_gold(a);
   factor_.fill(1);
-  addend_.fill(round_up(slack_));
+  std::transform(slack_.begin(), slack_.end(), addend_.begin(), [](double slack) { return round_up(slack); });
 }
 
 // What sixth derivatives add to X at places of some bricks that a tested cell's stencil reaches: those of the
@@ -144,13 +141,13 @@ BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Ind
 }
 
 // By brick, x fastest. Neighbours share theirs, since a sum over all views takes milliseconds: but no more of
-// them than an eighth of the region, whose lambda differs.
+// them than a twenty-fourth of the region, where lambda differs by little.
 std::vector<BrickRemainder::Maxima> BrickRemainder::addends_by_group(const Index3& first,
                                                                      const Index3& bricks) const {
   std::vector<Maxima> out(at(bricks[0] * bricks[1] * bricks[2]), Maxima{});
   if (scan_.views.empty()) return out;
   const std::int64_t group =
-      std::clamp<std::int64_t>(*std::max_element(bricks_.begin(), bricks_.end()) / 8, 1, 4);
+      std::clamp<std::int64_t>(*std::max_element(bricks_.begin(), bricks_.end()) / 24, 1, 4);
   const Index3 groups{(bricks[0] + group - 1) / group, (bricks[1] + group - 1) / group,
                       (bricks[2] + group - 1) / group};
   parallel_for(groups[0] * groups[1] * groups[2], {}, "", [&](std::int64_t n) {

@@ -61,7 +61,7 @@ class BrickRemainder {
   std::vector<Maxima> maxima_;           // with the rings; of cone beam with what sixth derivatives add
   std::vector<std::uint8_t> looked_at_;  // alike
   Maxima factor_{}, addend_{};           // of a difference, by which X is bounded
-  double slack_ = 0;                     // what a difference of computed gold errs
+  std::array<double, 6> slack_{};        // what differences of computed gold err
   double lowest_ = 0, lowest_z_ = 0;
   // Of cone beam, what the stencils of tested cells read.
   std::optional<RegionOutline> read_;

@@ -195,26 +195,52 @@ constexpr double curved_apart = 1.5;
 
 }  // namespace
 
+KeptGold::ConeParts KeptGold::cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
+  // What the filters round: a product in runs along z, one more than taps in either filter across z.
+  const double sums = 2 * static_cast<double>(half_taps_) + 1;
+  const double rounding =
+      unit_roundoff * cone_->sup() *
+      (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
+       (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
+  return {cone_->errors(), cone_->filter_error(x, y, z), rounding};
+}
+
 // Every kept node errs by itself.
 GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
   const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
                    &z = filter_of(lattice.phases[2], 2);
-  const double S = cone_->sup(), nodes = x.norm * y.norm * z.norm,
+  const double nodes = x.norm * y.norm * z.norm,
                curved =
                    (bend(x) * y.norm * z.norm + x.norm * bend(y) * z.norm + x.norm * y.norm * bend(z)) / 8;
-  const ConeTiles::Errors kept = cone_->errors();
-  const double filters = cone_->filter_error(x, y, z);
-  // What the filters round: a product in runs along z, one more than taps in either filter across z.
-  const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double apart = unit_roundoff * S *
-                       (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
-                        (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
+  const ConeParts parts = cone_parts(x, y, z);
   GoldErrors out;
   out.ramp = cone_->largest_weight() * filter_error_bound(upsampler_, scan_);
-  out.interpolation = nodes * kept.interpolation + filters;
-  out.curved_interpolation = curved * kept.interpolation + curved_apart * filters;
-  out.rounding = nodes * kept.rounding + apart;
-  out.curved_rounding = curved * kept.rounding + curved_apart * apart;
+  out.interpolation = nodes * parts.kept.interpolation + parts.filters;
+  out.curved_interpolation = curved * parts.kept.interpolation + curved_apart * parts.filters;
+  out.rounding = nodes * parts.kept.rounding + parts.rounding;
+  out.curved_rounding = curved * parts.kept.rounding + curved_apart * parts.rounding;
+  return out;
+}
+
+// Of cone beam a kept node's error passes through the filters, whose interpolant hardly bends from one node of
+// gold to the next.
+std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
+  constexpr double weights = 16;  // magnitudes of a fourth difference's, pure or mixed
+  std::array<double, 6> out{};
+  if (!cone_) {
+    const GoldErrors e = errors(lattice);
+    out.fill(weights * (e.interpolation + e.rounding));
+    return out;
+  }
+  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
+                   &z = filter_of(lattice.phases[2], 2);
+  const ConeParts parts = cone_parts(x, y, z);
+  const double node = parts.kept.interpolation + parts.kept.rounding,
+               apart = weights * (parts.filters + parts.rounding);
+  const auto pure = [](const GoldFilter& f) { return f.rate > 1 ? f.fourth_difference : weights; };
+  out = {pure(x) * y.norm * z.norm,    x.norm * pure(y) * z.norm,    x.norm * y.norm * pure(z),
+         bend(x) * bend(y) * z.norm, bend(x) * y.norm * bend(z), x.norm * bend(y) * bend(z)};
+  for (double& of_nodes : out) of_nodes = of_nodes * node + apart;
   return out;
 }
 

@@ -66,6 +66,8 @@ class KeptGold {
   [[nodiscard]] GoldLattice lattice(const Grid& grid, int rate) const;
   /// Cost: milliseconds for each new ratio.
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
+  /// What fourth differences of gold on that lattice err, xx, yy, zz, xy, xz, yz: of F^, rounding included.
+  [[nodiscard]] std::array<double, 6> fourth_errors(const GoldLattice& lattice);
 
   /// Back-projects what `boxes` will read and is not kept yet; where that is most of what can be kept, all of
   /// it, since the columns of the detector are upsampled anew each time. Throws ResourceError where memory
@@ -140,6 +142,12 @@ class KeptGold {
   void keep_heights(double reach);
   [[nodiscard]] ConeLattice cone_lattice(double reach) const;
   [[nodiscard]] double room_to_sources(double from, const std::pair<double, double>& heights) const;
+  /// What gold of cone beam errs: kept nodes, each by itself; filters between them, and their rounding.
+  struct ConeParts {
+    ConeTiles::Errors kept;
+    double filters = 0, rounding = 0;
+  };
+  ConeParts cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
   GoldErrors cone_errors(const GoldLattice& lattice);
   void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
