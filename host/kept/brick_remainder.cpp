@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <numbers>
 #include <stdexcept>
 
@@ -60,11 +61,14 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
   maxima_.resize(at(all[0] * all[1] * all[2]));
   looked_at_.resize(maxima_.size());
   // Columns that a stencil of a tested cell reads: the cell meets the covered region.
-  lowest_ = -(std::hypot(grid.spacing[0], grid.spacing[1]) +
+  constexpr double cell = 0.5;  // of gold at 2x
+  lowest_ = -(cell * std::hypot(grid.spacing[0], grid.spacing[1]) +
               static_cast<double>(stencil_[0]) * std::hypot(spacing[0], spacing[1])) *
             (1 + 1e-6);
-  lowest_z_ = -(grid.spacing[2] + static_cast<double>(stencil_[2]) * spacing[2]) * (1 + 1e-6);
+  lowest_z_ = -(cell * grid.spacing[2] + static_cast<double>(stencil_[2]) * spacing[2]) * (1 + 1e-6);
   if (scan.views.empty()) return;
+  sixth_.resize(at(bricks_[0] * bricks_[1] * bricks_[2]));
+  has_sixth_.resize(sixth_.size());
   const double read = static_cast<double>(reach) * std::hypot(spacing[0], spacing[1]) - lowest_,
                read_z = static_cast<double>(reach) * spacing[2] - lowest_z_;
   if (read > kept.claimed()[0] || read_z > kept.claimed()[2])
@@ -107,13 +111,13 @@ void BrickRemainder::set_cone() {
   std::transform(slack_.begin(), slack_.end(), addend_.begin(), [](double slack) { return round_up(slack); });
 }
 
-// What sixth derivatives add to X at places of some bricks that a tested cell's stencil reaches: those of the
-// differences' own stencils count.
+// What sixth derivatives add to X on some bricks and a stencil around them; those of the differences' own
+// stencils count.
 BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Index3& bricks) const {
   Vec3 low{}, high{}, square{};
   for (std::size_t a = 0; a < 3; ++a) {
     const double node = grid_.spacing[a] / static_cast<double>(rates_[a]),
-                 around = static_cast<double>(reach) * node,
+                 around = static_cast<double>(stencil_[a] + reach) * node,
                  side = static_cast<double>(granularity_) * grid_.spacing[a];
     low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side - around;
     high[a] = grid_.origin[a] + static_cast<double>(first[a] + bricks[a]) * side + around;
@@ -140,45 +144,32 @@ BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Ind
   return out;
 }
 
-// By brick, x fastest. Neighbours share theirs, since a sum over all views takes milliseconds: but no more of
-// them than a twenty-fourth of the region, where lambda differs by little.
-std::vector<BrickRemainder::Maxima> BrickRemainder::addends_by_group(const Index3& first,
-                                                                     const Index3& bricks) const {
-  std::vector<Maxima> out(at(bricks[0] * bricks[1] * bricks[2]), Maxima{});
-  if (scan_.views.empty()) return out;
+// Neighbours share theirs, since a sum over all views takes up to milliseconds: but no more of them than a
+// twenty-fourth of the region, where lambda differs by little.
+void BrickRemainder::add_sixth(const std::vector<std::uint8_t>& selected) {
   const std::int64_t group =
       std::clamp<std::int64_t>(*std::max_element(bricks_.begin(), bricks_.end()) / 24, 1, 4);
-  const Index3 groups{(bricks[0] + group - 1) / group, (bricks[1] + group - 1) / group,
-                      (bricks[2] + group - 1) / group};
-  parallel_for(groups[0] * groups[1] * groups[2], {}, "", [&](std::int64_t n) {
-    const Index3 begin{n % groups[0] * group, n / groups[0] % groups[1] * group,
-                       n / (groups[0] * groups[1]) * group};
-    Index3 size{}, place{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      size[a] = std::min(group, bricks[a] - begin[a]);
-      place[a] = first[a] + begin[a];
-    }
-    if (!is_read(place, size)) return;
-    const Maxima of_group = addends_of(place, size);
-    for (std::int64_t z = 0; z < size[2]; ++z)
-      for (std::int64_t y = 0; y < size[1]; ++y)
-        for (std::int64_t x = 0; x < size[0]; ++x)
-          out[at(((begin[2] + z) * bricks[1] + begin[1] + y) * bricks[0] + begin[0] + x)] = of_group;
-  });
-  return out;
-}
-
-// Whether a tested cell's stencil may reach these bricks.
-bool BrickRemainder::is_read(const Index3& first, const Index3& bricks) const {
-  Vec3 low{}, size{};
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double side = static_cast<double>(granularity_) * grid_.spacing[a];
-    low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side;
-    size[a] = static_cast<double>(bricks[a]) * side;
+  const Bricks bricks(grid_, granularity_);
+  std::set<Index3> firsts;
+  for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
+    if (!selected[at(brick)] || has_sixth_[at(brick)]) continue;
+    const Index3 p = bricks.position(brick);
+    firsts.insert({p[0] / group * group, p[1] / group * group, p[2] / group * group});
   }
-  return coverage_.margin(low[0] + 0.5 * size[0], low[1] + 0.5 * size[1]) >=
-             lowest_ - 0.5 * std::hypot(size[0], size[1]) &&
-         coverage_.margin_z(low[2] + 0.5 * size[2]) >= lowest_z_ - 0.5 * size[2];
+  const std::vector<Index3> groups(firsts.begin(), firsts.end());
+  parallel_for(static_cast<std::int64_t>(groups.size()), {}, "", [&](std::int64_t n) {
+    const Index3& first = groups[at(n)];
+    Index3 size{};
+    for (std::size_t a = 0; a < 3; ++a) size[a] = std::min(group, bricks_[a] - first[a]);
+    const Maxima of_group = addends_of(first, size);
+    for (std::int64_t z = first[2]; z < first[2] + size[2]; ++z)
+      for (std::int64_t y = first[1]; y < first[1] + size[1]; ++y)
+        for (std::int64_t x = first[0]; x < first[0] + size[0]; ++x) {
+          const std::size_t i = at((z * bricks_[1] + y) * bricks_[0] + x);
+          sixth_[i] = of_group;
+          has_sixth_[i] = 1;
+        }
+  });
 }
 
 std::size_t BrickRemainder::slot(const Index3& p) const {
@@ -188,6 +179,7 @@ std::size_t BrickRemainder::slot(const Index3& p) const {
 }
 
 void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Progress& progress) {
+  if (!scan_.views.empty()) add_sixth(selected);
   const Bricks bricks(grid_, granularity_);
   std::vector<std::uint8_t> wanted(maxima_.size(), 0);
   for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
@@ -280,15 +272,12 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
                                side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
                                static_cast<float>(lowest_)});
   const std::vector<float> found = out.to_host();
-  const std::vector<Maxima> addends = addends_by_group(first, bricks);
   for (std::int64_t z = 0; z < bricks[2]; ++z)
     for (std::int64_t y = 0; y < bricks[1]; ++y)
       for (std::int64_t x = 0; x < bricks[0]; ++x) {
         const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
         const std::int64_t brick = (z * bricks[1] + y) * bricks[0] + x;
-        for (std::size_t d = 0; d < 6; ++d)
-          maxima_[i][d] = round_up(static_cast<double>(found[at(brick * 6) + d]) +
-                                   static_cast<double>(addends[at(brick)][d]));
+        std::copy_n(found.begin() + brick * 6, 6, maxima_[i].begin());
         looked_at_[i] = 1;
       }
 }
@@ -305,7 +294,8 @@ float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
     square[a] = std::pow(static_cast<double>(lattice.step[a]) * nodes_.phases[a] / lattice.phases[a], 2);
   const auto sup = [&](std::size_t d) {
     return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) +
-           static_cast<double>(addend_[d]);
+           static_cast<double>(addend_[d]) +
+           (sixth_.empty() ? 0.0 : static_cast<double>(sixth_[at(brick)][d]));
   };
   const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) +
                       square[2] * square[2] * sup(2),

@@ -39,8 +39,7 @@ class BrickRemainder {
   }
   void set_parallel(const FilteredScan& scan, const FieldSups& sups);
   void set_cone();
-  [[nodiscard]] std::vector<Maxima> addends_by_group(const Index3& first, const Index3& bricks) const;
-  [[nodiscard]] bool is_read(const Index3& first, const Index3& bricks) const;
+  void add_sixth(const std::vector<std::uint8_t>& selected);
   [[nodiscard]] std::pair<int, int> heights_read(const GoldBox& box) const;
   [[nodiscard]] Maxima addends_of(const Index3& first, const Index3& bricks) const;
   [[nodiscard]] std::size_t slot(const Index3& position) const;
@@ -58,10 +57,12 @@ class BrickRemainder {
   Index3 rates_{};                       // nodes to a cell
   Index3 bricks_{}, rings_{};            // of the grid, and of bricks around it
   Index3 stencil_{};                     // nodes around the brick that X looks at
-  std::vector<Maxima> maxima_;           // with the rings; of cone beam with what sixth derivatives add
+  std::vector<Maxima> maxima_;           // with the rings
   std::vector<std::uint8_t> looked_at_;  // alike
   Maxima factor_{}, addend_{};           // of a difference, by which X is bounded
-  std::array<double, 6> slack_{};        // what differences of computed gold err
+  std::vector<Maxima> sixth_;            // what sixth derivatives add by brick; of cone beam alone
+  std::vector<std::uint8_t> has_sixth_;
+  std::array<double, 6> slack_{};  // what differences of computed gold err
   double lowest_ = 0, lowest_z_ = 0;
   // Of cone beam, what the stencils of tested cells read.
   std::optional<RegionOutline> read_;
