@@ -27,6 +27,9 @@ std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 
 // Gold cells of a piece's side at most: what is computed at once stays small whatever the rate.
 constexpr std::int64_t most_cells = 64;
 
+// Of cone beam, heights of nodes that are back-projected together, but for those around them.
+constexpr std::int64_t most_heights = 128;
+
 /// Host memory counted against --max-memory.
 class HostShare {
  public:
@@ -321,6 +324,27 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
   return p;
 }
 
+// Of cone beam: neighbouring layers of bricks together, whose heights around them are then the same.
+std::vector<std::vector<std::uint8_t>> VerifyField::joined(std::vector<std::vector<std::uint8_t>> layers,
+                                                           const std::vector<std::uint8_t>& selected) const {
+  const Index3 n = volume_.bricks();
+  const auto together =
+      std::max<std::int64_t>(1, most_heights / (std::int64_t{volume_.granularity} * rates_of_cone_.along));
+  std::vector<std::vector<std::uint8_t>> out;
+  std::int64_t first = -1, last = -1;
+  for (const std::vector<std::uint8_t>& layer : layers) {
+    const std::int64_t z = Box(n, layer).first[2];
+    if (!out.empty() && z == last + 1 && z < first + together) {
+      out.back() = layers_of(selected, n, 2, first, z + 1);
+    } else {
+      out.push_back(layer);
+      first = z;
+    }
+    last = z;
+  }
+  return out;
+}
+
 // The detector's rows serve all heights; where fewer heights are asked for, they are made themselves, layer
 // by layer of bricks. Both in bands of bricks whose nodes fit the memory.
 std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint8_t>& selected,
@@ -337,6 +361,7 @@ std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint
   // Of cone beam no two nodes see the same rows.
   const bool rows = field_.views().empty() && field_.geometry().rows <= heights;
   if (rows) runs.assign(1, selected);
+  if (!field_.views().empty()) runs = joined(std::move(runs), selected);
   const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
   std::vector<Part> parts;
   for (const std::vector<std::uint8_t>& run : runs) {
