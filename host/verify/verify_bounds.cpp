@@ -22,7 +22,7 @@ constexpr std::int64_t sup_density = 3;  // points per pixel where sups are samp
 }  // namespace
 
 SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& g,
-                   const Progress& progress) {
+                     const Progress& progress) {
   const std::int64_t U = g.columns, V = g.rows, K = g.views();
   // One row does not vary along v. Else rows at every third of a pixel, from edge to edge of the half period.
   const std::int64_t heights = V == 1 ? 1 : sup_density * V + 1,
@@ -77,7 +77,7 @@ struct Sums {
 
 // docs/error-bounds.md, "What verify does", step 1: each row of its table is one kind.
 std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const ParallelGeometry& g,
-                                   const Vec3& h, const NodePath& path) {
+                                     const Vec3& h, const NodePath& path) {
   const double d = g.pitch_u / static_cast<double>(fine_columns),
                slope = std::min(pi / g.pitch_u * S.value, std::sqrt(2 * S.value * S.second_u));
   const double columns = static_cast<double>(fine_columns * (g.columns + 2)),
@@ -134,8 +134,8 @@ void add_errors(FieldBounds& b, const KindOfError& kind) {
   }
 }
 
-FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
-                         const NodePath& path) {
+FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const ParallelGeometry& g,
+                         const Vec3& h, const NodePath& path) {
   const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
   const std::size_t K = sups.value.size();
   // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.

@@ -29,7 +29,7 @@ struct SupsByView {
 /// Cost: views * 18 rows * columns * (rows + columns) multiply-adds on the host. `coefficients` double
 /// [view][m][l].
 SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
-                   const Progress& progress);
+                     const Progress& progress);
 
 /// How F is computed at nodes of gold (verify_nodes.hpp).
 struct NodePath {

@@ -101,7 +101,8 @@ double factorial(std::size_t n) {
 Polynomial weighted(const Sups& sups, std::size_t n) {
   Polynomial out{};
   for (std::size_t p = 0; p <= n; ++p)
-    for (std::size_t r = 0; p + r <= n; ++r) out[p][r] = factorial(n + 1) / factorial(p + r + 1) * sups.of(p, r);
+    for (std::size_t r = 0; p + r <= n; ++r)
+      out[p][r] = factorial(n + 1) / factorial(p + r + 1) * sups.of(p, r);
   return out;
 }
 
@@ -152,22 +153,21 @@ void add_derivatives(EvenDerivatives& out, const ViewOnBox& v, const Sups& sups)
 
 /// The sums over the views of what nodes and lines of nodes err.
 struct NodeSums {
-  double value = 0;      // lambda^-2 sup |q|
-  double weight = 0;     // the largest lambda^-2
-  double places = 0;     // what wrong places change
-  double between = 0;    // what interpolation errs in tables
-  Vec3 along{};          // what interpolation along each axis errs between nodes
+  double value = 0;    // lambda^-2 sup |q|
+  double weight = 0;   // the largest lambda^-2
+  double places = 0;   // what wrong places change
+  double between = 0;  // what interpolation errs in tables
+  Vec3 along{};        // what interpolation along each axis errs between nodes
 };
 
 // |f'|^2 <= 2 sup |f| sup |f''| on a line (Landau), and Bernstein.
 double slope(double value, double second) { return std::min(pi * value, std::sqrt(2 * value * second)); }
 
-// Twelve points of Lagrange along an axis, `factor` places to a node: the twelfth derivative (at j derivatives
-// of q along X, (12 choose j) 13! / (j + 1)! times (pi (|X_u| + |X_v|))^j) times what the product of the
-// distances to the points is at most.
+// Twelve points of Lagrange along an axis, `factor` places to a node: the twelfth derivative (at j
+// derivatives of q along X, (12 choose j) 13! / (j + 1)! times (pi (|X_u| + |X_v|))^j) times what the product
+// of the distances to the points is at most.
 double lagrange_share(const ViewOnBox& v, const Sups& sups, std::size_t axis, int factor) {
-  const double band =
-                   factor * pi * (v.across_u[axis] + (sups.varies_along_v() ? v.across_v[axis] : 0.0)),
+  const double band = factor * pi * (v.across_u[axis] + (sups.varies_along_v() ? v.across_v[axis] : 0.0)),
                growth = factor * v.growth[axis];
   constexpr auto n = static_cast<std::size_t>(lagrange_points);
   double sum = 0;
@@ -196,16 +196,15 @@ void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePa
 // docs/error-bounds.md, "What verify does", "Cone beam": nodes, then what is made of them.
 void add_kinds(FieldBounds& b, const NodeSums& S, const ConePath& p) {
   constexpr double weights = 1.4883 * 1.4883;  // sums of magnitudes of the points' weights, both ways
-  const double roundings = 56 + 10 * p.nodes.cancellation +
-                           static_cast<double>(p.nodes.together + p.nodes.calls),
+  const double roundings =
+                   56 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
                node = S.places + S.between + weights * 1.01 * u * roundings * S.value +
                       weights * S.weight * p.host_rounding;
   const LagrangeFilter across = lagrange_filter(p.path.across), along = lagrange_filter(p.path.along);
   const AxisNorms each;
   add_errors(b, {node, {across.norms, across.norms, along.norms}});
   const double row_runs = static_cast<double>((p.path.terms + rows_per_run - 1) / rows_per_run),
-               product =
-                   1.01 * u * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * u);
+               product = 1.01 * u * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * u);
   if (p.path.along > 1)
     add_errors(b, {along.norms.value * product * S.value, {across.norms, across.norms, each}});
   // Along z first, then y, then x: what comes later passes on what went wrong before.
@@ -260,8 +259,8 @@ FieldBounds cone_field_bounds(std::span<const ViewMatrix> views, const SupsByVie
   return b;
 }
 
-double cone_derivative(const ViewMatrix& view, const std::array<int, 3>& orders, double value, double second_u,
-                       double second_v, const ConeBox& box, const Vec3& spacing) {
+double cone_derivative(const ViewMatrix& view, const std::array<int, 3>& orders, double value,
+                       double second_u, double second_v, const ConeBox& box, const Vec3& spacing) {
   const ViewOnBox v = look(view, box, spacing);
   Polynomial f{};
   f[0][0] = 1;

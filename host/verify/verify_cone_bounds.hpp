@@ -32,7 +32,7 @@ FieldBounds cone_field_bounds(std::span<const ViewMatrix> views, const SupsByVie
 
 /// At least |derivative of lambda^-2 q| of `orders` along x, y and z, anywhere on the box, times the spacing
 /// to those orders. `value`, `second_u`, `second_v`: sups of |q|, |q_uu|, |q_vv| per pixel. For tests.
-double cone_derivative(const ViewMatrix& view, const std::array<int, 3>& orders, double value, double second_u,
-                       double second_v, const ConeBox& box, const Vec3& spacing);
+double cone_derivative(const ViewMatrix& view, const std::array<int, 3>& orders, double value,
+                       double second_u, double second_v, const ConeBox& box, const Vec3& spacing);
 
 }  // namespace vdvr

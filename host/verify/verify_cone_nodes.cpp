@@ -24,8 +24,8 @@ static_assert(sizeof(VdvrVerifyCone) == 36);
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double u = 0x1p-24;                     // rounding unit of fp32
-constexpr std::int64_t tile = VDVR_VERIFY_TILE;   // nodes of its side
+constexpr double u = 0x1p-24;                    // rounding unit of fp32
+constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
 constexpr std::int64_t block = VDVR_VERIFY_CONE_BLOCK;
 constexpr std::int64_t before = cone_points / 2 - 1;  // points that a polynomial takes before the place
 constexpr std::int64_t most_rows = 64;                // summed at a time, so that their lines stay in cache
@@ -63,8 +63,8 @@ ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage,
       const double phi = 2 * pi * d / directions, r = coverage.inner_radius();
       for (const ViewMatrix& m : field.views())
         for (std::size_t a = 0; a < 3; ++a)
-          band[a] = std::max(band[a],
-                             band_at(m, {r * std::cos(phi), r * std::sin(phi), z}, a, field.geometry().rows > 1));
+          band[a] = std::max(
+              band[a], band_at(m, {r * std::cos(phi), r * std::sin(phi), z}, a, field.geometry().rows > 1));
     }
   const auto rate = [](double radians) {
     int n = 1;
@@ -218,8 +218,7 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
   const auto even = std::clamp<std::int64_t>(std::llround(std::sqrt(static_cast<double>(K))), 8, 32);
   const std::uint64_t each = sizeof(float) * count(window.columns * window.rows),
                       share = std::min(state_.memory.left() / 4, state_.info.max_allocation);
-  facts.together =
-      std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1, std::min(even, K));
+  facts.together = std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1, std::min(even, K));
   facts.calls = (K + facts.together - 1) / facts.together;
   Table table(state_, window, facts.together);
   const opencl::DeviceArray<cl_int2> device_tiles(state_, std::span<const cl_int2>(tiles), "tiles of nodes");
@@ -245,8 +244,8 @@ struct Place {
 // (n0 + sum_e n_e d_e) / (l0 + sum_e l_e d_e) less its value m in the middle is sum_e (n_e - m l_e) d_e over
 // lambda. Numerator: five roundings of each term. Lambda: five, of terms `cancellation` as large as itself;
 // its reciprocal 2.5 units in the last place, the product one. Then the sum with what is left of the middle.
-Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing, double lambda_min,
-               double cancellation, std::int64_t first) {
+Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing,
+               double lambda_min, double cancellation, std::int64_t first) {
   Place out;
   double reach = 0;
   for (std::size_t e = 0; e < 3; ++e) {
@@ -295,8 +294,10 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
           }
           out.lambda.s[3] = static_cast<float>(seen[2]);
           const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
-          const Place at_u = place_of(m, 0, seen, wanted.spacing, least, cancellation, table.window.first_column),
-                      at_v = place_of(m, 1, seen, wanted.spacing, least, cancellation, table.window.first_row);
+          const Place at_u = place_of(m, 0, seen, wanted.spacing, least, cancellation,
+                                      table.window.first_column),
+                      at_v =
+                          place_of(m, 1, seen, wanted.spacing, least, cancellation, table.window.first_row);
           out.u = at_u.numbers;
           out.v = at_v.numbers;
           out.whole = {{at_u.whole, at_v.whole, 0, 0}};
@@ -321,8 +322,9 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                                .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
     const std::int64_t groups = wanted.heights / VDVR_VERIFY_CONE_HEIGHTS;
-    kernel({{count(groups), count(tile), count(n)}, {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}},
-           nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
+    kernel(
+        {{count(groups), count(tile), count(n)}, {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}},
+        nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
     opencl::finish(state_, "nodes of the field to verify against");  // before the numbers go
   }
 }

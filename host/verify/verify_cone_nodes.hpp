@@ -42,8 +42,8 @@ class VerifyConeNodes {
 
   /// An array of nodes [y][x][heights] in tiles of VDVR_VERIFY_TILE columns a side.
   struct Nodes {
-    Vec3 first{}, spacing{};           ///< where the first lies, and how far apart they are
-    std::int64_t nx = 0, heights = 0;  ///< of the array; heights to a multiple of 16
+    Vec3 first{}, spacing{};                         ///< where the first lies, and how far apart they are
+    std::int64_t nx = 0, heights = 0;                ///< of the array; heights to a multiple of 16
     std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
   };
   /// Writes those of the wanted tiles that are not too far out. Throws InputError where such a tile reaches a
@@ -57,8 +57,8 @@ class VerifyConeNodes {
   [[nodiscard]] Window window_of(const Nodes& wanted, const std::vector<cl_int2>& tiles) const;
   void fill(Table& table, std::int64_t first_view) const;
   void back_project(const Nodes& wanted, const std::vector<cl_int2>& tiles, const Table& table,
-                    const opencl::DeviceArray<cl_int2>& device_tiles,
-                    const opencl::DeviceArray<float>& nodes, ConeNodeFacts& facts);
+                    const opencl::DeviceArray<cl_int2>& device_tiles, const opencl::DeviceArray<float>& nodes,
+                    ConeNodeFacts& facts);
 
   opencl::State& state_;
   const ExactField& field_;

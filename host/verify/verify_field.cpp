@@ -278,8 +278,7 @@ std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> s
     const double x = grid.origin[0] + (static_cast<double>(i % n[0]) + 0.5) * g * grid.spacing[0],
                  y = grid.origin[1] + (static_cast<double>(i / n[0] % n[1]) + 0.5) * g * grid.spacing[1];
     if (coverage_.margin(x, y) < -(0.5 * g + 1) * diagonal) selected[at(i)] = 0;
-    const double z =
-        grid.origin[2] + (static_cast<double>(i / n[0] / n[1]) + 0.5) * g * grid.spacing[2];
+    const double z = grid.origin[2] + (static_cast<double>(i / n[0] / n[1]) + 0.5) * g * grid.spacing[2];
     if (coverage_.margin_z(z) < -(0.5 * g + 1) * grid.spacing[2]) selected[at(i)] = 0;
   }
   return selected;

@@ -96,8 +96,8 @@ class VerifyField {
   struct Part;
   [[nodiscard]] std::vector<Part> parts_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates) const;
-  [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(std::vector<std::vector<std::uint8_t>> layers,
-                                                              const std::vector<std::uint8_t>& selected) const;
+  [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(
+      std::vector<std::vector<std::uint8_t>> layers, const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] VerifyNodes::Part nodes_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates, bool rows) const;
   [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;

@@ -18,8 +18,8 @@
 
 namespace vdvr {
 
-/// Of parallel beam, nodes to a cell of the grid across z: the smallest power of two with which they lie at most a quarter of a
-/// pixel apart. 2^24 where none does.
+/// Of parallel beam, nodes to a cell of the grid across z: the smallest power of two with which they lie at
+/// most a quarter of a pixel apart. 2^24 where none does.
 int nodes_across(const Grid& grid, const ParallelGeometry& geometry);
 
 class VerifyNodes {
@@ -56,8 +56,8 @@ class VerifyNodes {
   VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, const Grid& grid,
               double unit, double furthest);
 
-  /// Back-projects. Cost (of cone beam, verify_cone_nodes.hpp): rows * columns * 12 * (rows + columns / 2) multiply-adds a view on the host, 7
-  /// multiply-adds a view and value on the device.
+  /// Back-projects. Cost (of cone beam, verify_cone_nodes.hpp): rows * columns * 12 * (rows + columns / 2)
+  /// multiply-adds a view on the host, 7 multiply-adds a view and value on the device.
   void make(const Part& part);
 
   /// float gold[block][y][x][z_padded] of the part made last. Nodes without a complete stencil in it are

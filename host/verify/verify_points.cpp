@@ -31,9 +31,8 @@ FieldPoints::FieldPoints(const ExactField& exact, const CertifiedRegion& region,
   const auto wanted =
       std::clamp(static_cast<std::int64_t>(most_work / (2 * row * static_cast<double>(g.rows))), least_bricks,
                  most_bricks);
-  nodes_each_ =
-      std::max(cone ? least_cone_nodes : least_nodes,
-               std::min(most_points, static_cast<std::int64_t>(most_work / point)) / (2 * wanted));
+  nodes_each_ = std::max(cone ? least_cone_nodes : least_nodes,
+                         std::min(most_points, static_cast<std::int64_t>(most_work / point)) / (2 * wanted));
   const Bricks bricks(volume.grid, volume.granularity);
   for (std::size_t i = 0; i < selected.size(); ++i) {
     Vec3 middle{};

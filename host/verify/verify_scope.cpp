@@ -58,8 +58,9 @@ void compare_views(Compare& out, const nlohmann::json& g, const std::optional<Co
     const double magnitude =
         i % 4 < 3 ? std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2])}) : 1 + std::abs(row[3]);
     if (std::abs(numbers[i] - wanted) <= 0x1p-44 * magnitude) continue;
-    return out.differs(fmt::format("options.geometry.cone.matrices[{}] (view {}, row {}, column {}) is {}, not {}",
-                                   i, i / 12, i % 12 / 4, i % 4, numbers[i], wanted));
+    return out.differs(
+        fmt::format("options.geometry.cone.matrices[{}] (view {}, row {}, column {}) is {}, not {}", i,
+                    i / 12, i % 12 / 4, i % 4, numbers[i], wanted));
   }
 }
 

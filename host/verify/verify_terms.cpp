@@ -35,9 +35,9 @@ struct Filtered {
         units(of_scan),
         scan(filter_scan(device, projections, field, progress, Precision::fp64, units)),
         upsampler(device, scan, ColumnMethod::accurate) {
-    sups = is_cone()                                   ? cone_sups(device, upsampler, scan)
+    sups = is_cone()                                  ? cone_sups(device, upsampler, scan)
            : interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan)
-                                                       : field_sups(device, upsampler, scan);
+                                                      : field_sups(device, upsampler, scan);
   }
   Filtered(const Filtered&) = delete;
   Filtered& operator=(const Filtered&) = delete;

@@ -8,13 +8,13 @@
 #define VDVR_VERIFY_CONE_BLOCK 16
 
 typedef struct {
-  int accumulate;      // whether the views are added to what the nodes hold, or written
-  int views;           // in the table
-  int columns, rows;   // of a view of the table
-  int first_tile;      // of the tiles whose blocks have their numbers here
-  int tiles;           // so many
-  int blocks;          // of heights
-  int nx, all_heights; // of the array of nodes
+  int accumulate;       // whether the views are added to what the nodes hold, or written
+  int views;            // in the table
+  int columns, rows;    // of a view of the table
+  int first_tile;       // of the tiles whose blocks have their numbers here
+  int tiles;            // so many
+  int blocks;           // of heights
+  int nx, all_heights;  // of the array of nodes
 } VdvrVerifyCone;
 
 #endif

@@ -18,9 +18,9 @@ static inline __attribute__((always_inline)) float8 lagrange(float f) {
   const float8 a = (f - (float8)(-2, -1, 0, 1, 2, 3, 4, -3)) * (f - (float8)(-1, 0, 1, 2, 3, 4, -3, -2)),
                b = (f - (float8)(0, 1, 2, 3, 4, -3, -2, -1)) * (f - (float8)(1, 2, 3, 4, -3, -2, -1, 0)),
                c = (f - (float8)(2, 3, 4, -3, -2, -1, 0, 1)) * (f - (float8)(3, 4, -3, -2, -1, 0, 1, 2)),
-               d = (f - (float8)(4, -3, -2, -1, 0, 1, 2, 3)) *
-                   (float8)(-1.0f / 5040, 1.0f / 720, -1.0f / 240, 1.0f / 144, -1.0f / 144, 1.0f / 240,
-                            -1.0f / 720, 1.0f / 5040);
+               d = (f - (float8)(4, -3, -2, -1, 0, 1, 2, 3)) * (float8)(-1.0f / 5040, 1.0f / 720, -1.0f / 240,
+                                                                        1.0f / 144, -1.0f / 144, 1.0f / 240,
+                                                                        -1.0f / 720, 1.0f / 5040);
   return (a * b) * (c * d);
 }
 
@@ -31,14 +31,13 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
 }
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*rows)
-#define ADD(n, at_u, weight, at_v, part_v)                                                             \
-  {                                                                                                    \
-    __global const float* from =                                                                       \
-        plane + (size_t)clamp(at_u, 0, last_column) * rows + clamp(at_v, 0, last_row);                 \
-    sum##n += lagrange(part_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) +                      \
-                                  weight.s2 * COLUMN(2) + weight.s3 * COLUMN(3) +                      \
-                                  weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5) +                      \
-                                  weight.s6 * COLUMN(6) + weight.s7 * COLUMN(7));                      \
+#define ADD(n, at_u, weight, at_v, part_v)                                                                \
+  {                                                                                                       \
+    __global const float* from =                                                                          \
+        plane + (size_t)clamp(at_u, 0, last_column) * rows + clamp(at_v, 0, last_row);                    \
+    sum##n += lagrange(part_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) + weight.s2 * COLUMN(2) + \
+                                  weight.s3 * COLUMN(3) + weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5) + \
+                                  weight.s6 * COLUMN(6) + weight.s7 * COLUMN(7));                         \
   }
 
 #define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
@@ -46,10 +45,10 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
 #if VDVR_UPRIGHT
 #define PART(n) ADD(n, column, weight, row.s##n, part_v.s##n)
 #else
-#define PART(n)                                                                       \
-  {                                                                                   \
-    const float8 weight = (inverse.s##n * inverse.s##n) * lagrange(part_u.s##n);      \
-    ADD(n, column.s##n, weight, row.s##n, part_v.s##n)                                \
+#define PART(n)                                                                  \
+  {                                                                              \
+    const float8 weight = (inverse.s##n * inverse.s##n) * lagrange(part_u.s##n); \
+    ADD(n, column.s##n, weight, row.s##n, part_v.s##n)                           \
   }
 #endif
 #define PUT(n) to[n] = accumulate ? to[n] + sum_of(sum##n) : sum_of(sum##n);
@@ -66,9 +65,8 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
             last_row = s.rows - 8, height = group * VDVR_VERIFY_CONE_HEIGHTS;
   const size_t plane_size = (size_t)s.columns * (size_t)s.rows;
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
-  const float8 dz =
-      (float8)(0, 1, 2, 3, 4, 5, 6, 7) +
-      ((float)(height - block * VDVR_VERIFY_CONE_BLOCK) - 0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1));
+  const float8 dz = (float8)(0, 1, 2, 3, 4, 5, 6, 7) + ((float)(height - block * VDVR_VERIFY_CONE_BLOCK) -
+                                                        0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1));
   const int2 first = tiles[s.first_tile + tile];
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * views;
   for (int x = 0; x < VDVR_VERIFY_TILE; ++x) {

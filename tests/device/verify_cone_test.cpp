@@ -52,9 +52,14 @@ std::vector<Case> cases() {
   displaced.shift = 2.5;
   displaced.views = 30;
   arc.arc_deg = 230;
-  return {{"5 degrees", orbit(80)},     {"15 degrees", orbit(26)}, {"tilted", tilted},
-          {"displaced", displaced},     {"short scan", arc},       {"fan beam", orbit(50, 1)},
-          {"cells of .6 pixels", orbit(50), 0.6}, {"cells of two pixels", orbit(50), 2}};
+  return {{"5 degrees", orbit(80)},
+          {"15 degrees", orbit(26)},
+          {"tilted", tilted},
+          {"displaced", displaced},
+          {"short scan", arc},
+          {"fan beam", orbit(50, 1)},
+          {"cells of .6 pixels", orbit(50), 0.6},
+          {"cells of two pixels", orbit(50), 2}};
 }
 
 /// The covered cylinder and a little more.
@@ -135,7 +140,8 @@ Worst compare(const ExactField& exact, const Coverage& coverage, const Grid& gri
       p[a] = grid.origin[a] + static_cast<double>(node[a] - 2) / rate * grid.spacing[a];
     if (coverage.margin(p[0], p[1]) < -reach) continue;
     points.push_back(p);
-    values.push_back(static_cast<double>(gold.values[at((node[1] * gold.n + node[0]) * gold.z_padded + node[2])]));
+    values.push_back(
+        static_cast<double>(gold.values[at((node[1] * gold.n + node[0]) * gold.z_padded + node[2])]));
   }
   Worst w;
   w.nodes = static_cast<std::int64_t>(points.size());
@@ -220,7 +226,8 @@ BOOST_AUTO_TEST_CASE(derivatives_are_bounded_as_build_bounds_them) {
       for (int x = 0; x <= 6; ++x)
         for (int y = 0; x + y <= 6; ++y)
           for (int z = 0; x + y + z <= 6; ++z) {
-            const double own = cone_derivative(m, {x, y, z}, sups.value, sups.second_u, sups.second_v, box, {1, 1, 1}),
+            const double own = cone_derivative(m, {x, y, z}, sups.value, sups.second_u, sups.second_v, box,
+                                               {1, 1, 1}),
                          theirs = derivative_bound(view_box(m, box.low, box.high), {x, y, z}, sups);
             // Either is widened by some thousand roundings.
             BOOST_TEST(std::abs(own - theirs) <= 0x1p-30 * theirs, c.name << ": " << x << y << z);
@@ -281,7 +288,8 @@ BOOST_AUTO_TEST_CASE(no_point_exceeds_the_bound_of_its_brick) {
       std::vector<double> total(volume.level.size(), -1);
       field.run(
           std::vector<std::uint8_t>(volume.level.size(), 1), rate,
-          [&](const VerifyField::Piece& p) { total[at(p.brick)] = std::max(total[at(p.brick)], p.total); }, {});
+          [&](const VerifyField::Piece& p) { total[at(p.brick)] = std::max(total[at(p.brick)], p.total); },
+          {});
       std::mt19937 random(5);
       std::vector<Vec3> points;
       const Grid& g = volume.grid;
@@ -360,9 +368,7 @@ BOOST_AUTO_TEST_CASE(certificates_of_other_views_are_refused_by_name) {
   });
   BOOST_TEST(!matrix.holds);
   BOOST_TEST(names(matrix.differences, "options.geometry.cone.matrices[37] (view 3, row 0, column 1)"));
-  const VerifyResult fewer = changed([](auto& g) {
-    g["cone"]["matrices"].erase(0);
-  });
+  const VerifyResult fewer = changed([](auto& g) { g["cone"]["matrices"].erase(0); });
   BOOST_TEST(names(fewer.differences, "the number of matrices"));
   const VerifyResult redundancy = changed([](auto& g) { g["cone"]["redundancy"] = "short-scan"; });
   BOOST_TEST(names(redundancy.differences, "redundancy"));
@@ -388,7 +394,8 @@ BOOST_AUTO_TEST_CASE(edited_terms_are_told) {
                      if (c.total_image3d) *c.total_image3d -= less;
                    }).differences,
                    "the arithmetic term"));
-  BOOST_TEST(names(changed([](Certificate& c) { c.not_covered_count += 1; }).differences, "not_covered.count"));
+  BOOST_TEST(
+      names(changed([](Certificate& c) { c.not_covered_count += 1; }).differences, "not_covered.count"));
   BOOST_TEST(!changed([](Certificate& c) { c.reference_range *= 1.01; }).holds);
 }
 
@@ -403,8 +410,7 @@ BOOST_AUTO_TEST_CASE(points_are_drawn_in_the_certified_cylinder) {
   BOOST_TEST(!points.bricks().empty());
   VerifyField field(support::device().state(), exact, volume, {}, {});
   field.look_at(points.bricks(), points.nodes_each(), 1);
-  field.run(
-      points.flags(), 8, [](const VerifyField::Piece&) {}, {});
+  field.run(points.flags(), 8, [](const VerifyField::Piece&) {}, {});
   BOOST_TEST(field.seen().size() > 50);
   for (const VerifyField::Node& node : field.seen()) BOOST_TEST(region.contains(node.at));
   BOOST_TEST(FieldPoints::compare(exact, field.seen(), {}).failure.empty());
