@@ -209,7 +209,18 @@ class TestedBricks {
       return undecided(b) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
                               rate <= 2 * std::max(first, field_.least_rate(i)));
     };
-    run(selected, rates, wants, result);
+    if (!field_.nodes_are_dear()) return run(selected, rates, wants, result);
+    // Few bricks need what finer gold needs around them.
+    run(selected, {first}, wants, result);
+    rates.erase(rates.begin());
+    if (rates.empty()) return;
+    std::vector<std::uint8_t> rest = selected;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      const bool tested = bricks_[i].tried > 0 || field_.least_rate(i) > first;
+      rest[i] = rest[i] && tested &&
+                std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
+    }
+    if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
   }
 
   /// Tests bricks again on finer gold, the worst first, until none may err by more than the limits. Ends

@@ -321,7 +321,7 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                                .blocks = to_int(blocks),
                                .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
-    const std::int64_t groups = wanted.heights / VDVR_VERIFY_CONE_HEIGHTS;
+    const std::int64_t groups = up(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / VDVR_VERIFY_CONE_HEIGHTS;
     kernel(
         {{count(groups), count(tile), count(n)}, {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}},
         nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);

@@ -44,6 +44,7 @@ class VerifyConeNodes {
   struct Nodes {
     Vec3 first{}, spacing{};                         ///< where the first lies, and how far apart they are
     std::int64_t nx = 0, heights = 0;                ///< of the array; heights to a multiple of 16
+    std::int64_t used = 0;                           ///< of the heights
     std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
   };
   /// Writes those of the wanted tiles that are not too far out. Throws InputError where such a tile reaches a

@@ -61,6 +61,8 @@ class VerifyField {
 
   /// Nodes to a cell of the grid that determine F across z: with fewer, gold is back-projected itself.
   [[nodiscard]] int across() const { return across_; }
+  /// Of cone beam: finer gold, which is made of more nodes around a brick, is better asked for by itself.
+  [[nodiscard]] bool nodes_are_dear() const { return !field_.views().empty(); }
   /// The least rate of gold on whose cells the brick is trilinear.
   [[nodiscard]] int least_rate(std::size_t brick) const;
 

@@ -183,6 +183,7 @@ void VerifyNodes::make_cone_nodes(const Part& part) {
   }
   wanted.nx = tile_columns_ * tile;
   wanted.heights = rows_padded_;
+  wanted.used = part.nz;
   for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
     if (part.tiles[at(t)]) wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
   cone_facts_ = cone_->make(wanted, *nodes_);
