@@ -27,8 +27,6 @@ constexpr int density = 8;
 constexpr std::int64_t fewest_rows = 16;
 constexpr std::uint64_t most_table_bytes = std::uint64_t{256} << 20,
                         most_view_bytes = std::uint64_t{16} << 20;
-// Views whose tables lie on the device together.
-constexpr std::int64_t most_views = 16;
 constexpr std::int64_t side = VDVR_CONE_TILE, heights = VDVR_CONE_HEIGHTS;
 
 // What a view is about the middle of a block of nodes, as kernels/kept/cone_nodes.cl reads it: places in the
@@ -149,7 +147,7 @@ std::int64_t ConeTiles::views_together() const {
                     "raise `max_memory`",
                     scan_.geometry.columns, scan_.geometry.rows, static_cast<double>(each) / 0x1p20));
   return std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1,
-                                  std::min<std::int64_t>(most_views, scan_.geometry.views()));
+                                  std::min(most_views, scan_.geometry.views()));
 }
 
 ConeTiles::Table ConeTiles::table(std::int64_t first, std::int64_t views) {
@@ -249,7 +247,11 @@ void ConeTiles::back_project(std::span<const ConePage> pages, const Progress& pr
 
 // --- bounds ---
 
-ConeTiles::Errors ConeTiles::errors() {
+double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
+  return static_cast<double>(together + (views + together - 1) / together);
+}
+
+ConeTiles::Errors ConeTiles::errors(std::int64_t together) {
   const ParallelGeometry& g = scan_.geometry;
   const SixTaps& six = six_tap_facts();
   const double square = six.norm * six.norm, views = static_cast<double>(g.views());
@@ -268,8 +270,7 @@ ConeTiles::Errors ConeTiles::errors() {
   const double position = 2 * unit * (16 * block_reach_ + 4) * pi / density * sup_;
   // Six products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
   // lambda^-2, which a float place makes err more.
-  const double chunk = static_cast<double>(views_together_);
-  const double roundings = 6 + 1 + chunk + 3 + std::ceil(views / chunk) + (in_double_ ? 3 : 24);
+  const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double_ ? 3 : 24);
   out.rounding = square * entries + position + 2 * six.norm * six.rounding * sup_ +
                  1.01 * unit_roundoff * roundings * square * sup_ +
                  views * largest_weight_ * (2 * product_underflow(g, upsampler_.gain_u()) + 16 * 0x1p-126);

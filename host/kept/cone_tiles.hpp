@@ -64,7 +64,12 @@ class ConeTiles {
   struct Errors {
     double interpolation = 0, rounding = 0;
   };
-  [[nodiscard]] Errors errors();
+  [[nodiscard]] Errors errors() { return errors(views_together_); }
+  /// The same where memory had allowed so many views at once, from 1 to most_views.
+  [[nodiscard]] Errors errors(std::int64_t together);
+  static constexpr std::int64_t most_views = 16;
+  /// Roundings of a sum over views, of which so many are added up before they are added to the others.
+  [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);
   /// Of an axis, x and y alike: designed for the band with which it errs least, most views being below the
   /// highest. Where a band exceeds what filters are designed for, none; `error` is infinite.
   struct BestFilter {

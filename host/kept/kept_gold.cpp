@@ -244,6 +244,22 @@ std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   return out;
 }
 
+std::pair<double, double> KeptGold::rounding_by_memory(const GoldLattice& lattice) {
+  const double own = errors(lattice).rounding;
+  if (!cone_) return {own, own};
+  const std::int64_t views = scan_.geometry.views();
+  const double nodes = filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
+                       filter_of(lattice.phases[2], 2).norm,
+               now = cone_->errors().rounding;
+  std::pair<double, double> out{own, own};
+  for (std::int64_t together = 1; together <= std::min(views, ConeTiles::most_views); ++together) {
+    const double other = own + nodes * (cone_->errors(together).rounding - now);
+    out.first = std::min(out.first, other);
+    out.second = std::max(out.second, other);
+  }
+  return out;
+}
+
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   if (cone_) return cone_errors(lattice);
   const ParallelGeometry& g = scan_.geometry;

@@ -68,6 +68,9 @@ class KeptGold {
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
   /// What fourth differences of gold on that lattice err, xx, yy, zz, xy, xz, yz: of F^, rounding included.
   [[nodiscard]] std::array<double, 6> fourth_errors(const GoldLattice& lattice);
+  /// The least and the most that `rounding` of these would be, whatever memory allows: of cone beam it
+  /// depends on how many views lie on the device together.
+  [[nodiscard]] std::pair<double, double> rounding_by_memory(const GoldLattice& lattice);
 
   /// Back-projects what `boxes` will read and is not kept yet; where that is most of what can be kept, all of
   /// it, since the columns of the detector are upsampled anew each time. Throws ResourceError where memory

@@ -18,9 +18,10 @@
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
 #include "host/verify/verify_scope.hpp"
-#include "host/verify/verify_seams.hpp"
+#include "host/volume/seams.hpp"
 #include "host/verify/verify_terms.hpp"
 #include "host/volume/bricks.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -208,7 +209,18 @@ class TestedBricks {
       return undecided(b) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
                               rate <= 2 * std::max(first, field_.least_rate(i)));
     };
-    run(selected, rates, wants, result);
+    if (!field_.nodes_are_dear()) return run(selected, rates, wants, result);
+    // Few bricks need what finer gold needs around them.
+    run(selected, {first}, wants, result);
+    rates.erase(rates.begin());
+    if (rates.empty()) return;
+    std::vector<std::uint8_t> rest = selected;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      const bool tested = bricks_[i].tried > 0 || field_.least_rate(i) > first;
+      rest[i] = rest[i] && tested &&
+                std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
+    }
+    if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
   }
 
   /// Tests bricks again on finer gold, the worst first, until none may err by more than the limits. Ends
@@ -333,12 +345,13 @@ void add_differences(VerifyResult& r) {
 
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                     const Certificate& stored, const VerifyOptions& options, const Progress& progress) {
-  require_parallel(scan, "verify");
   opencl::State& state = device.state();
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;
   check_scan(used);
-  const std::uint64_t all = static_cast<std::uint64_t>(scan.size()) * sizeof(double);
+  // Weights at most double the columns of a displaced detector.
+  const std::uint64_t padded = scan.cone && scan.cone->redundancy == Redundancy::displaced ? 2 : 1;
+  const std::uint64_t all = padded * static_cast<std::uint64_t>(scan.size()) * sizeof(double);
   const std::uint64_t bytes =
       scan.data.scratch() ? std::min(all, scan.data.scratch()->resident_bytes()) : all;
   state.memory.take(bytes, "cosine coefficients of the filtered projections");
@@ -361,11 +374,12 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   };
   also(check_samplers(device, volume, stored, slopes, sampler));
   const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
-  TotalAttack attack(volume, stored);
+  const CertifiedRegion region(scan, stored.field);
+  TotalAttack attack(volume, stored, region);
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
-  const FieldPoints points_of_field(exact, volume, selected, options.seed);
+  const FieldPoints points_of_field(exact, region, volume, selected, options.seed);
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
   TestedBricks tested(
       field, volume, attack,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <set>
 
@@ -30,9 +31,10 @@ void for_each_middle(Visit&& visit) {
 
 }  // namespace
 
-TotalAttack::TotalAttack(const MixedVolume& volume, const Certificate& stored)
+TotalAttack::TotalAttack(const MixedVolume& volume, const Certificate& stored, const CertifiedRegion& region)
     : volume_(volume),
       stored_(stored),
+      region_(region),
       rest_(stored.budget.arithmetic.value + stored.budget.sampler.buffer.value) {}
 
 double TotalAttack::certified(std::int64_t brick) const {
@@ -69,12 +71,16 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
   std::vector<Cell> cells = cells_;
   std::sort(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) { return a.excess > b.excess; });
   const ParallelGeometry& g = exact.geometry();
+  // A height costs all coefficients, of cone beam a point does.
   const auto most_heights = static_cast<std::size_t>(
       std::max(48.0, most_work / static_cast<double>(g.views() * g.rows * g.columns)));
+  const std::size_t most_points = exact.views().empty() ? SIZE_MAX : most_heights;
   std::set<double> heights;
   std::vector<Vec3> points;
   const Bricks bricks(volume_.grid, volume_.granularity);
-  for (std::size_t i = 0; i < std::min(cells.size(), most_cells) && heights.size() + 3 <= most_heights; ++i) {
+  for (std::size_t i = 0; i < std::min(cells.size(), most_cells) && heights.size() + 3 <= most_heights &&
+                          points.size() + points_per_cell <= most_points;
+       ++i) {
     const Index3 brick = bricks.position(cells[i].brick);
     for_each_middle([&](const Index3& half) {
       Vec3 p{};
@@ -84,7 +90,7 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
             (static_cast<double>(cells[i].cell[a]) + 0.5 * static_cast<double>(half[a])) / cells[i].rate;
         p[a] = volume_.grid.origin[a] + cell * volume_.grid.spacing[a];
       }
-      if (!exact.covered(p)) return;
+      if (!region_.contains(p)) return;
       points.push_back(p);
       heights.insert(p[2]);
     });

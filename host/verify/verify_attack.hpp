@@ -8,6 +8,7 @@
 
 #include "host/verify/verify_field.hpp"
 #include "vdvr/certificate.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -18,7 +19,8 @@ namespace vdvr {
 /// whose bound by verify is farthest above: verify's bound may just be the looser one.
 class TotalAttack {
  public:
-  TotalAttack(const MixedVolume& volume, const Certificate& stored);
+  /// Refers to all it is given.
+  TotalAttack(const MixedVolume& volume, const Certificate& stored, const CertifiedRegion& region);
 
   /// Keeps the brick's worst cells, if they are among the worst of all.
   void consider(const VerifyField::Piece& piece);
@@ -29,7 +31,7 @@ class TotalAttack {
     std::string failure;      ///< empty: no point is above
   };
   /// |V - F| at the middles of the kept cells, of their faces and edges, in double precision. Cost: at most
-  /// 4,000 points, and few enough heights that they take about 2e10 multiply-adds.
+  /// 4,000 points, and few enough heights (of cone beam, points) that they take about 2e10 multiply-adds.
   [[nodiscard]] Outcome run(const ExactField& exact, const Progress& progress) const;
 
  private:
@@ -43,6 +45,7 @@ class TotalAttack {
 
   const MixedVolume& volume_;
   const Certificate& stored_;
+  const CertifiedRegion& region_;
   double rest_ = 0;  // arithmetic and sampler
   std::vector<Cell> cells_;
 };

@@ -21,8 +21,8 @@ constexpr std::int64_t sup_density = 3;  // points per pixel where sups are samp
 
 }  // namespace
 
-ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& g,
-                   const Progress& progress) {
+SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& g,
+                     const Progress& progress) {
   const std::int64_t U = g.columns, V = g.rows, K = g.views();
   // One row does not vary along v. Else rows at every third of a pixel, from edge to edge of the half period.
   const std::int64_t heights = V == 1 ? 1 : sup_density * V + 1,
@@ -32,7 +32,7 @@ ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry&
                factor = (1 + 1e-9) * factor_u * (V == 1 ? 1 : factor_u);
   const double wave_u = pi / (static_cast<double>(U) * g.pitch_u),
                wave_v = pi / (static_cast<double>(V) * g.pitch_v);
-  ViewSups sups{std::vector<double>(at(K)), std::vector<double>(at(K)), std::vector<double>(at(K))};
+  SupsByView sups{std::vector<double>(at(K)), std::vector<double>(at(K)), std::vector<double>(at(K))};
   parallel_for(K, progress, "sups", [&](std::int64_t k) {
     const double* a = coefficients.data() + k * U * V;
     std::vector<double> basis(at(V * rows)), basis_vv(at(V * rows)), line(at(U * rows));
@@ -70,20 +70,14 @@ ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry&
 
 namespace {
 
-/// Errors of one kind: of nodes from which gold is made, or of gold. Axes x, y, z.
-struct ErrorKind {
-  double size = 0;
-  std::array<AxisNorms, 3> norms;  // what is formed along each axis is at most so many times as large
-};
-
 /// The sums over views of |q|, |q_uu| and the sixth derivative in u.
 struct Sums {
   double value = 0, second_u = 0, sixth_u = 0;
 };
 
 // docs/error-bounds.md, "What verify does", step 1: each row of its table is one kind.
-std::vector<ErrorKind> error_kinds(const Sums& S, double host_rounding, const ParallelGeometry& g,
-                                   const Vec3& h, const NodePath& path) {
+std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const ParallelGeometry& g,
+                                     const Vec3& h, const NodePath& path) {
   const double d = g.pitch_u / static_cast<double>(fine_columns),
                slope = std::min(pi / g.pitch_u * S.value, std::sqrt(2 * S.value * S.second_u));
   const double columns = static_cast<double>(fine_columns * (g.columns + 2)),
@@ -99,7 +93,7 @@ std::vector<ErrorKind> error_kinds(const Sums& S, double host_rounding, const Pa
 
   const LagrangeFilter filter = lagrange_filter(path.across), along = lagrange_filter(path.along);
   const AxisNorms across = filter.norms, each, band = band_norms(pi * h[2] / g.pitch_v);
-  std::vector<ErrorKind> kinds;
+  std::vector<KindOfError> kinds;
   if (path.rows) {
     // What the rows hold is a function of the band, whatever they err.
     kinds.push_back({column, {across, across, band}});
@@ -120,7 +114,9 @@ std::vector<ErrorKind> error_kinds(const Sums& S, double host_rounding, const Pa
   return kinds;
 }
 
-void add_errors(FieldBounds& b, const ErrorKind& kind) {
+}  // namespace
+
+void add_errors(FieldBounds& b, const KindOfError& kind) {
   const auto product = [&](const std::array<double, 3>& f) { return kind.size * f[0] * f[1] * f[2]; };
   std::array<double, 3> value{};
   for (std::size_t a = 0; a < 3; ++a) value[a] = kind.norms[a].value;
@@ -138,10 +134,8 @@ void add_errors(FieldBounds& b, const ErrorKind& kind) {
   }
 }
 
-}  // namespace
-
-FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& g, const Vec3& h,
-                         const NodePath& path) {
+FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const ParallelGeometry& g,
+                         const Vec3& h, const NodePath& path) {
   const double wu = pi / g.pitch_u * (pi / g.pitch_u), wv = pi / g.pitch_v * (pi / g.pitch_v);
   const std::size_t K = sups.value.size();
   // sup |d_u^a d_v^b q_k| for even a + b >= 2, by Bernstein from the second derivatives.
@@ -166,7 +160,7 @@ FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const Paral
     S.second_u += sups.second_u[k];
     S.sixth_u += derivative(k, 6, 0);
   }
-  for (const ErrorKind& kind : error_kinds(S, host_rounding, g, h, path)) add_errors(b, kind);
+  for (const KindOfError& kind : error_kinds(S, host_rounding, g, h, path)) add_errors(b, kind);
   b.differences = 40 * u * S.value;
   double plain = 0;
   for (std::size_t j = 0; j < 3; ++j) {

@@ -1,6 +1,6 @@
 // The bound on |V - F| as `verify` has it, but for what gold tells cell by cell: sups of the filtered
 // projections and the constants that follow from them (docs/error-bounds.md, "What verify does"). Called by
-// verify_field.cpp.
+// verify_field.cpp and verify_cone_bounds.cpp.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "host/verify/verify_lagrange.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -21,14 +22,14 @@ constexpr std::int64_t fine_columns = 12;
 constexpr std::int64_t views_per_run = 8, rows_per_run = 16;
 
 /// Per view: sups over the whole detector, view weight included.
-struct ViewSups {
+struct SupsByView {
   std::vector<double> value, second_u, second_v;  ///< |q|, |q_uu|, |q_vv|
 };
 
 /// Cost: views * 18 rows * columns * (rows + columns) multiply-adds on the host. `coefficients` double
 /// [view][m][l].
-ViewSups view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
-                   const Progress& progress);
+SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
+                     const Progress& progress);
 
 /// How F is computed at nodes of gold (verify_nodes.hpp).
 struct NodePath {
@@ -55,8 +56,16 @@ struct FieldBounds {
 };
 
 /// `host_rounding`: what the table's double-precision values err.
-FieldBounds field_bounds(const ViewSups& sups, double host_rounding, const ParallelGeometry& geometry,
+FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const ParallelGeometry& geometry,
                          const Vec3& gold_spacing, const NodePath& path);
+
+/// Errors of one kind: of nodes from which gold is made, or of gold. Axes x, y, z.
+struct KindOfError {
+  double size = 0;
+  std::array<AxisNorms, 3> norms;  ///< what is formed along each axis is at most so many times as large
+};
+/// Adds what the kind makes of values and of differences.
+void add_errors(FieldBounds& bounds, const KindOfError& kind);
 
 /// T's part that is constant over a piece: `fourth` are the largest computed fourth differences at its nodes,
 /// xx, yy, zz, xy, xz, yz.

@@ -27,6 +27,9 @@ std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 
 // Gold cells of a piece's side at most: what is computed at once stays small whatever the rate.
 constexpr std::int64_t most_cells = 64;
 
+// Of cone beam, heights of nodes that are back-projected together, but for those around them.
+constexpr std::int64_t most_heights = 128;
+
 /// Host memory counted against --max-memory.
 class HostShare {
  public:
@@ -55,7 +58,9 @@ struct VerifyField::Shape {
   Index3 pieces{};                     // of the grid
   std::int64_t nx = 0, nz = 0, z_padded = 0, error_padded = 0, words = 0;
   std::int64_t slab_z = 0;  // first layer of pieces
-  FieldBounds bounds;
+  VerifyNodes::Part nodes;  // that gold is made of
+  FieldBounds bounds;       // of parallel beam
+  float correction = 1;     // of all bounds
 
   /// Where a piece begins along an axis.
   [[nodiscard]] double begin(const Grid& grid, std::size_t axis, std::int64_t piece) const {
@@ -151,10 +156,14 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
       volume_(volume),
       unit_(std::ldexp(1.0, density)),
       coverage_(field.geometry(), field.views()),
-      sups_(view_sups(field.coefficients(), field.geometry(), progress)),
+      sups_(field.views().empty() ? view_sups(field.coefficients(), field.geometry(), progress)
+                                  : cone_view_sups(field, progress)),
       stored_(upload(state, volume, -density)),
-      across_(nodes_across(volume.grid, field.geometry())),
-      nodes_(state, field, volume.grid, unit_, furthest_node(volume, across_)) {
+      rates_of_cone_(cone_node_rates(field, coverage_, volume.grid.spacing)),
+      across_(field.views().empty() ? nodes_across(volume.grid, field.geometry()) : rates_of_cone_.across),
+      nodes_(field.views().empty()
+                 ? VerifyNodes(state, field, volume.grid, unit_, furthest_node(volume, across_))
+                 : VerifyNodes(state, field, coverage_, volume.grid, unit_, furthest_node(volume, across_))) {
   if (window) window_ = {window->first / unit_, window->second / unit_};
 }
 
@@ -187,11 +196,80 @@ VerifyField::Shape VerifyField::shape_at(int rate, bool many, const VerifyNodes:
   s.nx = s.width * s.cells + 1 + 2 * halo;
   s.error_padded = up(s.cells + 1, 16) + 16;
   s.words = (s.cells + 15) / 16;
-  s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), s.h, nodes_.path(part, rate));
+  s.nodes = part;
+  if (field_.views().empty())
+    s.bounds = field_bounds(sups_, field_.rounding(), field_.geometry(), s.h, nodes_.path(part, rate));
   return s;
 }
 
-// A brick whose middle lies further outside than half its diagonal and a cell's has no tested cell.
+// --- cone beam: bounds by groups of bricks ---
+
+namespace {
+
+// Groups of bricks across the grid at most, along each axis: lambda, and with it every bound, changes little
+// in one.
+constexpr std::int64_t most_groups = 16;
+
+std::int64_t bricks_to_group(std::int64_t bricks) { return (bricks + most_groups - 1) / most_groups; }
+
+}  // namespace
+
+std::int64_t VerifyField::group_of(std::int64_t brick) const {
+  const Index3 n = volume_.bricks(), p{brick % n[0], brick / n[0] % n[1], brick / n[0] / n[1]};
+  return (p[2] / bricks_to_group(n[2]) * most_groups + p[1] / bricks_to_group(n[1])) * most_groups +
+         p[0] / bricks_to_group(n[0]);
+}
+
+// With all nodes that gold of its tested cells, and differences of that gold, are made of.
+ConeBox VerifyField::group_box(std::int64_t group, int rate, const VerifyNodes::Part& part) const {
+  const Index3 n = volume_.bricks(),
+               p{group % most_groups, group / most_groups % most_groups, group / most_groups / most_groups};
+  const Grid& grid = volume_.grid;
+  ConeBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int nodes = a < 2 ? part.across : part.along;
+    const double around = static_cast<double>(halo) / rate +
+                          (rate > nodes ? static_cast<double>(VerifyNodes::reach) / nodes : 0.0);
+    const std::int64_t cells = bricks_to_group(n[a]) * volume_.granularity;
+    box.low[a] = grid.origin[a] + (static_cast<double>(p[a] * cells) - around) * grid.spacing[a];
+    box.high[a] =
+        grid.origin[a] +
+        (static_cast<double>(std::min((p[a] + 1) * cells, grid.cells[a])) + around) * grid.spacing[a];
+  }
+  return box;
+}
+
+void VerifyField::bound_groups(const Shape& s, const std::vector<std::uint8_t>& selected) {
+  std::vector<std::int64_t> groups;
+  for (std::size_t i = 0; i < selected.size(); ++i)
+    if (selected[i]) groups.push_back(group_of(static_cast<std::int64_t>(i)));
+  std::sort(groups.begin(), groups.end());
+  groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+  const ConePath path{nodes_.path(s.nodes, to_int(s.rate)), nodes_.cone_facts(), field_.rounding()};
+  const auto bounds = [&](std::int64_t group, bool corrected) {
+    return cone_field_bounds(field_.views(), sups_, group_box(group, to_int(s.rate), s.nodes), s.h, path,
+                             corrected);
+  };
+  // On coarse gold the sixth derivatives weigh more than what the fourth differences gain: one choice for
+  // all, as kernels make it.
+  const std::int64_t middle = groups[groups.size() / 2];
+  const bool corrected = !(bounds(middle, false).second < bounds(middle, true).second);
+  std::vector<FieldBounds> found(groups.size());
+  parallel_for(static_cast<std::int64_t>(groups.size()), {}, "",
+               [&](std::int64_t i) { found[at(i)] = bounds(groups[at(i)], corrected); });
+  of_groups_.clear();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    of_groups_.emplace(groups[i], found[i]);
+    arithmetic_ = std::max(arithmetic_, found[i].arithmetic);
+  }
+}
+
+const FieldBounds& VerifyField::bounds_of(const Shape& s, std::int64_t brick) const {
+  return field_.views().empty() ? s.bounds : of_groups_.at(group_of(brick));
+}
+
+// A brick whose middle lies further outside than half its diagonal and a cell's has no tested cell, nor has
+// one above or below what is covered.
 std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> selected) const {
   const Index3 n = volume_.bricks();
   const Grid& grid = volume_.grid;
@@ -200,6 +278,8 @@ std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> s
     const double x = grid.origin[0] + (static_cast<double>(i % n[0]) + 0.5) * g * grid.spacing[0],
                  y = grid.origin[1] + (static_cast<double>(i / n[0] % n[1]) + 0.5) * g * grid.spacing[1];
     if (coverage_.margin(x, y) < -(0.5 * g + 1) * diagonal) selected[at(i)] = 0;
+    const double z = grid.origin[2] + (static_cast<double>(i / n[0] / n[1]) + 0.5) * g * grid.spacing[2];
+    if (coverage_.margin_z(z) < -(0.5 * g + 1) * grid.spacing[2]) selected[at(i)] = 0;
   }
   return selected;
 }
@@ -219,8 +299,11 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
   p.rows = rows;
   if (!rows) {
     p.along = 1;
-    while (p.along < rates.back() && !(volume_.grid.spacing[2] / p.along <= 0.25 * field_.geometry().pitch_v))
-      p.along *= 2;
+    const auto dense = [&](int along) {
+      return field_.views().empty() ? volume_.grid.spacing[2] / along <= 0.25 * field_.geometry().pitch_v
+                                    : along >= rates_of_cone_.along;
+    };
+    while (p.along < rates.back() && !dense(p.along)) p.along *= 2;
     const std::int64_t tall = std::int64_t{volume_.granularity} * p.along;
     // Steps of the coarsest rate, and a polynomial's nodes.
     const std::int64_t beyond = halo * std::max<std::int64_t>(1, p.along / rates.front()) +
@@ -240,6 +323,27 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
   return p;
 }
 
+// Of cone beam: neighbouring layers of bricks together, whose heights around them are then the same.
+std::vector<std::vector<std::uint8_t>> VerifyField::joined(std::vector<std::vector<std::uint8_t>> layers,
+                                                           const std::vector<std::uint8_t>& selected) const {
+  const Index3 n = volume_.bricks();
+  const auto together =
+      std::max<std::int64_t>(1, most_heights / (std::int64_t{volume_.granularity} * rates_of_cone_.along));
+  std::vector<std::vector<std::uint8_t>> out;
+  std::int64_t first = -1, last = -1;
+  for (const std::vector<std::uint8_t>& layer : layers) {
+    const std::int64_t z = Box(n, layer).first[2];
+    if (!out.empty() && z == last + 1 && z < first + together) {
+      out.back() = layers_of(selected, n, 2, first, z + 1);
+    } else {
+      out.push_back(layer);
+      first = z;
+    }
+    last = z;
+  }
+  return out;
+}
+
 // The detector's rows serve all heights; where fewer heights are asked for, they are made themselves, layer
 // by layer of bricks. Both in bands of bricks whose nodes fit the memory.
 std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint8_t>& selected,
@@ -253,8 +357,10 @@ std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint
     heights += nodes_of(layer, rates, false).nz;
     runs.push_back(std::move(layer));
   }
-  const bool rows = field_.geometry().rows <= heights;
+  // Of cone beam no two nodes see the same rows.
+  const bool rows = field_.views().empty() && field_.geometry().rows <= heights;
   if (rows) runs.assign(1, selected);
+  if (!field_.views().empty()) runs = joined(std::move(runs), selected);
   const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
   std::vector<Part> parts;
   for (const std::vector<std::uint8_t>& run : runs) {
@@ -320,6 +426,11 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const
       if (box.bricks > 0) {
         Shape s = shape_at(rate, 2 * box.bricks > box.size(), part.nodes);
         arithmetic_ = std::max(arithmetic_, s.bounds.arithmetic);
+        s.correction = s.bounds.correction;
+        if (!field_.views().empty()) {
+          bound_groups(s, wanted);
+          s.correction = of_groups_.begin()->second.correction;
+        }
         const std::vector<Slab> slabs = slabs_of(s, wanted);
         for (std::size_t i = 0; i < slabs.size(); ++i) {
           s.slab_z = slabs[i].z;
@@ -427,12 +538,12 @@ void VerifyField::look(const Batch& batch, const Shape& s, const opencl::DeviceA
         node.at[a] = s.begin(volume_.grid, a, item.s[a]) + static_cast<double>(in[a]) * s.h[a];
         place[a] = (item.s[a] - first.s[a]) * s.cells + in[a] + halo;
       }
-      if (!field_.covered(node.at)) continue;
+      if (!covered(node.at)) continue;
       float value = 0;
       values.read(std::span(&value, 1),
                   count(((item.s[3] * s.nx + place[1]) * s.nx + place[0]) * s.z_padded + place[2]));
       node.value = unit_ * static_cast<double>(value);
-      node.arithmetic = s.bounds.arithmetic;
+      node.arithmetic = bounds_of(s, batch.bricks[i]).arithmetic;
       seen_.push_back(node);
     }
   }
@@ -505,7 +616,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
                           window_ ? 1 : 0,
                           window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
                           window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f,
-                          s.bounds.correction};
+                          s.correction};
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces>
       errors(state_, "verify/verify_field", "verify_errors", stored_.defines);
@@ -524,7 +635,8 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     for (std::int64_t y = 0; y < side; ++y)
       for (std::size_t q = 0; q < 6; ++q)
         largest[q] = std::max(largest[q], unit_ * static_cast<double>(rows[at(i * side + y)].s[q]));
-    constants[at(i)] = brick_constant(s.bounds, largest) + s.bounds.arithmetic;
+    const FieldBounds& bounds = bounds_of(s, batch.bricks[at(i)]);
+    constants[at(i)] = brick_constant(bounds, largest) + bounds.arithmetic;
     widening[at(i)] = static_cast<float>(constants[at(i)] / unit_ * (1 + 1e-6));
   }
   const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
@@ -550,7 +662,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     Piece b;
     b.brick = batch.bricks[at(i)];
     b.rate = to_int(s.rate);
-    b.arithmetic = s.bounds.arithmetic;
+    b.arithmetic = bounds_of(s, b.brick).arithmetic;
     const cl_int4 place = batch.items[at(i)];
     for (int a = 0; a < 3; ++a) b.first_cell[at(a)] = place.s[a] % s.per_brick * s.cells;
     b.constant = constants[at(i)];

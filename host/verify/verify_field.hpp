@@ -1,11 +1,12 @@
 // The bound on |V - F| as `verify` computes it, gold cell by gold cell, at every rate that is asked for
 // (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Called by
-// verify.cpp. Launches kernels/verify/verify_field.cl; F is verify_nodes'.
+// verify.cpp. Launches kernels/verify/verify_field.cl; F is verify_nodes', of either beam.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <random>
 #include <span>
@@ -15,6 +16,7 @@
 #include "host/fbp/coverage.hpp"
 #include "host/opencl/array.hpp"
 #include "host/sampler/device_field.hpp"
+#include "host/verify/verify_cone_bounds.hpp"
 #include "host/verify/verify_nodes.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/mixed_volume.hpp"
@@ -59,6 +61,8 @@ class VerifyField {
 
   /// Nodes to a cell of the grid that determine F across z: with fewer, gold is back-projected itself.
   [[nodiscard]] int across() const { return across_; }
+  /// Of cone beam: finer gold, which is made of more nodes around a brick, is better asked for by itself.
+  [[nodiscard]] bool nodes_are_dear() const { return !field_.views().empty(); }
   /// The least rate of gold on whose cells the brick is trilinear.
   [[nodiscard]] int least_rate(std::size_t brick) const;
 
@@ -81,6 +85,10 @@ class VerifyField {
 
   /// The most that the last run's computation of F may err at any node.
   [[nodiscard]] double arithmetic() const { return arithmetic_; }
+  /// Whether the certificate speaks of a point.
+  [[nodiscard]] bool covered(const Vec3& point) const {
+    return coverage_.margin(point[0], point[1]) >= 0 && coverage_.margin_z(point[2]) >= 0;
+  }
 
  private:
   struct Shape;
@@ -90,9 +98,15 @@ class VerifyField {
   struct Part;
   [[nodiscard]] std::vector<Part> parts_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates) const;
+  [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(
+      std::vector<std::vector<std::uint8_t>> layers, const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] VerifyNodes::Part nodes_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates, bool rows) const;
   [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;
+  [[nodiscard]] ConeBox group_box(std::int64_t group, int rate, const VerifyNodes::Part& part) const;
+  [[nodiscard]] std::int64_t group_of(std::int64_t brick) const;
+  void bound_groups(const Shape& shape, const std::vector<std::uint8_t>& selected);
+  [[nodiscard]] const FieldBounds& bounds_of(const Shape& shape, std::int64_t brick) const;
   [[nodiscard]] std::vector<Slab> slabs_of(const Shape& shape,
                                            const std::vector<std::uint8_t>& selected) const;
   void run_slab(const Shape& shape, const std::vector<std::array<std::int64_t, 2>>& blocks,
@@ -113,10 +127,12 @@ class VerifyField {
   double unit_;                                      // of densities on the device
   std::optional<std::pair<double, double>> window_;  // in it
   Coverage coverage_;
-  ViewSups sups_;
+  SupsByView sups_;
   DeviceField stored_;
+  ConeNodeRates rates_of_cone_;
   int across_;
   VerifyNodes nodes_;
+  std::map<std::int64_t, FieldBounds> of_groups_;  // cone beam: at this rate
   double arithmetic_ = 0;
   std::vector<std::uint8_t> looked_at_;  // bricks
   std::int64_t nodes_each_ = 0;

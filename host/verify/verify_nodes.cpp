@@ -54,6 +54,12 @@ VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Gr
   columns_ = fine_columns * g.columns + 1 + 2 * pad_;
 }
 
+VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage,
+                         const Grid& grid, double unit, double furthest)
+    : state_(state), field_(field), grid_(grid), unit_(unit) {
+  cone_.emplace(state, field, coverage, unit, furthest);
+}
+
 std::uint64_t VerifyNodes::bytes_of(const Part& part) const {
   return 4 * count(tiles_across(part.nx) * tile * tiles_across(part.ny) * tile) *
          count(up(rows_of(part, field_.geometry().rows), lanes));
@@ -134,6 +140,10 @@ void VerifyNodes::make(const Part& part) {
   rows_padded_ = up(rows, lanes);
   nodes_.emplace(state_, bytes_of(part) / 4 + count(room), "nodes of the field to verify against");
   nodes_->fill(0.0f);
+  if (cone_) {
+    make_cone_nodes(part);
+    return;
+  }
   std::vector<cl_int2> tiles;
   for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
     if (part.tiles[at(t)])
@@ -162,6 +172,21 @@ void VerifyNodes::make(const Part& part) {
   steps_.emplace(state_, std::span<const cl_float4>(steps), "view positions");
   Table table(state_, columns_, views_at_once());
   for (std::int64_t row = 0; row < rows; row += lanes) back_project(table, row);
+}
+
+void VerifyNodes::make_cone_nodes(const Part& part) {
+  VerifyConeNodes::Nodes wanted;
+  const std::array<std::int64_t, 3> first{part.first_x, part.first_y, part.first_z};
+  for (std::size_t a = 0; a < 3; ++a) {
+    wanted.spacing[a] = grid_.spacing[a] / static_cast<double>(a < 2 ? part.across : part.along);
+    wanted.first[a] = grid_.origin[a] + static_cast<double>(first[a]) * wanted.spacing[a];
+  }
+  wanted.nx = tile_columns_ * tile;
+  wanted.heights = rows_padded_;
+  wanted.used = part.nz;
+  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
+    if (part.tiles[at(t)]) wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
+  cone_facts_ = cone_->make(wanted, *nodes_);
 }
 
 void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
@@ -296,6 +321,7 @@ NodePath VerifyNodes::path(const Part& part, int rate) const {
   p.along = std::max(1, rate / part.along);
   p.terms = part.rows ? g.rows : lanes + lagrange_points;
   p.gain = part.rows ? gain_ : 1;
+  if (cone_) return p;
   p.calls = (g.views() + views_at_once() - 1) / views_at_once();
   const auto n = static_cast<double>(part.across);
   p.reach = static_cast<double>(fine_columns) / g.pitch_u *

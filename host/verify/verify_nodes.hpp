@@ -11,14 +11,15 @@
 
 #include "host/opencl/array.hpp"
 #include "host/verify/verify_bounds.hpp"
+#include "host/verify/verify_cone_nodes.hpp"
 #include "shared/verify_nodes.h"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {
 
-/// Nodes to a cell of the grid across z: the smallest power of two with which they lie at most a quarter of a
-/// pixel apart. 2^24 where none does.
+/// Of parallel beam, nodes to a cell of the grid across z: the smallest power of two with which they lie at
+/// most a quarter of a pixel apart. 2^24 where none does.
 int nodes_across(const Grid& grid, const ParallelGeometry& geometry);
 
 class VerifyNodes {
@@ -51,9 +52,12 @@ class VerifyNodes {
   /// `field` outlives this object. Values are in `unit`. `furthest`: how far beyond the covered region,
   /// across z, a node may lie that is used.
   VerifyNodes(opencl::State& state, const ExactField& field, const Grid& grid, double unit, double furthest);
+  /// Of cone beam: parts are of heights. `coverage` outlives this object.
+  VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, const Grid& grid,
+              double unit, double furthest);
 
-  /// Back-projects. Cost: rows * columns * 12 * (rows + columns / 2) multiply-adds a view on the host, 7
-  /// multiply-adds a view and value on the device.
+  /// Back-projects. Cost (of cone beam, verify_cone_nodes.hpp): rows * columns * 12 * (rows + columns / 2)
+  /// multiply-adds a view on the host, 7 multiply-adds a view and value on the device.
   void make(const Part& part);
 
   /// float gold[block][y][x][z_padded] of the part made last. Nodes without a complete stencil in it are
@@ -64,10 +68,13 @@ class VerifyNodes {
 
   /// How gold of that rate is made of this part's nodes, for its errors.
   [[nodiscard]] NodePath path(const Part& part, int rate) const;
+  /// Of cone beam: of the part made last.
+  [[nodiscard]] const ConeNodeFacts& cone_facts() const { return cone_facts_; }
 
  private:
   struct Table;
   struct Heights;
+  void make_cone_nodes(const Part& part);
   void fill(Table& table, std::int64_t first_row, std::int64_t first_view);
   void back_project(Table& table, std::int64_t first_row);
   [[nodiscard]] Heights heights_of(const Blocks& blocks) const;
@@ -78,7 +85,9 @@ class VerifyNodes {
   const Grid& grid_;
   double unit_;
   std::int64_t pad_ = 0, columns_ = 0;  // fine columns
-  double gain_;                         // of the detector's rows
+  double gain_ = 1;                     // of the detector's rows
+  std::optional<VerifyConeNodes> cone_;
+  ConeNodeFacts cone_facts_;
   Part part_;
   std::int64_t tile_columns_ = 0, rows_padded_ = 0;
   std::optional<opencl::DeviceArray<float>> nodes_;

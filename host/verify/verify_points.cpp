@@ -1,4 +1,5 @@
-// A height costs the reference all coefficients, a point there a row of them.
+// A height costs the reference all coefficients, a point there a row of them; of cone beam each point costs
+// it all.
 #include "host/verify/verify_points.hpp"
 
 #include <fmt/format.h>
@@ -14,21 +15,24 @@ namespace vdvr {
 namespace {
 
 constexpr double most_work = 5e8;  // multiply-adds for heights, and for points
-constexpr std::int64_t least_bricks = 4, most_bricks = 32, least_nodes = 64, most_points = 4096;
+constexpr std::int64_t least_bricks = 4, most_bricks = 32, least_nodes = 64, least_cone_nodes = 8,
+                       most_points = 4096;
 
 }  // namespace
 
-FieldPoints::FieldPoints(const ExactField& exact, const MixedVolume& volume,
+FieldPoints::FieldPoints(const ExactField& exact, const CertifiedRegion& region, const MixedVolume& volume,
                          const std::vector<std::uint8_t>& selected, unsigned seed)
     : flags_(selected.size(), 0) {
   const ParallelGeometry& g = exact.geometry();
-  const double row = static_cast<double>(g.views() * g.columns);
+  const bool cone = !exact.views().empty();
+  const double row = static_cast<double>(g.views() * g.columns),
+               point = cone ? row * static_cast<double>(g.rows) : row;
   // Each brick is looked at on two golds, at a height of each.
   const auto wanted =
       std::clamp(static_cast<std::int64_t>(most_work / (2 * row * static_cast<double>(g.rows))), least_bricks,
                  most_bricks);
-  nodes_each_ =
-      std::max(least_nodes, std::min(most_points, static_cast<std::int64_t>(most_work / row)) / (2 * wanted));
+  nodes_each_ = std::max(cone ? least_cone_nodes : least_nodes,
+                         std::min(most_points, static_cast<std::int64_t>(most_work / point)) / (2 * wanted));
   const Bricks bricks(volume.grid, volume.granularity);
   for (std::size_t i = 0; i < selected.size(); ++i) {
     Vec3 middle{};
@@ -36,7 +40,7 @@ FieldPoints::FieldPoints(const ExactField& exact, const MixedVolume& volume,
     for (std::size_t a = 0; a < 3; ++a)
       middle[a] = volume.grid.origin[a] +
                   volume.grid.spacing[a] * volume.granularity * (static_cast<double>(place[a]) + 0.5);
-    if (selected[i] && exact.covered(middle)) bricks_.push_back(i);
+    if (selected[i] && region.contains(middle)) bricks_.push_back(i);
   }
   std::mt19937 random(seed);
   std::shuffle(bricks_.begin(), bricks_.end(), random);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host/verify/verify_field.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -17,10 +18,10 @@ namespace vdvr {
 
 class FieldPoints {
  public:
-  /// Draws bricks among the selected ones whose middle is covered. Few where F is dear: some 1e9
-  /// multiply-adds in all, but for at least four bricks and 64 nodes of each, at two rates.
-  FieldPoints(const ExactField& exact, const MixedVolume& volume, const std::vector<std::uint8_t>& selected,
-              unsigned seed);
+  /// Draws bricks among the selected ones whose middle lies in the region. Few where F is dear: some 1e9
+  /// multiply-adds in all, but for at least four bricks and 64 nodes of each (8 of cone beam), at two rates.
+  FieldPoints(const ExactField& exact, const CertifiedRegion& region, const MixedVolume& volume,
+              const std::vector<std::uint8_t>& selected, unsigned seed);
 
   [[nodiscard]] const std::vector<std::size_t>& bricks() const { return bricks_; }
   [[nodiscard]] const std::vector<std::uint8_t>& flags() const { return flags_; }

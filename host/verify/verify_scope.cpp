@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/fdk/filter_cone.hpp"
 #include "host/system/casts.hpp"
 #include "vdvr/region_of_interest.hpp"
 
@@ -40,6 +41,29 @@ class Compare {
   }
 };
 
+void compare_views(Compare& out, const nlohmann::json& g, const std::optional<ConeGeometry>& cone) {
+  if (g.contains("cone") != cone.has_value())
+    return out.differs(fmt::format("options.geometry is of {} beam, not of {} beam",
+                                   cone ? "parallel" : "cone", cone ? "cone" : "parallel"));
+  if (!cone) return;
+  out.text("options.geometry.cone.redundancy", g.at("cone").at("redundancy").get<std::string>(),
+           text_of(cone->redundancy));
+  const auto numbers = g.at("cone").at("matrices").get<std::vector<double>>();
+  out.integer("the number of matrices of options.geometry.cone", static_cast<std::int64_t>(numbers.size()),
+              static_cast<std::int64_t>(12 * cone->views.size()));
+  for (std::size_t i = 0; i < std::min(numbers.size(), 12 * cone->views.size()); ++i) {
+    const std::array<double, 4>& row = cone->views[i / 12][i % 12 / 4];
+    const double wanted = row[i % 4];
+    // Products that cancel round like the largest of their row; the last column holds pixels.
+    const double magnitude =
+        i % 4 < 3 ? std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2])}) : 1 + std::abs(row[3]);
+    if (std::abs(numbers[i] - wanted) <= 0x1p-44 * magnitude) continue;
+    return out.differs(
+        fmt::format("options.geometry.cone.matrices[{}] (view {}, row {}, column {}) is {}, not {}", i,
+                    i / 12, i % 12 / 4, i % 4, numbers[i], wanted));
+  }
+}
+
 void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeometry& used) {
   out.integer("options.geometry.columns", g.at("columns").get<std::int64_t>(), used.columns);
   out.integer("options.geometry.rows", g.at("rows").get<std::int64_t>(), used.rows);
@@ -59,7 +83,8 @@ void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeome
 }
 
 // A program over the library may note no options at all; what is noted must be so.
-void compare_options(Compare& out, const Certificate& c, const MixedVolume& v, const ParallelGeometry& used) {
+void compare_options(Compare& out, const Certificate& c, const MixedVolume& v, const ParallelGeometry& used,
+                     const std::optional<ConeGeometry>& cone) {
   const auto options = nlohmann::json::parse(c.options_json, nullptr, false);
   if (!options.is_object()) return out.differs("options are not a JSON object");
   const auto integer = [&](const char* name, const char* member, std::int64_t wanted) {
@@ -82,7 +107,10 @@ void compare_options(Compare& out, const Certificate& c, const MixedVolume& v, c
       const auto base = options.at("base").get<std::vector<std::int64_t>>();
       out.equal("options.base", base, wanted, base == wanted);
     }
-    if (options.contains("geometry")) compare_geometry(out, options.at("geometry"), used);
+    if (options.contains("geometry")) {
+      compare_geometry(out, options.at("geometry"), used);
+      compare_views(out, options.at("geometry"), cone);
+    }
   } catch (const nlohmann::json::exception& e) {
     out.differs(fmt::format("options: {}", e.what()));
   }
@@ -101,9 +129,8 @@ void compare_rates(Compare& out, const MixedVolume& v, const Certificate& c) {
     out.differs(fmt::format("rates.upsampling_u is {}, not a power of two from 2 to 64", c.rates.upsampling));
 }
 
-void compare_coverage(Compare& out, const ParallelGeometry& used, const MixedVolume& v,
-                      const Certificate& c) {
-  const std::int64_t count = count_not_covered(v.grid, Coverage(used));
+void compare_coverage(Compare& out, const ProjectionSet& scan, const MixedVolume& v, const Certificate& c) {
+  const std::int64_t count = count_not_covered(v.grid, certified_coverage(scan, c.field));
   out.integer("not_covered.count", c.not_covered_count, count);
   out.number("not_covered.fraction", c.not_covered_fraction,
              static_cast<double>(count) / static_cast<double>(v.grid.sample_count()));
@@ -179,9 +206,9 @@ Differences compare_scope(const ProjectionSet& scan, const ParallelGeometry& use
   Compare out;
   if (std::string what = contradiction(stored); !what.empty()) out.differs(std::move(what));
   compare_input(out, scan, stored);
-  compare_options(out, stored, volume, used);
+  compare_options(out, stored, volume, used, scan.cone);
   compare_rates(out, volume, stored);
-  compare_coverage(out, used, volume, stored);
+  compare_coverage(out, scan, volume, stored);
   compare_region(out, volume, stored);
   compare_totals(out, volume, stored);
   return std::move(out.found);

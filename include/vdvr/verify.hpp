@@ -72,9 +72,9 @@ struct VerifyResult {
 /// says hold and that this device has; then computes again what else `stored` says (docs/error-bounds.md,
 /// "What verify compares"). Does not check hashes: the caller does, from the file. Cost: views * rows *
 /// columns^2 a few times on the host, 7 * views multiply-adds for each node a quarter of a pixel apart across
-/// z on each detector row, as many as there are rows for each gold node, and what `build` takes to filter, to
-/// reconstruct the base and to measure the tested bricks. Throws ResourceError when --max-memory is too small
-/// for one row of bricks and one view.
+/// z on each detector row, as many as there are rows for each gold node (of cone beam 64 * views for each
+/// node at about 8x), and what `build` takes to filter, to reconstruct the base and to measure the tested
+/// bricks. Throws ResourceError when --max-memory is too small for one row of bricks and one view.
 VDVR_API VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                              const Certificate& stored, const VerifyOptions& options = {},
                              const Progress& progress = {});

@@ -11,7 +11,7 @@
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/simulate.hpp"
@@ -324,5 +324,6 @@ BOOST_AUTO_TEST_CASE(covered_is_a_cylinder_with_two_cones_cut_into_it) {
 BOOST_AUTO_TEST_CASE(what_is_for_parallel_beam_refuses_cone_beam) {
   const ProjectionSet scan = noisy_cone({});
   Device device;
-  BOOST_CHECK_THROW(make_plan(device, scan, Tolerance{.relative = 0.03}, {}), InputError);
+  BOOST_CHECK_THROW(static_cast<void>(filter_projections(device.state(), scan, {})), InputError);
+  BOOST_CHECK_THROW(D2vrField(device, scan, {}, {}), InputError);
 }

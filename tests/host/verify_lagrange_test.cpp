@@ -70,7 +70,7 @@ double reached(const LagrangeFilter& f, const std::vector<double>& formula) {
   return largest;
 }
 
-ViewSups some_sups(std::size_t views) {
+SupsByView some_sups(std::size_t views) {
   return {std::vector<double>(views, 0.7), std::vector<double>(views, 3.0), std::vector<double>(views, 2.0)};
 }
 

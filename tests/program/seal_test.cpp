@@ -7,6 +7,7 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/vdvr_files.hpp"
 #include "vdvr/build.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/verify.hpp"
 
@@ -512,8 +513,9 @@ BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
               largest = std::max(largest, b.total);
             },
             {});
+  const CertifiedRegion region(scan);
   const auto attacked = [&](const Certificate& c) {
-    TotalAttack attack(volume, c);
+    TotalAttack attack(volume, c, region);
     field.run(all, volume.rate,
               [&](const VerifyField::Piece& b) {
                 if (b.total >= 0) attack.consider(b);

@@ -13,11 +13,12 @@
 
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/verify/verify_seams.hpp"
+#include "host/volume/seams.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/build.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -245,7 +246,7 @@ BOOST_AUTO_TEST_CASE(a_wrong_F_of_verify_is_told_by_nodes) {
   const Made& m = small();
   const ExactField exact(m.scan, m.certificate.field);
   const std::vector<std::uint8_t> all(m.volume.level.size(), 1);
-  const FieldPoints chosen(exact, m.volume, all, 1);
+  const FieldPoints chosen(exact, CertifiedRegion(m.scan, m.certificate.field), m.volume, all, 1);
   BOOST_TEST(!chosen.bricks().empty());
   Device device;
   VerifyField field(device.state(), exact, m.volume, {}, {});

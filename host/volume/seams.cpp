@@ -1,5 +1,5 @@
 // Compares the samples that neighbouring bricks share.
-#include "host/verify/verify_seams.hpp"
+#include "host/volume/seams.hpp"
 
 #include <algorithm>
 #include <bit>

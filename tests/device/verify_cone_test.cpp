@@ -1,0 +1,417 @@
+// Verify of cone beam: its nodes and bounds against F in double precision, on several orbits; valid
+// certificates, damaged ones, and those of other views.
+#define BOOST_TEST_MODULE verify_cone
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+
+#include "host/fdk/filter_cone.hpp"
+#include "host/fdk/view_derivatives.hpp"
+#include "host/system/casts.hpp"
+#include "host/verify/verify_cone_bounds.hpp"
+#include "host/verify/verify_field.hpp"
+#include "host/verify/verify_nodes.hpp"
+#include "host/verify/verify_points.hpp"
+#include "host/volume/bricks.hpp"
+#include "tests/support/cone_scans.hpp"
+#include "tests/support/device.hpp"
+#include "tests/support/tolerance.hpp"
+#include "vdvr/certified_region.hpp"
+#include "vdvr/certify.hpp"
+#include "vdvr/verify.hpp"
+
+using namespace vdvr;
+using vdvr::testing::ConeShape;
+using vdvr::testing::noisy_cone;
+
+namespace {
+
+struct Case {
+  std::string name;
+  ConeShape shape;
+  double spacing = 1;
+};
+
+ConeShape orbit(double source, std::int64_t rows = 12, std::int64_t columns = 14) {
+  ConeShape s;
+  s.views = 17;
+  s.source_to_axis = source;
+  s.rows = rows;
+  s.columns = columns;
+  return s;
+}
+
+std::vector<Case> cases() {
+  ConeShape tilted = orbit(50), displaced = orbit(60), arc = orbit(45);
+  tilted.in_plane_deg = 1;
+  tilted.out_of_plane_deg = 3;
+  displaced.shift = 2.5;
+  displaced.views = 30;
+  arc.arc_deg = 230;
+  return {{"5 degrees", orbit(80)},
+          {"15 degrees", orbit(26)},
+          {"tilted", tilted},
+          {"displaced", displaced},
+          {"short scan", arc},
+          {"fan beam", orbit(50, 1)},
+          {"cells of .6 pixels", orbit(50), 0.6},
+          {"cells of two pixels", orbit(50), 2}};
+}
+
+/// The covered cylinder and a little more.
+Grid grid_of(const Coverage& coverage, double spacing) {
+  const double r = coverage.inner_radius();
+  const auto [low, high] = coverage.heights();
+  Grid grid;
+  grid.spacing = {spacing, spacing, spacing};
+  const auto cells = [&](double length) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing)));
+  };
+  grid.cells = {cells(2 * r), cells(2 * r), cells(high - low)};
+  grid.origin = {-r + 0.01, -r - 0.02, low};
+  return grid;
+}
+
+/// Places of the array of gold, two nodes around the grid's own.
+struct Gold {
+  std::int64_t n = 0, nz = 0, z_padded = 0;
+  std::vector<float> values;
+};
+
+Gold gold_of(opencl::State& state, VerifyNodes& nodes, const Grid& grid, int rate) {
+  Gold g;
+  g.n = std::max(grid.cells[0], grid.cells[1]) * rate + 5;
+  g.nz = grid.cells[2] * rate + 5;
+  g.z_padded = (g.nz + 15) / 16 * 16;
+  const opencl::DeviceArray<float> values(state, count(g.n * g.n * g.z_padded + 64), "gold");
+  const std::array<std::int64_t, 2> corner{-2, -2};
+  nodes.gold({rate, std::span(&corner, 1), g.n, -2, g.z_padded}, values);
+  g.values = values.to_host();
+  return g;
+}
+
+/// Nodes of the whole grid.
+VerifyNodes::Part part_of(const Grid& grid, const ConeNodeRates& rates, int finest) {
+  VerifyNodes::Part p;
+  p.across = rates.across;
+  p.rows = false;
+  p.along = rates.along;
+  const std::int64_t around = finest > p.across ? VerifyNodes::reach : 2,
+                     beyond = finest > p.along ? VerifyNodes::reach : 2 * std::max(1, p.along / p.across);
+  p.first_x = p.first_y = -around;
+  p.nx = grid.cells[0] * p.across + 1 + 2 * around;
+  p.ny = grid.cells[1] * p.across + 1 + 2 * around;
+  p.first_z = -beyond;
+  p.nz = grid.cells[2] * p.along + 1 + 2 * beyond;
+  p.tiles.assign(at(VerifyNodes::tiles_across(p.nx) * VerifyNodes::tiles_across(p.ny)), 1);
+  return p;
+}
+
+struct Worst {
+  double share = 0;
+  std::int64_t nodes = 0, off_detector = 0;
+};
+
+bool is_seen(const ExactField& exact, const Vec3& p) {
+  return std::all_of(exact.views().begin(), exact.views().end(), [&](const ViewMatrix& m) {
+    const Vec3 s = projected(m, p);
+    return s[0] >= -0.5 && s[0] <= static_cast<double>(exact.geometry().columns) - 0.5 && s[1] >= -0.5 &&
+           s[1] <= static_cast<double>(exact.geometry().rows) - 0.5;
+  });
+}
+
+/// Nodes by chance, of the cylinder and two steps of gold around, as a share of the bound.
+Worst compare(const ExactField& exact, const Coverage& coverage, const Grid& grid, const Gold& gold, int rate,
+              double bound) {
+  std::mt19937 random(7);
+  std::vector<Vec3> points;
+  std::vector<double> values;
+  const double reach = 3 * std::hypot(grid.spacing[0], grid.spacing[1]) / rate;
+  for (int tries = 0; tries < 20000 && points.size() < 500; ++tries) {
+    const Index3 node{static_cast<std::int64_t>(random() % count(grid.cells[0] * rate + 5)),
+                      static_cast<std::int64_t>(random() % count(grid.cells[1] * rate + 5)),
+                      static_cast<std::int64_t>(random() % count(gold.nz))};
+    Vec3 p{};
+    for (std::size_t a = 0; a < 3; ++a)
+      p[a] = grid.origin[a] + static_cast<double>(node[a] - 2) / rate * grid.spacing[a];
+    if (coverage.margin(p[0], p[1]) < -reach) continue;
+    points.push_back(p);
+    values.push_back(
+        static_cast<double>(gold.values[at((node[1] * gold.n + node[0]) * gold.z_padded + node[2])]));
+  }
+  Worst w;
+  w.nodes = static_cast<std::int64_t>(points.size());
+  const std::vector<double> F = exact.at(points);
+  for (std::size_t i = 0; i < F.size(); ++i) {
+    const double share = std::abs(values[i] - F[i]) / bound;
+    if (!(share <= w.share)) w.share = std::isnan(share) ? std::numeric_limits<double>::infinity() : share;
+    w.off_detector += is_seen(exact, points[i]) ? 0 : 1;
+  }
+  return w;
+}
+
+double uniform(std::mt19937& random, double low, double high) {
+  return low + (high - low) * static_cast<double>(random()) / 4294967296.0;
+}
+
+/// Base samples of F, every brick at level 0.
+MixedVolume volume_of(const ExactField& exact, const Grid& grid, int rate) {
+  MixedVolume v;
+  v.grid = grid;
+  v.granularity = 2;
+  v.rate = rate;
+  const Index3 n = grid.samples();
+  std::vector<Vec3> points;
+  for (std::int64_t i = 0; i < n[0] * n[1] * n[2]; ++i)
+    points.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  const std::vector<double> F = exact.at(points);
+  v.base.f32.assign(F.begin(), F.end());
+  v.level.assign(at(v.brick_count()), LevelTriple{0, 0, 0});
+  v.tile.assign(at(v.brick_count()), 0);
+  return v;
+}
+
+struct Built {
+  ProjectionSet scan;
+  BuildResult result;
+};
+
+// Ellipsoids, so that bricks have several levels.
+const Built& built() {
+  static const Built all = [] {
+    SimulateOptions options;
+    options.columns = options.rows = 24;
+    options.angles = 30;
+    options.arc_deg = 360;
+    options.cone = ConeSetup{};
+    options.cone->source_to_axis = options.cone->source_to_detector = 60;
+    Built b;
+    b.scan = simulate(shepp_logan(18), options);
+    b.result = certify(support::device(), b.scan, Tolerance{.relative = 0.05});
+    return b;
+  }();
+  return all;
+}
+
+VerifyResult verified(const MixedVolume& volume, const Certificate& certificate) {
+  VerifyOptions options;
+  options.exhaustive = true;
+  return verify(support::device(), built().scan, volume, certificate, options);
+}
+
+bool names(const std::vector<std::string>& differences, const std::string& what) {
+  return std::any_of(differences.begin(), differences.end(),
+                     [&](const std::string& d) { return d.find(what) != std::string::npos; });
+}
+
+}  // namespace
+
+// Two programs of one theorem.
+BOOST_AUTO_TEST_CASE(derivatives_are_bounded_as_build_bounds_them) {
+  std::mt19937 random(3);
+  for (const Case& c : cases())
+    for (int tries = 0; tries < 20; ++tries) {
+      const ViewMatrix m = testing::cone_of(c.shape).views[at(tries % c.shape.views)];
+      ConeBox box;
+      for (std::size_t a = 0; a < 3; ++a) {
+        box.low[a] = uniform(random, -5, 4);
+        box.high[a] = box.low[a] + uniform(random, 0, 2);
+      }
+      const double value = uniform(random, 0.1, 1);
+      const DetectorSups sups{value, uniform(random, 0.1, 12) * value, uniform(random, 0.1, 12) * value};
+      for (int x = 0; x <= 6; ++x)
+        for (int y = 0; x + y <= 6; ++y)
+          for (int z = 0; x + y + z <= 6; ++z) {
+            const double own = cone_derivative(m, {x, y, z}, sups.value, sups.second_u, sups.second_v, box,
+                                               {1, 1, 1}),
+                         theirs = derivative_bound(view_box(m, box.low, box.high), {x, y, z}, sups);
+            // Either is widened by some thousand roundings.
+            BOOST_TEST(std::abs(own - theirs) <= 0x1p-30 * theirs, c.name << ": " << x << y << z);
+          }
+    }
+}
+
+BOOST_AUTO_TEST_CASE(F_is_within_its_bound_at_every_node) {
+  std::int64_t off_detector = 0;
+  for (const Case& c : cases()) {
+    const ProjectionSet scan = noisy_cone(c.shape);
+    const ExactField exact(scan, {});
+    const Coverage coverage = certified_coverage(scan, {});
+    const Grid grid = grid_of(coverage, c.spacing);
+    const SupsByView sups = cone_view_sups(exact, {});
+    const ConeNodeRates rates = cone_node_rates(exact, coverage, grid.spacing);
+    // Where nodes of one axis are denser than gold, every second of them serves, or every fourth.
+    const int base = rates.across;
+    VerifyNodes nodes(support::device().state(), exact, coverage, grid, 1, 12 * grid.spacing[0]);
+    const VerifyNodes::Part part = part_of(grid, rates, 2 * base);
+    nodes.make(part);
+    for (const int rate : {base, 2 * base}) {
+      Vec3 h = grid.spacing;
+      for (double& x : h) x /= rate;
+      ConeBox box;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double around = (2.0 / rate + 7.0 / (a < 2 ? part.across : part.along)) * grid.spacing[a];
+        box.low[a] = grid.origin[a] - around;
+        box.high[a] = grid.origin[a] + static_cast<double>(grid.cells[a]) * grid.spacing[a] + around;
+      }
+      const FieldBounds bounds = cone_field_bounds(
+          exact.views(), sups, box, h, {nodes.path(part, rate), nodes.cone_facts(), exact.rounding()}, true);
+      const Gold gold = gold_of(support::device().state(), nodes, grid, rate);
+      const Worst w = compare(exact, coverage, grid, gold, rate, bounds.arithmetic);
+      BOOST_TEST_MESSAGE(c.name << ", " << rate << "x: " << 100 * w.share << " % of the bound "
+                                << bounds.arithmetic << " of " << w.nodes << " nodes, " << w.off_detector
+                                << " off the detector");
+      BOOST_TEST(w.share <= tolerance::bound(1.0), c.name << ", " << rate << "x");
+      // A bound that nothing comes near would hide a fault. On finer gold it is that of the fastest waves.
+      BOOST_TEST(w.share > (rate == base ? 0.002 : 0.0002), c.name);
+      BOOST_TEST(w.nodes > 200, c.name);
+      off_detector += w.off_detector;
+    }
+  }
+  BOOST_TEST(off_detector > 50);
+}
+
+// V and F at all points of a lattice twice as dense as gold: the trilinear V errs most between nodes.
+BOOST_AUTO_TEST_CASE(no_point_exceeds_the_bound_of_its_brick) {
+  for (const Case& c : cases()) {
+    if (c.shape.rows == 1) continue;  // no cell has a covered height
+    const ProjectionSet scan = noisy_cone(c.shape, 4);
+    const ExactField exact(scan, {});
+    const Coverage coverage = certified_coverage(scan, {});
+    const MixedVolume volume = volume_of(exact, grid_of(coverage, c.spacing), 8);
+    VerifyField field(support::device().state(), exact, volume, {}, {});
+    for (const int rate : {2, 8}) {
+      std::vector<double> total(volume.level.size(), -1);
+      field.run(
+          std::vector<std::uint8_t>(volume.level.size(), 1), rate,
+          [&](const VerifyField::Piece& p) { total[at(p.brick)] = std::max(total[at(p.brick)], p.total); },
+          {});
+      std::mt19937 random(5);
+      std::vector<Vec3> points;
+      const Grid& g = volume.grid;
+      while (points.size() < 1500) {
+        Vec3 p{};
+        for (std::size_t a = 0; a < 3; ++a) {
+          const auto half = static_cast<std::int64_t>(random() % count(g.cells[a] * 2 * rate + 1));
+          p[a] = g.origin[a] + static_cast<double>(half) / (2 * rate) * g.spacing[a];
+        }
+        if (field.covered(p)) points.push_back(p);
+      }
+      const std::vector<double> F = exact.at(points);
+      double worst = 0;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const double error = std::abs(static_cast<double>(sample_at(volume, points[i])) - F[i]),
+                     bound = total[at(Bricks(g, volume.granularity).number(brick_at(volume, points[i])))];
+        worst = std::max(worst, error / bound);
+        BOOST_TEST(error <= bound, c.name << ", " << rate << "x: " << error << " for " << bound);
+      }
+      BOOST_TEST_MESSAGE(c.name << ", " << rate << "x: largest error / bound " << worst);
+      if (rate == 8) BOOST_TEST(worst > 0.4, c.name);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_valid_certificate_holds) {
+  const VerifyResult r = verified(built().result.volume, built().result.certificate);
+  BOOST_TEST(r.holds, r.failure);
+  BOOST_TEST(r.differences.empty());
+  BOOST_TEST(r.measured_max <= built().result.certificate.measured_max + r.arithmetic);
+  BOOST_TEST(r.field_points > 100);
+  BOOST_TEST(r.field_share <= 1);
+  BOOST_TEST_MESSAGE("total " << r.total << ", certified " << built().result.certificate.total_buffer);
+}
+
+BOOST_AUTO_TEST_CASE(a_damaged_sample_is_found_and_named) {
+  MixedVolume damaged = built().result.volume;
+  const Grid& g = damaged.grid;
+  // Any brick of level 0 that lies well inside: its samples are the base's.
+  const Bricks bricks(g, damaged.granularity);
+  std::int64_t brick = -1;
+  Index3 sample{};
+  for (std::int64_t i = 0; i < bricks.size() && brick < 0; ++i) {
+    const Index3 p = bricks.position(i);
+    for (std::size_t a = 0; a < 3; ++a) sample[a] = p[a] * damaged.granularity + 1;
+    const Vec3 at_sample = g.position(sample);
+    if (damaged.level[at(i)] == LevelTriple{0, 0, 0} && damaged.coarsening == LevelTriple{0, 0, 0} &&
+        std::hypot(at_sample[0], at_sample[1]) < 4 && std::abs(at_sample[2]) < 4)
+      brick = i;
+  }
+  BOOST_REQUIRE(brick >= 0);
+  const Index3 n = g.samples();
+  const std::size_t place = at((sample[2] * n[1] + sample[1]) * n[0] + sample[0]);
+  if (!damaged.base.f32.empty()) damaged.base.f32[place] += 10;
+  if (!damaged.base.u16.empty()) damaged.base.u16[place] ^= 0x8000;
+  if (!damaged.base.u8.empty()) damaged.base.u8[place] ^= 0x80;
+  const VerifyResult r = verified(damaged, built().result.certificate);
+  BOOST_TEST(!r.holds);
+  BOOST_TEST(r.worst.brick == brick);
+  BOOST_TEST(r.worst.dataset == "/base");
+  for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(r.worst.sample[a] == sample[a]);
+}
+
+BOOST_AUTO_TEST_CASE(certificates_of_other_views_are_refused_by_name) {
+  const auto changed = [&](const auto& change) {
+    Certificate c = built().result.certificate;
+    auto options = nlohmann::ordered_json::parse(c.options_json);
+    change(options["geometry"]);
+    c.options_json = options.dump();
+    VerifyOptions few;
+    few.fraction = 0.001;
+    return verify(support::device(), built().scan, built().result.volume, c, few);
+  };
+  const VerifyResult matrix = changed([](auto& g) {
+    g["cone"]["matrices"][12 * 3 + 1] = g["cone"]["matrices"][12 * 3 + 1].template get<double>() + 1e-9;
+  });
+  BOOST_TEST(!matrix.holds);
+  BOOST_TEST(names(matrix.differences, "options.geometry.cone.matrices[37] (view 3, row 0, column 1)"));
+  const VerifyResult fewer = changed([](auto& g) { g["cone"]["matrices"].erase(0); });
+  BOOST_TEST(names(fewer.differences, "the number of matrices"));
+  const VerifyResult redundancy = changed([](auto& g) { g["cone"]["redundancy"] = "short-scan"; });
+  BOOST_TEST(names(redundancy.differences, "redundancy"));
+  const VerifyResult parallel = changed([](auto& g) { g.erase("cone"); });
+  BOOST_TEST(names(parallel.differences, "parallel beam, not of cone beam"));
+}
+
+// A certificate that says more than is so: of the terms that build's own code makes again.
+BOOST_AUTO_TEST_CASE(edited_terms_are_told) {
+  const auto changed = [&](const auto& change) {
+    Certificate c = built().result.certificate;
+    change(c);
+    VerifyOptions few;
+    few.fraction = 0.001;
+    return verify(support::device(), built().scan, built().result.volume, c, few);
+  };
+  BOOST_TEST(names(changed([](Certificate& c) { c.budget.projection.value *= 0.9; }).differences,
+                   "the projection term"));
+  BOOST_TEST(names(changed([](Certificate& c) {
+                     const double less = 0.1 * c.budget.arithmetic.value;
+                     c.budget.arithmetic.value -= less;
+                     c.total_buffer -= less;
+                     if (c.total_image3d) *c.total_image3d -= less;
+                   }).differences,
+                   "the arithmetic term"));
+  BOOST_TEST(
+      names(changed([](Certificate& c) { c.not_covered_count += 1; }).differences, "not_covered.count"));
+  BOOST_TEST(!changed([](Certificate& c) { c.reference_range *= 1.01; }).holds);
+}
+
+// What a view sees beyond the certified cylinder is promised nothing.
+BOOST_AUTO_TEST_CASE(points_are_drawn_in_the_certified_cylinder) {
+  const ProjectionSet& scan = built().scan;
+  const ExactField exact(scan, {});
+  const CertifiedRegion region(scan);
+  const MixedVolume& volume = built().result.volume;
+  const std::vector<std::uint8_t> all(volume.level.size(), 1);
+  const FieldPoints points(exact, region, volume, all, 1);
+  BOOST_TEST(!points.bricks().empty());
+  VerifyField field(support::device().state(), exact, volume, {}, {});
+  field.look_at(points.bricks(), points.nodes_each(), 1);
+  field.run(points.flags(), 8, [](const VerifyField::Piece&) {}, {});
+  BOOST_TEST(field.seen().size() > 50);
+  for (const VerifyField::Node& node : field.seen()) BOOST_TEST(region.contains(node.at));
+  BOOST_TEST(FieldPoints::compare(exact, field.seen(), {}).failure.empty());
+}
