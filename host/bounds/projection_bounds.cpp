@@ -324,6 +324,17 @@ double largest_sum(const FilteredScan& scan, const std::vector<double>& values) 
   return largest;
 }
 
+// Whether fourth derivatives are worth their sups, which cost as much again as those of second ones: bounds
+// of sixth derivatives grow with lambda^-8.
+bool looks_closely(const FilteredScan& scan) {
+  constexpr double near = 0.8;
+  const Coverage coverage(scan.geometry, scan.views);
+  double least = HUGE_VAL;
+  for (const Corners& part : RegionOutline(coverage, 0).parts(coverage.heights()))
+    for (const ViewMatrix& m : scan.views) least = std::min(least, view_box(m, part).lambda_min);
+  return least < near;
+}
+
 }  // namespace
 
 FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan, std::int64_t step) {
@@ -335,6 +346,13 @@ FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredSc
   sups.by_view.resize(at(g.views()));
   const std::int64_t chunk =
       view_chunk(state, scan, grid.columns.count, static_cast<std::int64_t>(grid.rows.size()));
+  const bool fourth = looks_closely(scan);
+  // Of samples, per pixel; a derivative along v multiplies rounding by at most pi / pitch_v (Bernstein).
+  const auto sup = [&](double sampled, int order_u, int order_v, double most) {
+    return std::pow(g.pitch_u, order_u) *
+           (std::pow(g.pitch_v, order_v) * grid.rise * sampled +
+            std::pow(pi, order_v) * derivative_rounding(upsampler, scan, grid.columns, order_u, most, 1));
+  };
   for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
     const auto derivative = [&](int order_u, int order_v) {
       return view_sups(state,
@@ -346,12 +364,19 @@ FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredSc
       DetectorSups& view = sups.by_view[at(first + i)];
       const double most = scan.view_max[at(first + i)];
       view.value = value[at(i)] + values.rounding(most, 1);
-      view.second_u = square_u * (grid.rise * along_u[at(i)] +
-                                  derivative_rounding(upsampler, scan, grid.columns, 2, most, 1));
-      // The second derivative along v multiplies by at most (pi / pitch_v)^2 (Bernstein).
-      if (g.rows > 1)
-        view.second_v = square_v * grid.rise * along_v[at(i)] +
-                        pi * pi * derivative_rounding(upsampler, scan, grid.columns, 0, most, 1);
+      view.second_u = sup(along_u[at(i)], 2, 0, most);
+      if (g.rows > 1) view.second_v = sup(along_v[at(i)], 0, 2, most);
+    }
+    if (!fourth) return;
+    const std::vector<double> fourth_u = derivative(4, 0);
+    for (std::int64_t i = 0; i < n; ++i)
+      sups.by_view[at(first + i)].fourth_u = sup(fourth_u[at(i)], 4, 0, scan.view_max[at(first + i)]);
+    if (g.rows == 1) return;
+    const std::vector<double> second_uv = derivative(2, 2), fourth_v = derivative(0, 4);
+    for (std::int64_t i = 0; i < n; ++i) {
+      DetectorSups& view = sups.by_view[at(first + i)];
+      view.second_uv = sup(second_uv[at(i)], 2, 2, scan.view_max[at(first + i)]);
+      view.fourth_v = sup(fourth_v[at(i)], 0, 4, scan.view_max[at(first + i)]);
     }
   });
   // An estimate takes the views between for those that were looked at.

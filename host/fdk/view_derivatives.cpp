@@ -35,19 +35,24 @@ double factorial_ratio(int n, int m) {  // n! / m!
 }
 
 // [p][r] = (n+1)! / (p+r+1)! sup |q_{u^p v^r}|, p + r <= n. Bernstein's inequality takes a factor of pi, the
-// Nyquist frequency, for each order; it may start from the value or from either second derivative.
+// Nyquist frequency, for each order; it may start from the value or from any derivative whose sup is known.
 Table weighted_sups(const DetectorSups& sups, int n) {
   constexpr double square = std::numbers::pi * std::numbers::pi;
-  const double from_value = square * sups.value;
-  const double from_u = std::min(from_value, sups.second_u), from_v = std::min(from_value, sups.second_v);
-  const double from_any = std::min(from_u, from_v);
+  // Each as a fourth derivative's.
+  const double from_value = square * square * sups.value, from_u = square * sups.second_u,
+               from_v = square * sups.second_v;
   Table table{};
-  double order_power = 1 / square;  // pi^(order - 2)
+  double order_power = 1 / (square * square);  // pi^(order - 4)
   for (int order = 0; order <= n; ++order, order_power *= std::numbers::pi) {
     const double factor = factorial_ratio(n + 1, order + 1) * order_power;
     for (int p = 0; p <= order; ++p) {
       const int r = order - p;
-      const double least = p >= 2 && r >= 2 ? from_any : p >= 2 ? from_u : r >= 2 ? from_v : from_value;
+      double least = from_value;
+      if (p >= 2) least = std::min(least, from_u);
+      if (r >= 2) least = std::min(least, from_v);
+      if (p >= 4) least = std::min(least, sups.fourth_u);
+      if (p >= 2 && r >= 2) least = std::min(least, sups.second_uv);
+      if (r >= 4) least = std::min(least, sups.fourth_v);
       table[static_cast<std::size_t>(p)][static_cast<std::size_t>(r)] = factor * least;
     }
   }

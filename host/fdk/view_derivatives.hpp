@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct DetectorSups {
   double value = 0;     ///< sup |q|
   double second_u = 0;  ///< sup |q_uu|
   double second_v = 0;  ///< sup |q_vv|
+  // Infinite where nobody looked: Bernstein's inequality has bounds of them then.
+  double fourth_u = HUGE_VAL;   ///< sup |q_uuuu|
+  double second_uv = HUGE_VAL;  ///< sup |q_uuvv|
+  double fourth_v = HUGE_VAL;   ///< sup |q_vvvv|
 };
 
 /// A convex piece of space, by its corners in any order.

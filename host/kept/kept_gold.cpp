@@ -81,7 +81,7 @@ void KeptGold::set_spacing() {
 // too far. Heights are kept themselves: no two nodes see the same rows.
 void KeptGold::keep_heights(double reach) {
   // Of the largest value that F can have, what filters along an axis may err: the remainder sees it 16 times.
-  constexpr double most_error = 5e-5;
+  constexpr double most_error = 2e-5;
   for (bool dense = false; !dense;) {
     const ConeLattice lattice = cone_lattice(reach);
     if (lattice.reach < lattice.claimed) {  // tiles whose middle reaches a source: smaller ones
@@ -198,10 +198,9 @@ constexpr double curved_apart = 1.5;
 KeptGold::ConeParts KeptGold::cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
   // What the filters round: a product in runs along z, one more than taps in either filter across z.
   const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double rounding =
-      unit_roundoff * cone_->sup() *
-      (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
-       (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
+  const double rounding = unit_roundoff * cone_->sup() *
+                          (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
+                           (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
   return {cone_->errors(), cone_->filter_error(x, y, z), rounding};
 }
 
@@ -222,8 +221,8 @@ GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
   return out;
 }
 
-// Of cone beam a kept node's error passes through the filters, whose interpolant hardly bends from one node of
-// gold to the next.
+// Of cone beam a kept node's error passes through the filters, whose interpolant hardly bends from one node
+// of gold to the next.
 std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   constexpr double weights = 16;  // magnitudes of a fourth difference's, pure or mixed
   std::array<double, 6> out{};
@@ -238,7 +237,7 @@ std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   const double node = parts.kept.interpolation + parts.kept.rounding,
                apart = weights * (parts.filters + parts.rounding);
   const auto pure = [](const GoldFilter& f) { return f.rate > 1 ? f.fourth_difference : weights; };
-  out = {pure(x) * y.norm * z.norm,    x.norm * pure(y) * z.norm,    x.norm * y.norm * pure(z),
+  out = {pure(x) * y.norm * z.norm,  x.norm * pure(y) * z.norm,  x.norm * y.norm * pure(z),
          bend(x) * bend(y) * z.norm, bend(x) * y.norm * bend(z), x.norm * bend(y) * bend(z)};
   for (double& of_nodes : out) of_nodes = of_nodes * node + apart;
   return out;

@@ -27,8 +27,11 @@ constexpr double pi = std::numbers::pi;
 // q = amplitude cos(w_u u + w_v v + phase)
 struct Wave {
   double amplitude = 1, w_u = 0, w_v = 0, phase = 0;
-  [[nodiscard]] DetectorSups sups() const {
-    return {std::abs(amplitude), std::abs(amplitude) * w_u * w_u, std::abs(amplitude) * w_v * w_v};
+  /// With those of the fourth derivatives, or as if nobody had looked.
+  [[nodiscard]] DetectorSups sups(bool fourth = false) const {
+    const double a = std::abs(amplitude), u = w_u * w_u, v = w_v * w_v;
+    return fourth ? DetectorSups{a, a * u, a * v, a * u * u, a * u * v, a * v * v}
+                  : DetectorSups{a, a * u, a * v};
   }
 };
 
@@ -181,7 +184,7 @@ BOOST_AUTO_TEST_CASE(no_wave_exceeds_a_bound_in_any_box) {
     const ViewBox box = view_box(m, low, high);
     BOOST_TEST_REQUIRE(box.lambda_min > 0);
     for (const auto& orders : orders_up_to_six()) {
-      const double bound = derivative_bound(box, orders, q.sups());
+      const double bound = derivative_bound(box, orders, q.sups(trial % 2 == 0));
       for (int point = 0; point < 12; ++point) {
         std::array<double, 3> x{};
         for (std::size_t e = 0; e < 3; ++e) {  // corners first
@@ -214,7 +217,7 @@ BOOST_AUTO_TEST_CASE(waves_of_a_distant_source_reach_their_bounds) {
       double product = q.amplitude;
       for (std::size_t e = 0; e < 3; ++e)
         product *= std::pow(q.w_u * std::abs(m[0][e]) + q.w_v * std::abs(m[1][e]), orders[e]);
-      const double bound = derivative_bound(box, orders, q.sups());
+      const double bound = derivative_bound(box, orders, q.sups(trial % 2 == 0));
       BOOST_TEST(product <= bound);
       if (q.w_u > 0 && q.w_v > 0) BOOST_TEST(bound <= product * (1 + rounding));
     }
@@ -246,7 +249,7 @@ BOOST_AUTO_TEST_CASE(top_waves_of_a_cone_come_near_their_bounds) {
             const Wave here{1, pi, sign * pi, turn * pi / 32};
             reached = std::max(reached, std::abs(derivative(m, here, x, axes_of(orders))));
           }
-      const double bound = derivative_bound(box, orders, q.sups());
+      const double bound = derivative_bound(box, orders, q.sups(trial % 2 == 0));
       BOOST_TEST(reached <= bound);
       least = std::min(least, reached / bound);
     }
