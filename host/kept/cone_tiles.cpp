@@ -210,7 +210,7 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
                                                        "views about blocks");
     const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
     shape.tiles = to_int(static_cast<std::int64_t>(n));
-    kernel({{count(lattice_.groups), count(side), n}, {1, 1, 1}}, page.out->buffer(), table.values.buffer(),
+    kernel({{count(side), count(lattice_.groups), n}, {1, 1, 1}}, page.out->buffer(), table.values.buffer(),
            views.buffer(), ranges.buffer(), static_cast<cl_ulong>(first) * shape.tile, shape);
     opencl::finish(state_, "kept nodes");  // before the views' numbers go
   }

@@ -1,7 +1,8 @@
 // Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by six taps both ways from
 // tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
 // VIEW views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in columns
-// and rows of the table, relative to the middle of a block of nodes. Called by host/kept/cone_tiles.cpp.
+// and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the same
+// columns and rows, follow one another. Called by host/kept/cone_tiles.cpp.
 #include "shared/cone_nodes.h"
 #include "shared/six_taps.h"
 
@@ -72,7 +73,7 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const View* views,
                          __global const int2* wanted, ulong first, VdvrConeNodes s) {
-  const int group = (int)get_global_id(0), y = (int)get_global_id(1), tile = (int)get_global_id(2);
+  const int y = (int)get_global_id(0), group = (int)get_global_id(1), tile = (int)get_global_id(2);
   if (group >= s.groups || tile >= s.tiles) return;
   const int2 range = wanted[tile * VDVR_CONE_TILE + y];
   const int column_stride = s.column_stride, views_all = s.views, height = group * VDVR_CONE_HEIGHTS,
