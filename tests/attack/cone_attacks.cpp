@@ -35,6 +35,7 @@ struct Report {
   std::string outcome = "held", message;
   std::map<std::string, Worst> checks;
   std::int64_t cells = 0, points = 0;
+  double lambda = 1;  // the least, on the grid
   double seconds = 0;
   [[nodiscard]] std::vector<std::string> violated() const {
     std::vector<std::string> out;
@@ -44,18 +45,21 @@ struct Report {
   }
 };
 
+std::string text_of(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", x);
+  return text;
+}
+
 std::string text_of(const Vec3& p) {
-  return "(" + std::to_string(p[0]) + ", " + std::to_string(p[1]) + ", " + std::to_string(p[2]) + ")";
+  return "(" + text_of(p[0]) + ", " + text_of(p[1]) + ", " + text_of(p[2]) + ")";
 }
 
 // What a reader needs to know of a case; the seed alone makes it again.
 std::string text_of(const ConeCase& c) {
-  char half[32];
-  std::snprintf(half, sizeof half, "%g", c.half_angle_deg);
-  char cells[32];
-  std::snprintf(cells, sizeof cells, "%g", c.cells);
-  return std::string(half) + " degrees, " + c.orbit + "; " + c.field + "; target: " + c.place + ", " +
-         text_of(c.target) + "; gold " + std::to_string(c.rates.gold) + ", cells of " + cells + " pixels";
+  return text_of(c.half_angle_deg) + " degrees, " + c.orbit + "; " + c.field + "; target: " + c.place + ", " +
+         text_of(c.target) + "; gold " + std::to_string(c.rates.gold) + ", cells of " + text_of(c.cells) +
+         " pixels";
 }
 
 // F at the half lattice of all gold cells, x fastest.
@@ -112,10 +116,11 @@ class Attack {
         region_(certified_coverage(c.scan, {})),
         certified_(c.scan) {
     // What ExactField says of its rounding is of the sums over coefficients; lambda^-2 multiplies them.
-    double largest = 1;
-    for (const ViewMatrix& m : chain_.exact.views())
-      for (const Vec3& p : half_.points) largest = std::max(largest, std::pow(projected(m, p)[2], -2));
-    rounding_ = largest * chain_.exact.rounding();
+    for_tested_nodes([&](std::size_t, const Vec3& p) {
+      for (const ViewMatrix& m : chain_.exact.views())
+        report_.lambda = std::min(report_.lambda, projected(m, p)[2]);
+    });
+    rounding_ = chain_.exact.rounding() / (report_.lambda * report_.lambda);
   }
   Report run() {
     check_nodes();
@@ -133,15 +138,26 @@ class Attack {
  private:
   Worst& worst(const char* name) { return report_.checks[name]; }
 
-  void check_nodes() {
-    const double bound = gold_.projection + gold_.arithmetic + rounding_;
+  template <class Look>
+  void for_tested_nodes(const Look& look) {
     for (std::int64_t z = 0; z < gold_.nodes[2]; ++z)
       for (std::int64_t y = 0; y < gold_.nodes[1]; ++y)
-        for (std::int64_t x = 0; x < gold_.nodes[0]; ++x) {
-          const std::size_t n = gold_.at(x, y, z), h = half_.at({2 * x, 2 * y, 2 * z});
-          if (gold_.above[n] < 0) continue;
-          worst("P + A at nodes").see(std::abs(gold_.gold[n] - half_.F[h]), bound, half_.points[h]);
-        }
+        for (std::int64_t x = 0; x < gold_.nodes[0]; ++x)
+          if (const std::size_t n = gold_.at(x, y, z); gold_.above[n] >= 0)
+            look(n, half_.points[half_.at({2 * x, 2 * y, 2 * z})]);
+  }
+
+  void check_nodes() {
+    const double bound = gold_.projection + gold_.arithmetic + rounding_;
+    std::vector<Vec3> points;
+    std::vector<double> found;
+    for_tested_nodes([&](std::size_t n, const Vec3& p) {
+      points.push_back(p);
+      found.push_back(gold_.gold[n]);
+    });
+    const auto F = chain_.exact.at(points);
+    for (std::size_t i = 0; i < F.size(); ++i)
+      worst("P + A at nodes").see(std::abs(found[i] - F[i]), bound, points[i]);
   }
 
   // The interpolant of computed and of exact gold against F.
@@ -287,9 +303,8 @@ Report attack(Device& device, std::uint64_t seed, std::string& text, double& hal
 }
 
 std::string text_of(const std::string& check, const Worst& w) {
-  char numbers[96];
-  std::snprintf(numbers, sizeof numbers, "error %.6g, bound %.6g (%.4f) at ", w.error, w.bound, w.ratio);
-  return check + ": " + numbers + text_of(w.at);
+  return check + ": error " + text_of(w.error) + ", bound " + text_of(w.bound) + " (" + text_of(w.ratio) +
+         ") at " + text_of(w.at);
 }
 
 nlohmann::ordered_json json_of(std::uint64_t seed, double half_angle, const std::string& text,
@@ -298,9 +313,9 @@ nlohmann::ordered_json json_of(std::uint64_t seed, double half_angle, const std:
   for (const auto& [name, w] : r.checks) checks[name] = w.ratio;
   for (const std::string& name : r.violated())
     failures.push_back({{"kind", name}, {"text", text_of(name, r.checks.at(name))}});
-  return {{"seed", seed},         {"outcome", r.outcome}, {"message", r.message}, {"half_angle", half_angle},
-          {"cells", r.cells},     {"points", r.points},   {"seconds", r.seconds}, {"checks", checks},
-          {"failures", failures}, {"case", text}};
+  return {{"seed", seed},       {"outcome", r.outcome}, {"message", r.message}, {"half_angle", half_angle},
+          {"lambda", r.lambda}, {"cells", r.cells},     {"points", r.points},   {"seconds", r.seconds},
+          {"checks", checks},   {"failures", failures}, {"case", text}};
 }
 
 // For one process: the script makes the tables of many.
@@ -358,7 +373,9 @@ int main(int argc, char** argv) {
         std::printf("seed %llu: %s; %s\n", static_cast<unsigned long long>(seed),
                     text_of(name, r.checks.at(name)).c_str(), text.c_str());
     }
-    if (verbose) std::fprintf(stderr, "  %s %s, %.2f s\n", r.outcome.c_str(), r.message.c_str(), r.seconds);
+    if (verbose)
+      std::fprintf(stderr, "  %s %s, least lambda %.3f, %.2f s\n", r.outcome.c_str(), r.message.c_str(),
+                   r.lambda, r.seconds);
     std::fflush(stdout);  // a later crash must not take it along
   }
   if (!json) table.print();

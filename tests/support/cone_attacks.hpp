@@ -344,8 +344,23 @@ inline std::string take_targeted(ProjectionSet& scan, const Vec3& target, std::s
   return std::string("noise aligned along ") + (flag ? "v" : "u") + signs;
 }
 
+/// One wave of one view: what filters and tables err is not lost among other frequencies.
+inline std::string take_wave(ProjectionSet& scan, Draw& draw) {
+  const auto rows = static_cast<std::size_t>(scan.geometry.rows),
+             columns = static_cast<std::size_t>(scan.geometry.columns);
+  const std::size_t m = columns - 1 - draw.below(columns / 2), l = draw.one_in(2) ? 0 : draw.below(rows),
+                    only = draw.below(scan.cone->views.size());
+  FilteredViews q(scan.cone->views.size(), std::vector<double>(rows * columns, 0.0));
+  for (std::size_t v = 0; v < rows; ++v)
+    for (std::size_t u = 0; u < columns; ++u)
+      q[only][v * columns + u] = std::cos(reference::frequency(m, columns) * (static_cast<double>(u) + 0.5)) *
+                                 std::cos(reference::frequency(l, rows) * (static_cast<double>(v) + 0.5));
+  take_views(scan, q);
+  return "wave " + std::to_string(m) + ", " + std::to_string(l) + " of view " + std::to_string(only);
+}
+
 inline std::string take_field(ProjectionSet& scan, const Coverage& region, const Vec3& target, Draw& draw) {
-  const std::size_t kind = draw.below(10);
+  const std::size_t kind = draw.below(11);
   if (kind < 6) return take_targeted(scan, target, kind % 3, draw);
   if (kind == 6) {
     take_samples(scan, [&](auto, auto, auto) { return draw.between(-1, 1); });
@@ -368,6 +383,7 @@ inline std::string take_field(ProjectionSet& scan, const Coverage& region, const
     take_ellipsoids(scan, region, target, draw);
     return "ellipsoids";
   }
+  if (kind == 9) return take_wave(scan, draw);
   const bool in_all_views = draw.one_in(2);
   take_hot_pixels(scan, target, in_all_views, draw);
   return in_all_views ? "hot pixels at the target" : "hot pixel";
