@@ -116,9 +116,9 @@ class Attack {
         region_(certified_coverage(c.scan, {})),
         certified_(c.scan) {
     // What ExactField says of its rounding is of the sums over coefficients; lambda^-2 multiplies them.
-    for_tested_nodes([&](std::size_t, const Vec3& p) {
+    for_tested_nodes([&](std::size_t, std::size_t half) {
       for (const ViewMatrix& m : chain_.exact.views())
-        report_.lambda = std::min(report_.lambda, projected(m, p)[2]);
+        report_.lambda = std::min(report_.lambda, projected(m, half_.points[half])[2]);
     });
     rounding_ = chain_.exact.rounding() / (report_.lambda * report_.lambda);
   }
@@ -144,20 +144,14 @@ class Attack {
       for (std::int64_t y = 0; y < gold_.nodes[1]; ++y)
         for (std::int64_t x = 0; x < gold_.nodes[0]; ++x)
           if (const std::size_t n = gold_.at(x, y, z); gold_.above[n] >= 0)
-            look(n, half_.points[half_.at({2 * x, 2 * y, 2 * z})]);
+            look(n, half_.at({2 * x, 2 * y, 2 * z}));
   }
 
   void check_nodes() {
     const double bound = gold_.projection + gold_.arithmetic + rounding_;
-    std::vector<Vec3> points;
-    std::vector<double> found;
-    for_tested_nodes([&](std::size_t n, const Vec3& p) {
-      points.push_back(p);
-      found.push_back(gold_.gold[n]);
+    for_tested_nodes([&](std::size_t n, std::size_t half) {
+      worst("P + A at nodes").see(std::abs(gold_.gold[n] - half_.F[half]), bound, half_.points[half]);
     });
-    const auto F = chain_.exact.at(points);
-    for (std::size_t i = 0; i < F.size(); ++i)
-      worst("P + A at nodes").see(std::abs(found[i] - F[i]), bound, points[i]);
   }
 
   // The interpolant of computed and of exact gold against F.
