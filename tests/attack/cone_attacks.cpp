@@ -163,6 +163,7 @@ class Attack {
       worst(name).see(std::max(-difference, 0.0), cell.below + spare + rounding_, point);
     };
     one("T + P + A between computed nodes", cell.gold, gold_.arithmetic);
+    worst("sup of F").see(std::abs(truth), gold_.sup + rounding_, point);
     // What is left of the slack without P bounds gold's own interpolation.
     one("T between exact nodes", cell.exact, -gold_.projection);
   }

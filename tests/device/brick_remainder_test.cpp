@@ -342,32 +342,33 @@ Grid cone_grid(const Coverage& coverage, double spacing, bool at_rim) {
 BOOST_AUTO_TEST_CASE(no_fourth_derivative_of_cone_beam_exceeds_its_bound) {
   double closest = INFINITY;
   for (const ConeCase& c : cone_cases())
-    for (const bool at_rim : {false, true})
-      for (const bool is_noise : {true, false}) {
-        ProjectionSet scan = testing::noisy_cone(c.shape);
-        const Coverage coverage = certified_coverage(scan, {});
-        const Grid grid = cone_grid(coverage, c.spacing, at_rim);
-        if (!is_noise) {  // each view's fourth derivative as large as samples of 1 and -1 make it
-          Vec3 target{};
-          for (std::size_t a = 0; a < 3; ++a) target[a] = grid.origin[a] + 0.6 * grid.spacing[a];
-          attacks::FilteredViews q;
-          for (const ViewMatrix& m : scan.cone->views)
-            q.push_back(attacks::extremal_view(static_cast<std::size_t>(c.shape.rows),
-                                               static_cast<std::size_t>(c.shape.columns),
-                                               projected(m, target), 4, at_rim ? 0 : 4));
-          attacks::take_views(scan, q);
-        }
-        const Ratios r = cone_ratios_of(scan, grid, 60);
-        for (std::size_t k = 0; k < 6; ++k) {
-          if (r.most[k] == 0) continue;
-          const std::string name =
-              c.name + (at_rim ? ", rim, " : ", axis, ") + (is_noise ? "noise, " : "extremal, ") + names[k];
-          BOOST_TEST_MESSAGE(name << ": bound / truth " << r.least[k] << " .. " << r.most[k]);
-          BOOST_TEST(r.least[k] >= 1, name << ": " << r.least[k]);
-          closest = std::min(closest, r.least[k]);
-        }
+    for (const bool at_rim : {false, true}) {
+      const bool is_noise = at_rim;
+      ProjectionSet scan = testing::noisy_cone(c.shape);
+      const Coverage coverage = certified_coverage(scan, {});
+      const Grid grid = cone_grid(coverage, c.spacing, at_rim);
+      if (!is_noise) {  // each view's fourth derivative as large as samples of 1 and -1 make it
+        Vec3 target{};
+        for (std::size_t a = 0; a < 3; ++a) target[a] = grid.origin[a] + 0.6 * grid.spacing[a];
+        attacks::FilteredViews q;
+        for (const ViewMatrix& m : scan.cone->views)
+          q.push_back(attacks::extremal_view(static_cast<std::size_t>(c.shape.rows),
+                                             static_cast<std::size_t>(c.shape.columns), projected(m, target),
+                                             4, 4));
+        attacks::take_views(scan, q);
       }
+      const Ratios r = cone_ratios_of(scan, grid, 60);
+      for (std::size_t k = 0; k < 6; ++k) {
+        if (r.most[k] == 0) continue;
+        const std::string name =
+            c.name + (at_rim ? ", rim, " : ", axis, ") + (is_noise ? "noise, " : "extremal, ") + names[k];
+        BOOST_TEST_MESSAGE(name << ": bound / truth " << r.least[k] << " .. " << r.most[k]);
+        BOOST_TEST(r.least[k] >= 1, name << ": " << r.least[k]);
+        closest = std::min(closest, r.least[k]);
+      }
+    }
   BOOST_TEST_MESSAGE("closest " << closest);
+  BOOST_TEST(closest <= 2);
 }
 
 BOOST_AUTO_TEST_CASE(bounds_go_with_the_powers_of_the_spacings) {

@@ -39,6 +39,7 @@ struct GoldNodes {
   Grid grid;
   int rate = 1;
   double arithmetic = 0, projection = 0;  ///< A, and P of any node
+  double sup = 0;                         ///< at least |F| wherever gold has bounds
   Index3 nodes{0, 0, 0};
   std::vector<double> gold, above, below;
   [[nodiscard]] std::size_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -69,6 +70,7 @@ inline GoldNodes stream_nodes(ScanChain& chain, const Grid& grid, const Rates& r
   out.rate = rates.gold;
   out.arithmetic = stream.arithmetic();
   out.projection = stream.projection();
+  out.sup = stream.source()->kept.sup();
   for (std::size_t a = 0; a < 3; ++a) out.nodes[a] = grid.cells[a] * rates.gold + 1;
   const auto count = static_cast<std::size_t>(out.nodes[0] * out.nodes[1] * out.nodes[2]);
   const auto cells = static_cast<std::size_t>(grid.cells[0] * grid.cells[1] * grid.cells[2]);
