@@ -75,7 +75,7 @@ struct Case {
   std::string name;
   testing::ConeShape shape;
   std::size_t axis = 0, view = 0;  // views 0 and 6 of 24 stand at -y and at x
-  std::array<std::size_t, 2> waves{19, 23}, row_waves{0, 0};
+  std::array<std::size_t, 2> waves{14, 23}, row_waves{0, 0};
 };
 
 std::vector<Case> cases() {
@@ -88,7 +88,7 @@ std::vector<Case> cases() {
   return {{"fan beam of 5 degrees, x", orbit(137, 1), 0, 0},
           {"fan beam of 5 degrees, y", orbit(137, 1), 1, 6},
           {"fan beam of 7 degrees, y", orbit(100, 1), 1, 6},
-          {"cone of 5 degrees, z", orbit(137, 12), 2, 0, {0, 1}, {9, 11}}};
+          {"cone of 5 degrees, z", orbit(137, 12), 2, 0, {0, 1}, {7, 11}}};
 }
 
 // From the axis towards the source as far as bounds hold.
