@@ -130,6 +130,8 @@ class Attack {
         for (low[0] = 0; low[0] + 1 < gold_.nodes[0]; ++low[0]) check_cell(Cell(gold_, half_, low));
     check_inside();
     check_sups();
+    // Where moving the detectors left the target outside, nothing is claimed of gold.
+    if (report_.cells == 0) report_.outcome = "nothing covered";
     for (auto& [name, worst] : report_.checks)
       if (!(worst.ratio <= 1)) report_.outcome = "violated";
     return report_;
