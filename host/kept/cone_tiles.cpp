@@ -66,6 +66,23 @@ struct Blocks {
   std::int64_t across, groups, per_side = 1, layers = 1;
 };
 
+// Columns and rows of the table that a node's place may lie from that of its block's middle, half a block
+// away by axis, sums of magnitudes: with d_e the way there, u - u_middle = sum of X_e d_e / lambda_middle,
+// and the kernel's products are X_e at the middle, X_e - (u - u_middle) lambda_e, times d_e, over lambda at
+// the node.
+std::array<double, 2> places_from_middle(const ViewBox& seen, const Vec3& half) {
+  double u = 0, v = 0, growth = 0;
+  for (std::size_t e = 0; e < 3; ++e) {
+    u += seen.along_u[e] * half[e];
+    v += seen.along_v[e] * half[e];
+    growth += seen.growth[e] * half[e];
+  }
+  // Tiles reach no nearer to a source (KeptGold::room_to_sources).
+  const double middle = std::max(seen.lambda_min - growth, 0.25 * seen.lambda_min);
+  const double more = density * (1 + growth / middle) / seen.lambda_min;
+  return {u * more, v * more};
+}
+
 // A position is about x, y and z of the middle; nothing that would vary along z is left of u and lambda.
 bool is_upright(const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; }
 
@@ -112,16 +129,14 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
       }
       const double weight = 1 / (seen.lambda_min * seen.lambda_min);
       ViewAtPart view{weight * sups_.by_view[k].value, {}, {}};
-      double reach_u = 0, reach_v = 0;
+      const auto [places_u, places_v] = places_from_middle(seen, half);
       for (std::size_t e = 0; e < 3; ++e) {
         const double of_v = g.rows > 1 ? seen.along_v[e] : 0.0;
         view.band[e] = pi * lattice_.spacing[e] * (seen.along_u[e] + of_v) / seen.lambda_min;
         view.rho[e] = lattice_.spacing[e] * seen.growth[e] / seen.lambda_min;
         band_[e] = std::max(band_[e], view.band[e]);
-        reach_u += density * seen.along_u[e] * half[e] / seen.lambda_min;
-        reach_v += density * seen.along_v[e] * half[e] / seen.lambda_min;
       }
-      block_reach_ = std::max({block_reach_, reach_u, reach_v});
+      block_reach_ = std::max({block_reach_, places_u, places_v});
       largest_weight_ = std::max(largest_weight_, weight);
       sum += view.weight;
       at_part.push_back(view);

@@ -38,7 +38,8 @@ class VDVR_API ExactField {
     return {coefficients_.get(),
             static_cast<std::size_t>(geometry_.views() * geometry_.rows * geometry_.columns)};
   }
-  /// Bounds the double-precision rounding of the coefficients and of sums over them, at any point.
+  /// Bounds the double-precision rounding of the coefficients and of sums over them, at any point; of
+  /// cone beam where lambda is 1, elsewhere times the largest lambda^-2.
   [[nodiscard]] double rounding() const { return rounding_; }
 
  private:
