@@ -266,10 +266,16 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
 
 // --- cone beam ---
 
-// All views moved alike, so that the isocentre is seen at column `wanted` on the average.
+// All views moved alike, so that the isocentre is seen at column `wanted` on the average. Where it is but for
+// the mean's rounding, nothing moves: a certificate's centre gives the matrices that it was made of.
 void move_axis(ConeGeometry& cone, double wanted) {
-  double mean = 0;
-  for (const ViewMatrix& m : cone.views) mean += m[0][3] / m[2][3] / static_cast<double>(cone.views.size());
+  double mean = 0, largest = 0;
+  const auto views = static_cast<double>(cone.views.size());
+  for (const ViewMatrix& m : cone.views) {
+    mean += m[0][3] / m[2][3] / views;
+    largest = std::max(largest, std::abs(m[0][3] / m[2][3]));
+  }
+  if (std::abs(wanted - mean) <= (2 * views + 4) * 0x1p-53 * largest) return;
   for (ViewMatrix& m : cone.views) m = recentred(m, m[0][3] / m[2][3] + wanted - mean);
 }
 

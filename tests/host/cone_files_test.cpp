@@ -286,6 +286,20 @@ BOOST_AUTO_TEST_CASE(center_option_moves_all_views_alike) {
   BOOST_TEST(has(scan.refused({{"matrices", "P.npy"}, {"center", 9}}), "centre 9"));
 }
 
+// verify reads a scan with the centre of its certificate, and compares matrices.
+BOOST_AUTO_TEST_CASE(a_centre_that_is_there_moves_nothing) {
+  const Scan scan;
+  for (const double center : {3.5, 4.1, 3.7, 2.9000000000000004}) {
+    const auto members = scan.geometry({{"center", center}});
+    const ProjectionSet plain = scan.read(members);
+    ScanOptions options;
+    for (const double again : {center, plain.geometry.center}) {
+      options.center = again;
+      BOOST_TEST((scan.read(members, options).cone->views == plain.cone->views), "centre " << center);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(use_selects_views_with_their_geometry) {
   const Scan scan;
   json members = scan.geometry();
