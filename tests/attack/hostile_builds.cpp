@@ -4,12 +4,12 @@
 // processes and names the seed of one that died.
 //   hostile_builds COUNT [FIRST_SEED] [--json] [--verbose]
 
-#include <cstdlib>
-#include <cstring>
+#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/hostile_check.hpp"
+#include "tests/support/seed_arguments.hpp"
 
 using namespace vdvr;
 using namespace vdvr::hostile;
@@ -87,28 +87,16 @@ struct Table {
   }
 };
 
-int usage() {
-  std::fputs("usage: hostile_builds COUNT [FIRST_SEED] [--json] [--verbose]\n", stderr);
-  return 2;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::vector<std::uint64_t> numbers;
-  bool json = false, verbose = false;
-  for (int i = 1; i < argc; ++i) {
-    char* end = nullptr;
-    if (std::strcmp(argv[i], "--json") == 0) json = true;
-    else if (std::strcmp(argv[i], "--verbose") == 0) verbose = true;
-    else if (numbers.push_back(std::strtoull(argv[i], &end, 10)); end == argv[i] || *end != 0) return usage();
-  }
-  if (numbers.empty() || numbers.size() > 2) return usage();
-  const std::uint64_t first = numbers.size() > 1 ? numbers[1] : 1;
+  const auto arguments = support::seed_arguments(argc, argv, "hostile_builds");
+  if (!arguments) return 2;
+  const auto [first, end, json, verbose] = *arguments;
 
   Device device;
   Table table;
-  for (std::uint64_t seed = first; seed < first + numbers[0]; ++seed) {
+  for (std::uint64_t seed = first; seed < end; ++seed) {
     const auto start = detail::Clock::now();
     const Case c = draw_case(seed);
     if (verbose)

@@ -21,6 +21,7 @@ namespace {
 using attacks::Chain;
 using attacks::device;
 using testing::ConeShape;
+using testing::grid_of;
 using testing::noisy_cone;
 
 struct Case {
@@ -53,21 +54,6 @@ std::vector<Case> cases() {
           {"an arc", arc},
           {"cells of .6 pixels", orbit(60), 0.6},
           {"cells of two pixels", orbit(60), 2}};
-}
-
-// The covered cylinder and a little more.
-Grid grid_of(const Chain& chain, double spacing) {
-  const Coverage coverage(chain.filtered.geometry, chain.filtered.views);
-  const double r = coverage.inner_radius();
-  const auto [low, high] = coverage.heights();
-  Grid grid;
-  grid.spacing = {spacing, spacing, spacing};
-  const auto cells = [&](double length) {
-    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing)));
-  };
-  grid.cells = {cells(2 * r), cells(2 * r), cells(high - low)};
-  grid.origin = {-r + 0.01, -r - 0.02, low};
-  return grid;
 }
 
 struct Compared {
@@ -129,7 +115,7 @@ BOOST_AUTO_TEST_CASE(gold_of_cone_beam_is_within_its_errors_of_the_field) {
   for (const Case& c : cases()) {
     const ProjectionSet scan = noisy_cone(c.shape);
     const Chain chain(scan);
-    const Grid grid = grid_of(chain, c.spacing);
+    const Grid grid = grid_of(Coverage(chain.filtered.geometry, chain.filtered.views), c.spacing);
     constexpr double reach = 1.5;
     KeptGold kept(device().state(), chain.filtered, chain.sups, grid, reach, 8, Interpolation::six_taps);
     BOOST_TEST_MESSAGE(c.name << ": S " << kept.sup() << ", at the axis' lengths " << chain.sups.value);

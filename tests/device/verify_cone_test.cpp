@@ -26,6 +26,7 @@
 
 using namespace vdvr;
 using vdvr::testing::ConeShape;
+using vdvr::testing::grid_of;
 using vdvr::testing::noisy_cone;
 
 namespace {
@@ -60,20 +61,6 @@ std::vector<Case> cases() {
           {"fan beam", orbit(50, 1)},
           {"cells of .6 pixels", orbit(50), 0.6},
           {"cells of two pixels", orbit(50), 2}};
-}
-
-/// The covered cylinder and a little more.
-Grid grid_of(const Coverage& coverage, double spacing) {
-  const double r = coverage.inner_radius();
-  const auto [low, high] = coverage.heights();
-  Grid grid;
-  grid.spacing = {spacing, spacing, spacing};
-  const auto cells = [&](double length) {
-    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing)));
-  };
-  grid.cells = {cells(2 * r), cells(2 * r), cells(high - low)};
-  grid.origin = {-r + 0.01, -r - 0.02, low};
-  return grid;
 }
 
 /// Places of the array of gold, two nodes around the grid's own.

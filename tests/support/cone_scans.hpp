@@ -1,9 +1,12 @@
 // Small cone-beam scans for tests.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <random>
 
+#include "host/fbp/coverage.hpp"
 #include "tests/support/scans.hpp"
 
 namespace vdvr::testing {
@@ -39,6 +42,20 @@ inline ProjectionSet noisy_cone(const ConeShape& s, unsigned seed = 1) {
   scan.cone = cone_of(s);
   scan.geometry = parallel_limit(*scan.cone, s.columns, s.rows, "pixel");
   return scan;
+}
+
+/// Around the covered cylinder and a little more, off its middle.
+inline Grid grid_of(const Coverage& coverage, double spacing) {
+  const double r = coverage.inner_radius();
+  const auto [low, high] = coverage.heights();
+  Grid grid;
+  grid.spacing = {spacing, spacing, spacing};
+  const auto cells = [&](double length) {
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / spacing)));
+  };
+  grid.cells = {cells(2 * r), cells(2 * r), cells(high - low)};
+  grid.origin = {-r + 0.01, -r - 0.02, low};
+  return grid;
 }
 
 }  // namespace vdvr::testing
