@@ -1,0 +1,13 @@
+# The scan in data/cone-head is certified at 5 %, and verify, by its own path, agrees. Nothing of the geometry is assumed.
+execute_process(COMMAND "${VDVR}" info "${SCAN}" RESULT_VARIABLE code OUTPUT_VARIABLE info)
+if(NOT code EQUAL 0 OR info MATCHES "assumed")
+  message(FATAL_ERROR "vdvr info on ${SCAN}: ${code}\n${info}")
+endif()
+execute_process(COMMAND "${VDVR}" build "${SCAN}" --epsilon 5% -o "${OUT}" --force RESULT_VARIABLE code OUTPUT_VARIABLE out)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "vdvr build failed with ${code}\n${out}")
+endif()
+execute_process(COMMAND "${VDVR}" verify "${OUT}" --projections "${SCAN}" RESULT_VARIABLE code OUTPUT_VARIABLE out)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "vdvr verify failed with ${code}\n${out}")
+endif()
