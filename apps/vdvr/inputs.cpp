@@ -45,6 +45,7 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
   options.center = field.center;
+  options.preparation = field.preparation;
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;

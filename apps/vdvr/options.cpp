@@ -73,19 +73,91 @@ void add_field(Arguments& args) {
       .value("center", "C", "column onto which the rotation axis projects")
       .value("filter", "NAME", fmt::format("{} (default ram-lak)", fmt::join(filter_names(), "|")))
       .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)");
+  args.group("Preparation (F is that of the prepared projections)")
+      .value("outliers", "T[,N]",
+             "pixels brighter than the median of N x N by T of the open beam become it (N: 3)")
+      .value("phase", "MM,KEV,RATIO",
+             "Paganin's phase retrieval: object to detector, energy, delta / beta; parallel beam")
+      .value("stripes", "RATIO[,LARGE,SMALL]|on",
+             "take stripes off sinograms, rings off slices; on: 3,51,21 (docs/preparation.md)")
+      .value("median", "N", "side of a square median window in pixels, odd")
+      .value("gaussian", "SU,SV", "standard deviations of a blur in columns and rows")
+      .value("binning", "N", "columns and rows that become one pixel");
 }
+
+namespace {
+
+const std::vector<std::string> preparation_names{"outliers", "phase",    "stripes",
+                                                 "median",   "gaussian", "binning"};
+
+// `count` numbers, or the first alone where `fewest` is 1.
+std::vector<double> list_of(const Arguments& args, const std::string& name, std::size_t fewest,
+                            std::size_t most) {
+  const std::vector<double> values = args.numbers(name, 0).value();
+  if (values.size() != fewest && values.size() != most)
+    throw InputError(fmt::format("--{}: {} numbers, expected {}{}", name, values.size(),
+                                 fewest == most ? "" : fmt::format("{} or ", fewest), most));
+  return values;
+}
+
+int whole(const std::string& name, double value) {
+  if (!(value >= 0 && value <= 1e6) || value != std::floor(value))
+    throw InputError(fmt::format("--{}: {} is not a whole number of pixels", name, value));
+  return static_cast<int>(value);
+}
+
+Preparation preparation_options(const Arguments& args) {
+  Preparation p;
+  if (args.has("outliers")) {
+    const auto values = list_of(args, "outliers", 1, 2);
+    p.outliers.emplace().threshold = values[0];
+    if (values.size() > 1) p.outliers->window = whole("outliers", values[1]);
+  }
+  if (args.has("phase")) {
+    const auto values = list_of(args, "phase", 3, 3);
+    p.phase = PhaseRetrieval{values[0], values[1], values[2]};
+  }
+  if (args.has("stripes")) {
+    p.stripes.emplace();
+    if (args.text("stripes") != "on") {
+      const auto values = list_of(args, "stripes", 1, 3);
+      p.stripes->ratio = values[0];
+      if (values.size() > 1) {
+        p.stripes->large = whole("stripes", values[1]);
+        p.stripes->small = whole("stripes", values[2]);
+      }
+    }
+  }
+  p.median = static_cast<int>(args.integer_or("median", 1, 1, 1000));
+  if (args.has("gaussian")) {
+    const auto values = list_of(args, "gaussian", 2, 2);
+    p.gaussian = {values[0], values[1]};
+  }
+  p.binning = static_cast<int>(args.integer_or("binning", 1, 1, 1000));
+  check_preparation(p);
+  return p;
+}
+
+}  // namespace
 
 FieldOptions field_options(const Arguments& args) {
   FieldOptions field;
   field.filter = ramp_window_of(args.choice("filter", filter_names(), text_of(field.filter))).value();
   field.cutoff = args.positive_or("filter-cutoff", field.cutoff);
   if (field.cutoff > 1) throw InputError(fmt::format("--filter-cutoff: {} is above 1", field.cutoff));
-  field.center = args.number("center");
+  field.preparation = preparation_options(args);
+  if (const auto center = args.number("center"))
+    field.center = binned_center(*center, field.preparation.binning);
   return field;
 }
 
+bool has_preparation_options(const Arguments& args) {
+  return std::any_of(preparation_names.begin(), preparation_names.end(),
+                     [&](const std::string& name) { return args.has(name); });
+}
+
 bool has_field_options(const Arguments& args) {
-  return args.has("center") || args.has("filter") || args.has("filter-cutoff");
+  return args.has("center") || args.has("filter") || args.has("filter-cutoff") || has_preparation_options(args);
 }
 
 void add_grid(Arguments& args) {

@@ -23,6 +23,7 @@ void add_build(Arguments& args);
 
 FieldOptions field_options(const Arguments& args);
 bool has_field_options(const Arguments& args);
+bool has_preparation_options(const Arguments& args);
 /// `size`: the option that holds the cells, where --size is something else.
 GridOptions grid_options(const Arguments& args, const std::string& size = "size");
 RateOptions rate_options(const Arguments& args);

@@ -191,6 +191,8 @@ void print_certificate(const Certificate& c) {
              c.rates.gold);
   fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", text_of(c.field.filter), c.field.cutoff,
              c.field.center ? fmt::format(", centre {:.4f}", *c.field.center) : "");
+  if (!c.field.preparation.none())
+    fmt::print("  prepared     {}; F is that of the prepared projections\n", text_of(c.field.preparation));
   fmt::print("  not covered  {} samples ({:.2f} %)\n", c.not_covered_count, 100 * c.not_covered_fraction);
   if (c.window)
     fmt::print("  window       only where F lies in [{:.6g}, {:.6g}]\n", c.window->first, c.window->second);

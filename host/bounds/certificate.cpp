@@ -9,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "host/prepare/preparation_json.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -202,6 +203,11 @@ void read_method(const Member& m, Certificate& c) {
   c.field.filter = field.at("filter").choice(ramp_window_of, "ram-lak, shepp-logan, cosine, hamming or hann");
   c.field.cutoff = field.at("cutoff").number();
   if (const Member center = field.at("center"); !center.is_null()) c.field.center = center.number();
+  if (field.has("preparation")) try {
+      c.field.preparation = preparation_of(field.at("preparation").object());
+    } catch (const InputError& e) {
+      throw FileError(fmt::format("certificate: member 'field.preparation': {}", e.what()));
+    }
   c.padding = field.at("padding").integer();
 }
 
@@ -286,6 +292,7 @@ std::string to_json(const Certificate& c) {
   j["field"] = {{"filter", text_of(c.field.filter)}, {"cutoff", finite("field.cutoff", c.field.cutoff)}};
   j["field"]["center"] = c.field.center ? Json(finite("field.center", *c.field.center)) : Json(nullptr);
   j["field"]["padding"] = c.padding;
+  if (!c.field.preparation.none()) j["field"]["preparation"] = json_of(c.field.preparation);
   j["window"] = c.window ? numbers("window", std::array{c.window->first, c.window->second}) : Json(nullptr);
   j["roi"] = c.roi ? numbers("roi", *c.roi) : Json(nullptr);
   j["not_covered"] = {{"count", c.not_covered_count},

@@ -356,6 +356,7 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
   c.bounds = plan.bounds;
   c.field = plan.field;
   c.field.center = plan.field.center.value_or(scan.geometry.center);
+  c.field.preparation = scan.report.preparation;
   c.padding = filtered.fft_length;
   c.window = options.window;
   c.roi = options.roi;

@@ -67,6 +67,7 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
        fmt::format("{} views of {} x {}, pitch {},{}", g.views(), g.columns, g.rows, g.pitch_u, g.pitch_v)},
       {"center", exact(plan.field.center.value_or(g.center))},
       {"filter", fmt::format("{} to {}", text_of(plan.field.filter), plan.field.cutoff)},
+      {"preparation", text_of(scan.report.preparation)},
       {"cells", fmt::format("{}x{}x{}", plan.grid.cells[0], plan.grid.cells[1], plan.grid.cells[2])},
       {"origin", exact_list(plan.grid.origin)},
       {"spacing", exact_list(plan.grid.spacing)},

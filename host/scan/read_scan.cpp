@@ -15,6 +15,7 @@
 
 #include "host/io/hdf5_writer.hpp"
 #include "host/io/raster_file.hpp"
+#include "host/prepare/prepare.hpp"
 #include "host/scan/find_center.hpp"
 #include "host/scan/hdf5_scan.hpp"
 #include "host/scan/preprocess.hpp"
@@ -116,15 +117,18 @@ std::int64_t block_views(const io::RawScan& raw, std::uint64_t max_memory_bytes)
   return std::clamp<std::int64_t>(block_samples / (raw.rows * raw.columns), 1, raw.projections.count);
 }
 
-void require_room(const io::RawScan& raw, const ScanOptions& options, const std::string& name) {
+void require_room(const io::RawScan& raw, const ScanOptions& options, const std::string& name,
+                  std::uint64_t preparation_bytes = 0) {
   const std::array<std::int64_t, 3> all{raw.projections.count, raw.rows, raw.columns};
   const std::array<std::int64_t, 3> block{block_views(raw, options.max_memory_bytes), raw.rows, raw.columns};
   const std::uint64_t samples = io::checked_bytes(all, sizeof(float), name),
                       resident = options.max_memory_bytes == 0
                                      ? samples
                                      : std::min(samples, options.max_memory_bytes / 8);
-  io::require_memory(resident + 2 * io::checked_bytes(block, sizeof(double), name), options.max_memory_bytes,
-                     name + ": the projections");
+  const std::uint64_t cores = std::max(1u, std::thread::hardware_concurrency());
+  io::require_memory(
+      resident + 2 * io::checked_bytes(block, sizeof(double), name) + cores * preparation_bytes,
+      options.max_memory_bytes, name + ": the projections");
 }
 
 // --- samples ---
@@ -152,8 +156,8 @@ void require_finite(std::span<const double> view, const io::RawScan& raw, std::i
                                   static_cast<std::int64_t>(i) % raw.columns, view[i]));
 }
 
-void read_samples(const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan,
-                  const Progress& progress) {
+void read_samples(const io::RawScan& raw, const ScanOptions& options, const ViewPreparation& preparation,
+                  ProjectionSet& scan, const Progress& progress) {
   const std::int64_t size = raw.rows * raw.columns, step = block_views(raw, options.max_memory_bytes);
   FlatField field;
   if (raw.counts) {
@@ -167,6 +171,7 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, Projection
   std::vector<double> block(static_cast<std::size_t>(step * size));
   std::vector<std::int64_t> dead(static_cast<std::size_t>(step));
   std::atomic<bool> rounds = false;
+  std::atomic<std::int64_t> outliers = 0;
   for (std::int64_t first = 0; first < raw.projections.count; first += step) {
     const std::int64_t n = std::min(step, raw.projections.count - first);
     raw.projections.read(first, n, block.data());
@@ -181,6 +186,12 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, Projection
                         [](double p) { return static_cast<double>(static_cast<float>(p)) != p; }))
           rounds = true;
       }
+      if (!preparation.none()) {
+        View copy{raw.columns, raw.rows, {view.begin(), view.end()}};
+        outliers += preparation.apply(copy);
+        require_finite(copy.data, raw, first + k);
+        std::copy(copy.data.begin(), copy.data.end(), view.begin());
+      }
       if (!raw.air_columns.empty()) subtract_air_background(view, raw.rows, raw.columns, raw.air_columns);
       std::transform(view.begin(), view.end(), scan.data.begin() + (first + k) * size,
                      [](double p) { return static_cast<float>(p); });
@@ -189,6 +200,10 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, Projection
     report(progress, "read", static_cast<double>(first + n) / static_cast<double>(raw.projections.count));
   }
   scan.report.air_background = !raw.air_columns.empty();
+  if (options.preparation.outliers)
+    scan.report.notes.push_back(fmt::format("{} of {} samples were outliers and got the median of {} x {}",
+                                            outliers.load(), samples, options.preparation.outliers->window,
+                                            options.preparation.outliers->window));
   if (rounds)
     scan.report.notes.push_back(
         "the scan holds float64 or wide integers: F is that of its values rounded to float32");
@@ -245,7 +260,7 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
     g.center = *options.center;
     r.center_source = "option";
   } else if (raw.center) {
-    g.center = *raw.center;
+    g.center = binned_center(*raw.center, options.preparation.binning);
     r.center_source = "file";
   } else if (const auto found = find_center(scan)) {
     g.center = found->center;
@@ -303,7 +318,9 @@ void set_cone(const fs::path& path, const io::RawScan& raw, const ScanOptions& o
   InputReport& r = scan.report;
   r.source_to_detector = raw.cone->geometry.source_to_detector;
   r.center_source = options.center ? "option" : raw.center ? "file" : raw.cone->geometry.center_source;
-  if (const auto wanted = options.center ? options.center : raw.center) {
+  std::optional<double> wanted = raw.center;
+  if (options.center) wanted = unbinned_center(*options.center, options.preparation.binning);
+  if (wanted) {
     require_on_detector(path, *wanted, raw.columns, options);
     move_axis(cone, *wanted);
     r.notes.push_back(fmt::format("all views were moved so that the axis is at column {:g}, as {} says",
@@ -361,10 +378,12 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.report.format = raw.format;
   scan.report.notes = raw.notes;
   scan.geometry = geometry_of(raw, path.string());
+  const ViewPreparation preparation(options.preparation, scan.geometry, raw.cone.has_value());
   if (raw.cone) set_cone(path, raw, options, scan);
-  require_room(raw, options, path.string());
+  require_room(raw, options, path.string(), preparation.bytes());
   const auto before = stamps_of(raw);
-  read_samples(raw, options, scan, progress);
+  read_samples(raw, options, preparation, scan, progress);
+  const std::int64_t samples = scan.size();
   scan.report.sha256 = hash_of(raw, folder);
   if (const auto after = stamps_of(raw); after != before) {
     const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();
@@ -374,10 +393,12 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (scan.report.dead_pixels > 0)
     scan.report.notes.push_back(
         fmt::format("{} of {} samples were dead and got the median of their neighbours",
-                    scan.report.dead_pixels, scan.size()));
+                    scan.report.dead_pixels, samples));
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
+  prepare_scan(scan, options.preparation, options.max_memory_bytes, progress);
+  scan.report.preparation = options.preparation;
   if (!raw.cone) choose_center(path, raw, options, scan);
   return scan;
 }

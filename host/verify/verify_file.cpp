@@ -34,7 +34,11 @@ VdvrFile read_to_verify(const std::filesystem::path& path, std::uint64_t max_mem
 }
 
 void check_input(const ProjectionSet& scan, const Certificate& c) {
-  if (scan.report.sha256 == c.input_sha256) return;
+  if (scan.report.sha256 == c.input_sha256) {
+    if (scan.report.preparation == c.field.preparation) return;
+    throw MismatchError(fmt::format("these projections were prepared by: {}; the volume's were by: {}",
+                                    text_of(scan.report.preparation), text_of(c.field.preparation)));
+  }
   throw MismatchError(fmt::format(
       "these are other projections: found {} of {} x {} x {} (views, rows, columns), sha256 {}; the volume "
       "was built from {} of {} with sha256 {}",

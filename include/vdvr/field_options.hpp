@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "vdvr/preparation.hpp"
+
 namespace vdvr {
 
 /// What the ramp is multiplied by towards high frequencies.
@@ -32,7 +34,9 @@ constexpr std::optional<RampWindow> ramp_window_of(std::string_view text) {
 struct FieldOptions {
   RampWindow filter = RampWindow::ram_lak;
   double cutoff = 1.0;           ///< fraction of the detector's Nyquist frequency
-  std::optional<double> center;  ///< overrides the scan's
+  std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections
+  /// What was done to the projections. It is done where they are read (ScanOptions), and recorded here.
+  Preparation preparation;
 };
 
 }  // namespace vdvr

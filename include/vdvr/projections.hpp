@@ -11,6 +11,7 @@
 
 #include "vdvr/cone_geometry.hpp"
 #include "vdvr/export.hpp"
+#include "vdvr/preparation.hpp"
 #include "vdvr/sample_array.hpp"
 
 namespace vdvr {
@@ -37,6 +38,7 @@ struct InputReport {
   std::string center_source;       ///< "file", "option", "found", "default"
   double source_to_detector = 0;   ///< of cone beam, in world units; 0: not stated, as matrices do not
   bool air_background = false;     ///< a linear air background was fitted and taken off
+  Preparation preparation;         ///< what else was done to the projections
   std::vector<std::string> notes;  ///< one line each, shown to the user
 };
 

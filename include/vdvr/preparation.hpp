@@ -1,0 +1,61 @@
+// What may be done to projections before F is made of them: F is that of the prepared projections. Recorded
+// in the certificate's `field`, done again by whoever reads the scan to verify it (docs/preparation.md).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "vdvr/export.hpp"
+
+namespace vdvr {
+
+/// A pixel whose transmission lies above the median of its window x window neighbours by more than
+/// `threshold`, a fraction of the open beam, becomes that median (zingers: X-rays that hit the camera).
+struct Outliers {
+  double threshold = 0.1;
+  int window = 3;  ///< odd
+  bool operator==(const Outliers&) const = default;
+};
+
+/// Paganin's single-distance phase retrieval (Journal of Microscopy 206, 2002, 33) of parallel beam: each
+/// transmission is divided, in frequency, by 1 + (d lambda / 4 pi) (delta / beta) |k|^2.
+struct PhaseRetrieval {
+  double distance_mm = 0;  ///< d, object to detector
+  double energy_kev = 0;
+  double delta_beta = 0;  ///< the object's delta / beta
+  bool operator==(const PhaseRetrieval&) const = default;
+};
+
+/// Stripes of a sinogram, rings in a slice (Vo et al., Optics Express 26, 2018, 28396, algorithms 6, 5 and 3):
+/// dead and fluctuating columns, columns far off their neighbours, small differences of all others.
+struct Stripes {
+  double ratio = 3;  ///< of a stripe to noise, above which a column is dead, fluctuating or far off
+  int large = 51;    ///< columns of the median that finds such columns; odd
+  int small = 21;    ///< columns of the median of sorted columns; odd
+  bool operator==(const Stripes&) const = default;
+};
+
+/// Steps in the order in which they are done. By default none.
+struct Preparation {
+  std::optional<Outliers> outliers;
+  std::optional<PhaseRetrieval> phase;
+  std::optional<Stripes> stripes;
+  int median = 1;                        ///< side of a square window, odd; 1: none
+  std::array<double, 2> gaussian{0, 0};  ///< standard deviations in columns and rows; 0: none
+  int binning = 1;                       ///< columns and rows of a detector pixel that become one
+
+  [[nodiscard]] bool none() const { return *this == Preparation{}; }
+  bool operator==(const Preparation&) const = default;
+};
+
+/// Throws InputError naming the member for a value out of its range.
+VDVR_API void check_preparation(const Preparation& preparation);
+/// "stripes 3,51,21; binning 2": every step with its numbers; "none".
+VDVR_API std::string text_of(const Preparation& preparation);
+/// The column of a detector whose pixels are binned that shows what column `center` showed before.
+VDVR_API double binned_center(double center, int binning);
+/// And back.
+VDVR_API double unbinned_center(double center, int binning);
+
+}  // namespace vdvr
