@@ -157,7 +157,8 @@ bool has_preparation_options(const Arguments& args) {
 }
 
 bool has_field_options(const Arguments& args) {
-  return args.has("center") || args.has("filter") || args.has("filter-cutoff") || has_preparation_options(args);
+  return args.has("center") || args.has("filter") || args.has("filter-cutoff") ||
+         has_preparation_options(args);
 }
 
 void add_grid(Arguments& args) {

@@ -27,7 +27,8 @@ std::int64_t source_of(std::int64_t i, std::int64_t n, std::int64_t length) {
 // |k|^2 of one axis at bin b of `length`.
 double squared_frequency(std::int64_t b, std::int64_t length, double pitch) {
   const std::int64_t signed_bin = b <= length / 2 ? b : b - length;
-  const double k = 2 * std::numbers::pi * static_cast<double>(signed_bin) / (static_cast<double>(length) * pitch);
+  const double k =
+      2 * std::numbers::pi * static_cast<double>(signed_bin) / (static_cast<double>(length) * pitch);
   return k * k;
 }
 

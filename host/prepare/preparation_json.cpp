@@ -15,7 +15,8 @@ namespace {
 using Json = nlohmann::json;
 
 void require_members(const Json& json, const std::string& what, const std::vector<std::string>& names) {
-  if (!json.is_object()) throw InputError(fmt::format("{} is {}, expected an object", what, json.type_name()));
+  if (!json.is_object())
+    throw InputError(fmt::format("{} is {}, expected an object", what, json.type_name()));
   for (const auto& [name, value] : json.items())
     if (std::find(names.begin(), names.end(), name) == names.end())
       throw InputError(fmt::format("{}: '{}' is not known to this version", what, name));
@@ -78,7 +79,8 @@ Preparation preparation_of(const Json& json) {
   if (json.contains("stripes")) {
     const Json& o = json.at("stripes");
     require_members(o, "stripes", {"ratio", "large", "small"});
-    p.stripes = Stripes{number(o, "stripes", "ratio"), whole(o, "stripes", "large"), whole(o, "stripes", "small")};
+    p.stripes =
+        Stripes{number(o, "stripes", "ratio"), whole(o, "stripes", "large"), whole(o, "stripes", "small")};
   }
   if (json.contains("median")) p.median = whole(json.at("median"), "median");
   if (json.contains("gaussian")) {

@@ -57,10 +57,11 @@ void remove_stripes(ProjectionSet& scan, const Stripes& stripes, std::uint64_t m
     remove_small_stripes(s, stripes.small);
     put(s, scan, row);
   });
-  scan.report.notes.push_back(fmt::format(
-      "stripes: in {} rows {} columns were dead or fluctuating, {} off their neighbours for many views, {} far "
-      "off; then all got the median of {} columns, rank by rank",
-      g.rows, dead.load(), lasting.load(), large.load(), stripes.small));
+  scan.report.notes.push_back(
+      fmt::format("stripes: in {} rows {} columns were dead or fluctuating, {} off their neighbours for many "
+                  "views, {} far "
+                  "off; then all got the median of {} columns, rank by rank",
+                  g.rows, dead.load(), lasting.load(), large.load(), stripes.small));
 }
 
 // --- binning ---

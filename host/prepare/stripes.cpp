@@ -35,8 +35,7 @@ Sorted sorted_columns(const Sinogram& s) {
   for (std::int64_t c = 0; c < s.columns; ++c) {
     const auto first = out.view.begin() + c * s.views, last = first + s.views;
     std::iota(first, last, 0);
-    std::stable_sort(first, last,
-                     [&](std::int32_t a, std::int32_t b) { return s.row(a)[c] < s.row(b)[c]; });
+    std::stable_sort(first, last, [&](std::int32_t a, std::int32_t b) { return s.row(a)[c] < s.row(b)[c]; });
     for (std::int64_t r = 0; r < s.views; ++r) out.ranks.row(r)[c] = s.row(*(first + r))[c];
   }
   return out;
@@ -145,7 +144,8 @@ std::vector<bool> outstanding(const std::vector<double>& values, double ratio, d
   const std::size_t first = n / 4, last = n - n / 4;
   double mean_x = 0, mean_y = 0, xy = 0, xx = 0;
   const auto count = static_cast<double>(last - first);
-  for (std::size_t i = first; i < last; ++i) mean_x += static_cast<double>(i) / count, mean_y += sorted[i] / count;
+  for (std::size_t i = first; i < last; ++i)
+    mean_x += static_cast<double>(i) / count, mean_y += sorted[i] / count;
   for (std::size_t i = first; i < last; ++i) {
     const double x = static_cast<double>(i) - mean_x;
     xy += x * (sorted[i] - mean_y), xx += x * x;
@@ -157,8 +157,8 @@ std::vector<bool> outstanding(const std::vector<double>& values, double ratio, d
   const bool above = sorted.back() - high >= ratio * noise, below = low - sorted.front() >= ratio * noise;
   // Half the distance from there on: what belongs to a stripe that was found need not stand out alone.
   for (std::size_t i = 0; i < n; ++i)
-    mask[i] = (above && values[i] > high + 0.5 * ratio * noise) ||
-              (below && values[i] < low - 0.5 * ratio * noise);
+    mask[i] =
+        (above && values[i] > high + 0.5 * ratio * noise) || (below && values[i] < low - 0.5 * ratio * noise);
   return mask;
 }
 
@@ -201,7 +201,8 @@ std::int64_t remove_large_stripes(Sinogram& s, double ratio, int window) {
   std::vector<double> difference(at(s.columns), 0.0);
   for (std::int64_t r = drop; r < s.views - drop; ++r)
     for (std::int64_t c = 0; c < s.columns; ++c)
-      difference[at(c)] += (sorted.ranks.row(r)[c] - smooth.row(r)[c]) / static_cast<double>(s.views - 2 * drop);
+      difference[at(c)] +=
+          (sorted.ranks.row(r)[c] - smooth.row(r)[c]) / static_cast<double>(s.views - 2 * drop);
   // What is wide belongs to the object, near its axis.
   const auto wide = median_along(difference.data(), s.columns, 2 * (window / 5) + 1);
   for (std::size_t c = 0; c < wide.size(); ++c) difference[c] -= wide[c];

@@ -31,8 +31,9 @@ std::int64_t remove_dead_stripes(Sinogram& sinogram, double ratio, int window);
 /// paper: sorting moves such a stripe's views among the ranks, and nine tenths of one that fills half of the
 /// views stay.
 std::int64_t remove_lasting_stripes(Sinogram& sinogram, double ratio);
-/// Columns far off their neighbours (algorithm 5), in stripes of at most a fifth of the window: wider ones are
-/// the object's (the paper takes them too, which damages the middle of a slice). Returns how many there were.
+/// Columns far off their neighbours (algorithm 5), in stripes of at most a fifth of the window: wider ones
+/// are the object's (the paper takes them too, which damages the middle of a slice). Returns how many there
+/// were.
 std::int64_t remove_large_stripes(Sinogram& sinogram, double ratio, int window);
 /// All others (algorithm 3): columns sorted along the views, each rank the median of its neighbours', and
 /// back. Cost: views columns (log views + window).

@@ -27,8 +27,8 @@ struct PhaseRetrieval {
   bool operator==(const PhaseRetrieval&) const = default;
 };
 
-/// Stripes of a sinogram, rings in a slice (Vo et al., Optics Express 26, 2018, 28396, algorithms 6, 5 and 3):
-/// dead and fluctuating columns, columns far off their neighbours, small differences of all others.
+/// Stripes of a sinogram, rings in a slice (Vo et al., Optics Express 26, 2018, 28396, algorithms 6, 5 and
+/// 3): dead and fluctuating columns, columns far off their neighbours, small differences of all others.
 struct Stripes {
   double ratio = 3;  ///< of a stripe to noise, above which a column is dead, fluctuating or far off
   int large = 51;    ///< columns of the median that finds such columns; odd

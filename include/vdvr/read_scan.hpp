@@ -16,17 +16,17 @@ struct ScanOptions {
   std::optional<std::filesystem::path> angles_file;  ///< for MHA/NRRD stacks; degrees, one per view
   /// Overrides the file's; in columns of the projections as they are prepared, binned ones where they are.
   std::optional<double> center;
-  Preparation preparation;                           ///< what is done to the projections
-  std::uint64_t max_memory_bytes = 0;                ///< 0: no limit
+  Preparation preparation;             ///< what is done to the projections
+  std::uint64_t max_memory_bytes = 0;  ///< 0: no limit
   /// Folder of the scratch files that hold a scan of more than an eighth of the limit, and what is made of it
   /// as a whole; empty: default_scratch_folder().
   std::filesystem::path scratch;
 };
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'
-/// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre: option, else file, else found from opposite
-/// views, else (U-1)/2; of cone beam option, else file, else (U-1)/2. Throws FileError or InputError (NaN,
-/// zero flats, wrong counts of angles, truncated files, ...).
+/// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre:
+/// option, else file, else found from opposite views, else (U-1)/2; of cone beam option, else file, else
+/// (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated files, ...).
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
                                  const Progress& progress = {});
 

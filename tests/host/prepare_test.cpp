@@ -21,7 +21,8 @@ using vdvr::support::TemporaryFolder;
 
 namespace {
 
-View view_of(std::int64_t columns, std::int64_t rows, const std::function<double(std::int64_t, std::int64_t)>& p) {
+View view_of(std::int64_t columns, std::int64_t rows,
+             const std::function<double(std::int64_t, std::int64_t)>& p) {
   View view{columns, rows, std::vector<double>(static_cast<std::size_t>(columns * rows))};
   for (std::int64_t j = 0; j < rows; ++j)
     for (std::int64_t i = 0; i < columns; ++i) view.at(i, j) = p(i, j);
@@ -43,7 +44,9 @@ ProjectionSet read(const std::filesystem::path& path, const Preparation& prepara
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(a_bright_pixel_becomes_its_neighbours_median_and_nothing_else_changes) {
-  const auto plain = [](std::int64_t i, std::int64_t j) { return 1 + 0.01 * static_cast<double>(i) + 0.02 * static_cast<double>(j); };
+  const auto plain = [](std::int64_t i, std::int64_t j) {
+    return 1 + 0.01 * static_cast<double>(i) + 0.02 * static_cast<double>(j);
+  };
   const View clean = view_of(9, 7, plain);
   View view = clean;
   view.at(4, 3) = -0.5;  // brighter than the open beam
@@ -76,7 +79,8 @@ BOOST_AUTO_TEST_CASE(phase_retrieval_divides_each_frequency_of_the_transmission)
     };
     View view = view_of(columns, rows, [&](auto i, auto j) { return -std::log(mean + height * wave(i, j)); });
     PaganinFilter(columns, rows, pitch_u, pitch_v, area).apply(view);
-    const double ku = std::numbers::pi * m / (columns * pitch_u), kv = std::numbers::pi * n / (rows * pitch_v);
+    const double ku = std::numbers::pi * m / (columns * pitch_u),
+                 kv = std::numbers::pi * n / (rows * pitch_v);
     const double passed = 1 / (1 + area * (ku * ku + kv * kv));
     double worst = 0;
     for (std::int64_t j = 0; j < rows; ++j)
@@ -90,7 +94,8 @@ BOOST_AUTO_TEST_CASE(phase_retrieval_divides_each_frequency_of_the_transmission)
 // d lambda (delta / beta) / (4 pi): 50 mm, 20 keV (0.0619920990 nm), 1000.
 BOOST_AUTO_TEST_CASE(phase_retrieval_counts_in_millimetres_and_kiloelectronvolts) {
   const double expected = 50 * 0.0619920990e-6 * 1000 / (4 * std::numbers::pi);
-  BOOST_TEST(std::abs(paganin_area_mm2({50, 20, 1000}) - expected) <= 1e-9 * expected);  // digits of the literal
+  BOOST_TEST(std::abs(paganin_area_mm2({50, 20, 1000}) - expected) <=
+             1e-9 * expected);  // digits of the literal
   BOOST_TEST(millimetres_of("um") == 1e-3);
   BOOST_CHECK_THROW(static_cast<void>(millimetres_of("pixel")), InputError);
 }
@@ -110,7 +115,8 @@ BOOST_AUTO_TEST_CASE(binning_keeps_the_mean_and_moves_the_axis_with_its_pixels) 
   BOOST_TEST(g.center == (6.25 - 1) / 3);
   double sum = 0;
   for (std::int64_t j = 3; j < 6; ++j)
-    for (std::int64_t i = 6; i < 9; ++i) sum += static_cast<double>(scan.data[static_cast<std::size_t>((2 * 7 + j) * 13 + i)]);
+    for (std::int64_t i = 6; i < 9; ++i)
+      sum += static_cast<double>(scan.data[static_cast<std::size_t>((2 * 7 + j) * 13 + i)]);
   BOOST_TEST(binned.data[static_cast<std::size_t>((2 * 2 + 1) * 4 + 2)] == static_cast<float>(sum / 9));
   BOOST_TEST((binned.report.preparation == binning_by(3)));
 }
@@ -127,7 +133,9 @@ BOOST_AUTO_TEST_CASE(binned_cone_beam_sees_each_point_where_the_binned_pixel_is)
   const Vec3 point{3, -5, 2};
   for (std::size_t k = 0; k < before.size(); ++k) {
     const auto seen = [&](const ViewMatrix& m, std::size_t axis) {
-      const auto row = [&](std::size_t i) { return m[i][0] * point[0] + m[i][1] * point[1] + m[i][2] * point[2] + m[i][3]; };
+      const auto row = [&](std::size_t i) {
+        return m[i][0] * point[0] + m[i][1] * point[1] + m[i][2] * point[2] + m[i][3];
+      };
       return row(axis) / row(2);
     };
     for (const std::size_t axis : {0u, 1u})
@@ -146,9 +154,11 @@ BOOST_AUTO_TEST_CASE(a_prepared_scan_is_that_of_its_steps_in_order) {
   const ProjectionSet prepared = read(folder / "scan.h5", p);
   for (std::int64_t k = 0; k < 9; ++k) {
     const float* from = scan.data.data() + k * 6 * 20;
-    const View view = binned(gaussian_filtered(median_filtered({20, 6, {from, from + 6 * 20}}, 3), 0.8, 0.5), 2);
+    const View view =
+        binned(gaussian_filtered(median_filtered({20, 6, {from, from + 6 * 20}}, 3), 0.8, 0.5), 2);
     for (std::size_t i = 0; i < view.data.size(); ++i)
-      BOOST_TEST(prepared.data[static_cast<std::size_t>(k) * view.data.size() + i] == static_cast<float>(view.data[i]));
+      BOOST_TEST(prepared.data[static_cast<std::size_t>(k) * view.data.size() + i] ==
+                 static_cast<float>(view.data[i]));
   }
 }
 
@@ -160,12 +170,14 @@ BOOST_AUTO_TEST_CASE(json_of_a_preparation_gives_it_back_and_strangers_are_refus
   p.median = 3;
   p.gaussian = {0.1, 4};
   BOOST_TEST((preparation_of(json_of(p)) == p));
-  BOOST_TEST(text_of(p) == "outliers 0.07,5; phase 12.5,30,250; stripes 2.5,61,31; median 3; gaussian 0.1,4; binning 2");
+  BOOST_TEST(text_of(p) ==
+             "outliers 0.07,5; phase 12.5,30,250; stripes 2.5,61,31; median 3; gaussian 0.1,4; binning 2");
   BOOST_TEST((preparation_of(nlohmann::json::object()).none()));
   for (const char* wrong :
-       {R"({"sharpen": 1})", R"({"binning": 0})", R"({"binning": 2.5})", R"({"median": 4})", R"({"gaussian": [1]})",
-        R"({"stripes": {"ratio": 3, "large": 51}})", R"({"stripes": {"ratio": -1, "large": 51, "small": 21}})",
-        R"({"outliers": 1})", R"({"phase": {"distance_mm": 0, "energy_kev": 1, "delta_beta": 1}})", "[1]"})
+       {R"({"sharpen": 1})", R"({"binning": 0})", R"({"binning": 2.5})", R"({"median": 4})",
+        R"({"gaussian": [1]})", R"({"stripes": {"ratio": 3, "large": 51}})",
+        R"({"stripes": {"ratio": -1, "large": 51, "small": 21}})", R"({"outliers": 1})",
+        R"({"phase": {"distance_mm": 0, "energy_kev": 1, "delta_beta": 1}})", "[1]"})
     BOOST_CHECK_THROW(static_cast<void>(preparation_of(nlohmann::json::parse(wrong))), InputError);
 }
 

@@ -90,8 +90,8 @@ double share_left(const Spoil& column) {
   return energy_of_difference(without_stripes(spoilt), without_stripes(clean)) / before;
 }
 
-// What issue and paper ask: at least nine tenths of a stripe's energy go, and at most a fiftieth of the variance of
-// a sinogram without any.
+// What issue and paper ask: at least nine tenths of a stripe's energy go, and at most a fiftieth of the
+// variance of a sinogram without any.
 constexpr double most_left = 0.1, most_changed = 0.02;
 
 }  // namespace
@@ -109,8 +109,7 @@ BOOST_AUTO_TEST_CASE(each_kind_of_stripe_is_removed) {
                                                          {"large", large_stripe},
                                                          {"dead", dead_stripe},
                                                          {"fluctuating", fluctuating_stripe}};
-  for (const auto& [name, kind] : kinds)
-    BOOST_TEST_CONTEXT(name) {
+  for (const auto& [name, kind] : kinds) BOOST_TEST_CONTEXT(name) {
       const double left = share_left(kind);
       BOOST_TEST_MESSAGE(name << ": " << left << " of the energy is left");
       BOOST_TEST(left <= most_left);
@@ -136,7 +135,8 @@ BOOST_AUTO_TEST_CASE(values_on_a_line_do_not_stand_out_and_one_beside_it_does) {
 }
 
 BOOST_AUTO_TEST_CASE(sinograms_too_small_to_judge_and_constant_ones_stay_finite) {
-  for (const auto& [views, columns] : {std::pair<std::int64_t, std::int64_t>{1, 1}, {1, 5}, {40, 9}, {3, 200}}) {
+  for (const auto& [views, columns] :
+       {std::pair<std::int64_t, std::int64_t>{1, 1}, {1, 5}, {40, 9}, {3, 200}}) {
     Sinogram s{views, columns, std::vector<double>(static_cast<std::size_t>(views * columns), 1.5)};
     const Sinogram before = s;
     s = without_stripes(std::move(s));

@@ -218,7 +218,8 @@ int probe_command(Arguments& args) {
     refuse(args, {"exact", "like", "angles-file"}, path.string() + " is not a projection set");
     if (d2vr) refuse(args, {"method"}, path.string() + " is not a projection set");
     refuse(args,
-           {"center", "filter", "filter-cutoff", "outliers", "phase", "stripes", "median", "gaussian", "binning"},
+           {"center", "filter", "filter-cutoff", "outliers", "phase", "stripes", "median", "gaussian",
+            "binning"},
            "defines the field of projections; " + path.string() + " has its own");
   }
   if (kind != InputKind::certified)

@@ -20,13 +20,15 @@ void check_field_options(const Arguments& args, const FieldOptions& stored) {
   const FieldOptions given = field_options(args);
   const bool same = (!args.has("filter") || given.filter == stored.filter) &&
                     (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
-                    (!args.has("center") || binned_center(args.number("center").value(), stored.preparation.binning) == stored.center) &&
+                    (!args.has("center") || binned_center(args.number("center").value(),
+                                                          stored.preparation.binning) == stored.center) &&
                     (!has_preparation_options(args) || given.preparation == stored.preparation);
   if (!same)
-    throw InputError(
-        fmt::format("the file was certified for filter {}, cutoff {}, centre {}, preparation {}; verify takes "
-                    "them from it",
-                    text_of(stored.filter), stored.cutoff, unbinned_center(stored.center.value_or(0), stored.preparation.binning), text_of(stored.preparation)));
+    throw InputError(fmt::format(
+        "the file was certified for filter {}, cutoff {}, centre {}, preparation {}; verify takes "
+        "them from it",
+        text_of(stored.filter), stored.cutoff,
+        unbinned_center(stored.center.value_or(0), stored.preparation.binning), text_of(stored.preparation)));
 }
 
 }  // namespace
