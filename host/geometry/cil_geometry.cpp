@@ -133,6 +133,9 @@ ConeViews cil_geometry(const std::filesystem::path& path, const StackShape& stac
   for (std::size_t k = 0; k < angles.size(); ++k)
     out.views.push_back(checked_view(rotated(about_z(-(first + angles[k]) * unit), standing_still), stack,
                                      path.string(), static_cast<std::int64_t>(k)));
+  const Vec3 normal = cross(standing_still.along_u, standing_still.along_v);
+  out.source_to_detector =
+      std::abs(dot(sum(standing_still.middle, scaled(standing_still.source, -1)), normal)) / length(normal);
   out.center_source = "file";
   if (about.has("units") && about.text("units").rfind("units", 0) != 0) out.unit = about.text("units");
   out.notes.emplace_back(
