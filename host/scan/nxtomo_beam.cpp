@@ -80,15 +80,10 @@ double needed_length(const Reader& file, const std::string& object, const std::s
 }
 
 // Of a detector's half_acquisition or field_of_view: whether the axis lies near its edge.
-bool is_half(const Reader& file, const std::string& detector, std::vector<std::string>& notes) {
+bool is_half(const Reader& file, const std::string& detector) {
   const std::string flag = detector + "/half_acquisition", text = detector + "/field_of_view";
-  if (!file.is_dataset(flag)) return file.is_dataset(text) && file.text(text, 64) == "Half";
-  try {
-    return find_number(file, flag).value_or(0) != 0;
-  } catch (const FileError& e) {  // HDF5's own booleans are no numbers
-    notes.push_back(fmt::format("{}; the axis is taken to lie near the detector's middle", e.what()));
-    return false;
-  }
+  if (file.is_dataset(flag)) return file.flag(flag);
+  return file.is_dataset(text) && file.text(text, 64) == "Half";
 }
 
 // The axis' column or row. nxtomo defines the field as a place on the detector; nabu and tomoscan read what
@@ -187,7 +182,7 @@ void place_axis(const Reader& file, const NxtomoGroups& groups, const RawScan& s
                     older = groups.detector + "/estimated_cor_from_motor",
                     row = groups.detector + "/y_rotation_axis_pixel_position";
   const std::string stated = file.is_dataset(column) ? column : older;
-  const bool half = file.is_dataset(stated) && is_half(file, groups.detector, out.notes);
+  const bool half = file.is_dataset(stated) && is_half(file, groups.detector);
   const auto center = axis_position(file, stated, scan.columns, half, "column", out.notes);
   out.center_source = center ? "file" : "default";
   view.center = center.value_or(stack.middle_column());

@@ -143,8 +143,24 @@ BOOST_AUTO_TEST_CASE(nxtomo_axis_is_read_as_a_place_or_as_an_offset) {
   };
   BOOST_TEST(half({}).report.center_source == "file");
   BOOST_TEST(noted(half({}), "read as a column"));
-  const ProjectionSet edge =
-      half([&](Hdf5Writer& file) { file.dataset(detector + "/half_acquisition", {1}, {1}, H5T_STD_U8LE); });
+  // As h5py writes True, and as a whole number.
+  const ProjectionSet edge = half([&](Hdf5Writer& file) {
+    const hid_t type = H5Tenum_create(H5T_STD_I8LE), space = H5Screate(H5S_SCALAR);
+    const std::int8_t no = 0, yes = 1;
+    H5Tenum_insert(type, "FALSE", &no);
+    H5Tenum_insert(type, "TRUE", &yes);
+    const hid_t set = H5Dcreate2(file.id(), (detector + "/half_acquisition").c_str(), type, space,
+                                 H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &yes);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Tclose(type);
+  });
+  for (const auto& [number, says] : {std::pair{1.0, "read as an offset"}, {0.0, "read as a column"}})
+    BOOST_TEST(noted(half([&, value = number](Hdf5Writer& file) {
+                       file.dataset(detector + "/half_acquisition", {1}, {value}, H5T_STD_U8LE);
+                     }),
+                     says));
   BOOST_TEST(noted(edge, "read as an offset"));
   BOOST_TEST(edge.geometry.center == 1.875, boost::test_tools::tolerance(same_geometry));
   BOOST_TEST(has(refusal(nxtomo(folder, with(distances, {column, {17}, ""})), cone()),
