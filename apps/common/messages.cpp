@@ -10,6 +10,7 @@ const std::set<std::string>& fields_with_options() {
   static const std::set<std::string> names{"angles_file",
                                            "azimuth",
                                            "base",
+                                           "beam",
                                            "camera_focal_point",
                                            "camera_position",
                                            "camera_view_angle",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "apps/common/progress.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -27,8 +28,10 @@ InputKind kind_of(const fs::path& path, const Arguments& args) {
   return InputKind::scan;
 }
 
-ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
-                        const Progress& progress) {
+namespace {
+
+ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                   std::optional<Beam> beam, const Progress& progress) {
   switch (kind_of(path, args)) {
     case InputKind::certified:
       throw InputError(fmt::format("{}: is a certified volume, not projections", path.string()));
@@ -44,6 +47,7 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   }
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
+  options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
   const CommonOptions common = common_options(args);
@@ -52,6 +56,23 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   ProjectionSet scan = read_scan(path, options, progress);
   for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
   return scan;
+}
+
+}  // namespace
+
+ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                        const Progress& progress) {
+  return load(path, args, field, {}, progress);
+}
+
+ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
+                                  const Progress& progress) {
+  const auto geometry = noted_geometry(certificate);
+  std::error_code error;
+  // Folders say it themselves; no other file is of cone beam.
+  const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
+  return load(path, args, certificate.field,
+              geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, progress);
 }
 
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {

@@ -22,6 +22,11 @@ InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
 ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress);
 
+/// The same under a certificate's field options. An HDF5 file that the certificate says is of cone beam is
+/// read so (--beam).
+ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
+                                  const Certificate& certificate, const Progress& progress);
+
 /// A certified volume, by vdvr::read_certified; says on stderr that a file is unsealed. `unverified`: nothing
 /// is compared.
 VdvrFile open_certified(const std::filesystem::path& path, const Arguments& args, bool unverified = false);

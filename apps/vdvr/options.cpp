@@ -65,7 +65,9 @@ std::optional<int> rate(const Arguments& args, const std::string& name, std::int
 }  // namespace
 
 void add_scan(Arguments& args) {
-  args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view");
+  args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view")
+      .value("beam", "cone|parallel",
+             "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise");
 }
 
 void add_field(Arguments& args) {

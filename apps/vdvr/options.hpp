@@ -13,7 +13,7 @@
 
 namespace vdvr::cli {
 
-/// --angles-file, for stacks that carry no angles.
+/// --angles-file, for stacks that carry no angles, and --beam.
 void add_scan(Arguments& args);
 void add_field(Arguments& args);
 void add_grid(Arguments& args);

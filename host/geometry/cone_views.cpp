@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -36,6 +37,37 @@ ViewMatrix checked_view(const CircularView& v, const std::string& where, std::in
        {std::pair{"the pitch of columns", v.pitch_u}, {"the pitch of rows", v.pitch_v}})
     require_positive(what, pitch, "it must be positive");
   return checked_view(circular_view(v), where, number);
+}
+
+// A point is source + t (middle + a u + b v - source) with (t a, t b, t) = [u v middle-source]^-1 (point -
+// source).
+ViewMatrix checked_view(const DetectorVectors& d, const StackShape& stack, const std::string& where,
+                        std::int64_t number) {
+  const Vec3 depth = sum(d.middle, scaled(d.source, -1));
+  const std::array<Vec3, 3> rows{cross(d.along_v, depth), cross(depth, d.along_u),
+                                 cross(d.along_u, d.along_v)};
+  const double volume = dot(d.along_u, rows[0]);
+  if (!(std::abs(volume) > 0))
+    throw FileError(
+        fmt::format("{}: view {}: the source lies in the detector's plane, or its columns and "
+                    "rows are parallel",
+                    where, number));
+  // As far as the origin lies towards the detector.
+  if (!(-dot(d.source, rows[2]) / volume > 0))
+    throw FileError(
+        fmt::format("{}: view {}: the isocentre lies on or behind the source's plane", where, number));
+  const auto row = [&](std::size_t i) -> std::array<double, 4> {
+    const Vec3& r = rows[i];
+    return {r[0] / volume, r[1] / volume, r[2] / volume, -dot(r, d.source) / volume};
+  };
+  const std::array<double, 4> a = row(0), b = row(1), t = row(2);
+  ViewMatrix matrix{};
+  for (std::size_t j = 0; j < 4; ++j) {
+    matrix[0][j] = a[j] + stack.middle_column() * t[j];
+    matrix[1][j] = b[j] + stack.middle_row() * t[j];
+    matrix[2][j] = t[j];
+  }
+  return checked_view(matrix, where, number);
 }
 
 void require_views(const std::string& where, const std::string& what, std::int64_t described,

@@ -19,6 +19,12 @@ struct StackShape {
   [[nodiscard]] double middle_row() const { return 0.5 * static_cast<double>(rows - 1); }
 };
 
+/// A flat detector and its source, as vectors of the world.
+struct DetectorVectors {
+  Vec3 source{}, middle{};    ///< of the rays, and of the detector
+  Vec3 along_u{}, along_v{};  ///< from one column, and from one row, to the next
+};
+
 struct ConeViews {
   std::vector<ViewMatrix> views;   ///< one for each of the stack's views, lambda = 1 at the isocentre
   std::string center_source;       ///< "file", or "default" where the detector's middle was assumed
@@ -32,6 +38,9 @@ struct ConeViews {
 ViewMatrix checked_view(const ViewMatrix& matrix, const std::string& where, std::int64_t view);
 /// circular_view, whose lengths must be finite and positive.
 ViewMatrix checked_view(const CircularView& view, const std::string& where, std::int64_t number);
+/// The view whose rays run from the source to that detector. The isocentre is the world's origin.
+ViewMatrix checked_view(const DetectorVectors& vectors, const StackShape& stack, const std::string& where,
+                        std::int64_t number);
 /// Throws FileError, which names `what`, unless as many views are described as there are.
 void require_views(const std::string& where, const std::string& what, std::int64_t described,
                    const StackShape& stack);

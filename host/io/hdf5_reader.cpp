@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "host/io/hdf5_chunks.hpp"
 #include "vdvr/error.hpp"
@@ -382,6 +383,19 @@ Dataset Reader::numeric_dataset(const std::string& path) const {
   if (null || H5Dget_storage_size(d.id.id()) == 0) refuse(path, "holds no data");
   if (const auto problem = check_extents(d)) refuse(path, *problem);
   return d;
+}
+
+bool Reader::flag(const std::string& path) const {
+  const Dataset d = declared(path);
+  std::array<unsigned char, 8> bytes{};
+  if (!(d.is_integer() || d.kind == H5T_ENUM) || d.count != 1 || d.element_bytes > bytes.size())
+    refuse(path, "is not one boolean");
+  if (d.outside || d.layout == H5D_CHUNKED || H5Dget_storage_size(d.id.id()) == 0)
+    refuse(path, "is not a boolean that lies in one piece within the file");
+  const Handle type(H5Dget_type(d.id.id()), H5Tclose);
+  if (H5Dread(d.id.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0)
+    refuse(path, fmt::format("cannot be read, truncated or damaged (HDF5: {})", reason()));
+  return std::any_of(bytes.begin(), bytes.end(), [](unsigned char b) { return b != 0; });
 }
 
 std::string Reader::text(const std::string& path, std::uint64_t max_bytes) const {

@@ -62,6 +62,8 @@ class Reader {
   void read(const Dataset& dataset, void* values) const;
   /// Any with numbers stored in this file; Dataset::read converts them.
   [[nodiscard]] Dataset numeric_dataset(const std::string& path) const;
+  /// One boolean, as h5py writes it (an enumeration) or as a whole number.
+  [[nodiscard]] bool flag(const std::string& path) const;
   /// A string dataset, fixed or variable length, scalar or of one element, of at most `max_bytes`.
   [[nodiscard]] std::string text(const std::string& path, std::uint64_t max_bytes) const;
 

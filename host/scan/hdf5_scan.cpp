@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "host/io/hdf5_reader.hpp"
+#include "host/scan/nxtomo_beam.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
@@ -201,7 +202,7 @@ std::string child_of(const Reader& file, const std::string& group, const std::st
 }
 
 struct TomoEntry {
-  std::string entry, detector;
+  std::string entry, instrument, detector;
 };
 
 // The first group, in order of depth and name, with a detector that has data and image_key. NXtomo entries
@@ -217,7 +218,7 @@ std::optional<TomoEntry> find_tomo_entry(const Reader& file) {
           instrument.empty() ? "" : child_of(file, instrument, "NXdetector", "detector");
       if (!detector.empty() && file.is_dataset(detector + "/data") &&
           file.is_dataset(detector + "/image_key"))
-        return TomoEntry{group, detector};
+        return TomoEntry{group, instrument, detector};
       for (const std::string& child : file.members(group.empty() ? "/" : group))
         if (file.is_group(group + "/" + child)) next.push_back(group + "/" + child);
     }
@@ -241,7 +242,7 @@ void read_pixel_size(const Reader& file, const std::string& detector, RawScan& s
   scan.unit = unit_of(x);
 }
 
-RawScan open_nxtomo(const Reader& file, const TomoEntry& where) {
+RawScan open_nxtomo(const Reader& file, const TomoEntry& where, bool cone) {
   RawScan scan;
   scan.format = "nxtomo";
   const Stack data = open_stack(file, where.detector + "/data", 0);
@@ -273,16 +274,24 @@ RawScan open_nxtomo(const Reader& file, const TomoEntry& where) {
   scan.flats = frames_of(data, numbers[1], "flat");
   scan.darks = frames_of(data, numbers[2], "dark");
   read_pixel_size(file, where.detector, scan);
+  if (cone)
+    set_nxtomo_cone(file, {where.detector, child_of(file, where.instrument, "NXsource", "source"), sample},
+                    numbers[0], data.count, scan);
   return scan;
 }
 
 }  // namespace
 
-RawScan open_hdf5_scan(const std::filesystem::path& path) {
+RawScan open_hdf5_scan(const std::filesystem::path& path, bool cone) {
   const Reader file(path, hdf5::Links::within_file);
   RawScan scan;
+  if (cone && file.is_dataset("/exchange/data"))
+    throw FileError(
+        path.string() +
+        ": Data Exchange states no distances, so cone beam (`beam`) cannot be read from it; describe "
+        "the scan in scan.json by 'geometry'");
   if (file.is_dataset("/exchange/data")) scan = open_data_exchange(file);
-  else if (const auto entry = find_tomo_entry(file)) scan = open_nxtomo(file, *entry);
+  else if (const auto entry = find_tomo_entry(file)) scan = open_nxtomo(file, *entry, cone);
   else if (file.find_text("/", "format") == "vdvr")
     throw FileError(path.string() + ": is a certified volume, not a scan");
   else

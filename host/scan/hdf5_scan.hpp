@@ -7,7 +7,8 @@
 
 namespace vdvr::io {
 
-/// Data Exchange (/exchange/data) or NXtomo; frames are read later. Throws FileError.
-RawScan open_hdf5_scan(const std::filesystem::path& path);
+/// Data Exchange (/exchange/data) or NXtomo; frames are read later. `cone`: of NXtomo, cone beam by its
+/// distances. Throws FileError.
+RawScan open_hdf5_scan(const std::filesystem::path& path, bool cone = false);
 
 }  // namespace vdvr::io

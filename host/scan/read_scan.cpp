@@ -28,6 +28,15 @@
 #include "vdvr/output_file.hpp"
 
 namespace vdvr {
+
+const char* text_of(Beam beam) { return beam == Beam::cone ? "cone" : "parallel"; }
+
+std::optional<Beam> beam_of(const std::string& text) {
+  for (const Beam beam : {Beam::parallel, Beam::cone})
+    if (text == text_of(beam)) return beam;
+  return {};
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -65,10 +74,21 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
   if (options.angles_file && !raster)
     throw InputError(path.string() +
                      ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
-  if (folder) return io::open_scan_folder(path, options.max_memory_bytes);
+  if (folder) return io::open_scan_folder(path, options.max_memory_bytes, options.beam);
   if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
   if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
-  if (is_hdf5(path)) return io::open_hdf5_scan(path);
+  const bool cone = options.beam == Beam::cone;
+  if (is_hdf5(path)) {
+    io::RawScan raw = io::open_hdf5_scan(path, cone);
+    if (raw.cone)
+      raw.notes.insert(raw.notes.end(), raw.cone->geometry.notes.begin(), raw.cone->geometry.notes.end());
+    return raw;
+  }
+  if (raster && cone)
+    throw InputError(
+        path.string() +
+        ": a stack states no distances, so cone beam (`beam`) cannot be read from it; describe the scan "
+        "in scan.json by 'geometry'");
   if (raster) {
     if (!options.angles_file)
       throw InputError(path.string() + ": a stack needs its angles; give them with `angles_file`");
@@ -78,7 +98,8 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
     if (path.filename() != "scan.json")
       throw FileError(path.string() + ": a scan's description is named scan.json");
     folder = true;
-    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes);
+    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes,
+                                options.beam);
   }
   throw FileError(path.string() +
                   ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "

@@ -27,9 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 
 std::set<std::string> known_members() {
-  std::set<std::string> known{"projections", "hdf5",        "flats",   "darks",     "angles",
-                              "angle_range", "use",         "center",  "pitch",     "unit",
-                              "air_columns", "description", "comment", "redundancy"};
+  std::set<std::string> known{"projections", "hdf5",        "flats",   "darks",      "angles",
+                              "angle_range", "use",         "center",  "pitch",      "unit",
+                              "air_columns", "description", "comment", "redundancy", "beam"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -115,12 +115,37 @@ RawScan open_stack(const Description& about, const std::string& name, std::uint6
   return scan;
 }
 
-RawScan open_hdf5(const Description& about) {
+// Whether cone beam is asked for by distances, in scan.json or beside it.
+bool wants_distances(const Description& about, std::optional<Beam> beam) {
+  const auto kind = cone_kind(about);
+  std::optional<Beam> stated;
+  if (about.has("beam")) stated = beam_of(about.text("beam"));
+  if (about.has("beam") && !stated)
+    about.fail(fmt::format("'beam' is \"{}\"; it must be \"cone\" or \"parallel\"", about.text("beam")));
+  const std::string name = (about.folder() / "scan.json").string();
+  if (kind && stated)
+    about.fail(fmt::format("'{}' and 'beam' both describe the geometry; leave one of them out", *kind));
+  if (kind && beam)
+    throw InputError(fmt::format("{}: '{}' describes the geometry; leave `beam` out", name, *kind));
+  if (stated && beam && *stated != *beam)
+    throw InputError(
+        fmt::format("{}: 'beam' is \"{}\"; `beam` asks for {}", name, text_of(*stated), text_of(*beam)));
+  if (stated.value_or(beam.value_or(Beam::parallel)) != Beam::cone) return false;
+  if (!about.has("hdf5")) {
+    const std::string what =
+        "cone beam by distances is read from an NXtomo file ('hdf5'); describe other scans by 'geometry'";
+    if (stated) about.fail(what);
+    throw InputError(name + ": " + what);
+  }
+  return true;
+}
+
+RawScan open_hdf5(const Description& about, bool cone) {
   for (const char* key : {"flats", "darks", "description"})
     if (about.has(key))
       about.fail(fmt::format("'{}' goes with 'projections'; an HDF5 file brings its own", key));
   const std::string name = about.text("hdf5");
-  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"));
+  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), cone);
   scan.files.clear();
   use_file(scan, about, name);
   return scan;
@@ -154,17 +179,18 @@ void set_angles(const Description& about, RawScan& scan) {
 
 }  // namespace
 
-RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes) {
+RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes, std::optional<Beam> beam) {
   const Description about(folder / "scan.json", known_members());
   std::optional<NikonScan> nikon;
   if (about.has("nikon")) nikon = read_nikon(about.inside(about.text("nikon"), "nikon"));
   const bool own_projections = nikon && !about.has("projections") && !about.has("hdf5");
   if (!own_projections && about.has("projections") == about.has("hdf5"))
     about.fail("needs one of 'projections' and 'hdf5'");
+  const bool distances = wants_distances(about, beam);
   RawScan scan;
   std::vector<std::string> names;  // of the projections, one file each; empty for one file of all
   if (about.has("hdf5")) {
-    scan = open_hdf5(about);
+    scan = open_hdf5(about, distances);
   } else {
     names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
     const bool stack = names.size() == 1 && is_raster_file(folder / names.front());
@@ -176,7 +202,8 @@ RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes)
   scan.format = "scan.json";
   use_file(scan, about, "scan.json");
   set_geometry(about, scan);
-  if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
+  if (distances) set_cone(about, "beam", scan);
+  else if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
   else set_angles(about, scan);
   const std::int64_t count = scan.projections.count;
   const auto [first, end] = about.has("use") ? about.half_open("use", count, "projections")

@@ -3,12 +3,17 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+
 #include "host/scan/raw_scan.hpp"
+#include "vdvr/read_scan.hpp"
 
 namespace vdvr::io {
 
 /// A folder's scan.json; frames are read later. The first frame is read to know its size, within
-/// `max_memory_bytes` (0: no limit). Throws FileError, ResourceError.
-RawScan open_scan_folder(const std::filesystem::path& folder, std::uint64_t max_memory_bytes);
+/// `max_memory_bytes` (0: no limit). `beam` is asked for beside scan.json's own. Throws FileError, InputError
+/// where the two contradict each other, ResourceError.
+RawScan open_scan_folder(const std::filesystem::path& folder, std::uint64_t max_memory_bytes,
+                         std::optional<Beam> beam = {});
 
 }  // namespace vdvr::io

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include "host/geometry/astra_geometry.hpp"
+#include "host/geometry/cil_geometry.hpp"
 #include "host/geometry/circular_geometry.hpp"
+#include "host/geometry/leap_geometry.hpp"
 #include "host/geometry/matrix_geometry.hpp"
 #include "host/geometry/nikon_geometry.hpp"
 #include "host/geometry/rtk_geometry.hpp"
@@ -69,6 +71,7 @@ ConeViews read_geometry(const Description& about, const std::string& kind, RawSc
   for (const char* key : {"angles", "angle_range"})
     if (about.has(key))
       about.fail(fmt::format("'{}' contradicts '{}', which brings its own; leave it out", key, kind));
+  if (kind == "beam") return std::move(scan.cone->geometry);
   const std::string name = about.text(kind);
   const fs::path path = about.inside(name, kind);
   use_file(scan, about, name);
@@ -76,7 +79,9 @@ ConeViews read_geometry(const Description& about, const std::string& kind, RawSc
   if (kind == "rtk_geometry") return rtk_geometry(path, placed_stack(about), stack);
   if (kind == "nikon") return nikon_geometry(read_nikon(path), stack);
   if (kind == "astra") return astra_geometry(path, stack);
-  return tigre_geometry(path, stack);
+  if (kind == "tigre") return tigre_geometry(path, stack);
+  if (kind == "cil") return cil_geometry(path, stack);
+  return leap_geometry(path, stack);
 }
 
 // Lengths of a geometry are in the unit that scan.json names, else that of its format or of the projections.

@@ -174,8 +174,29 @@ BOOST_AUTO_TEST_CASE(rtk_parameters_hold_until_they_are_given_again_as_in_rtk) {
   BOOST_TEST(largest_difference(once, scan.read({{"rtk_geometry", "g.xml"}})) == 0);
 }
 
-// Blocks of docs/inputs.md, "Cone beam", as a user copies them: what begins with '{"proj' or '{"nikon' is a
-// scan.json, the others are the files that it names.
+// NXtomo of the documentation's numbers.
+static void write_distances(const Path& path) {
+  Hdf5Writer file(path);
+  for (const char* group : {"/entry", "/entry/instrument", "/entry/instrument/detector",
+                            "/entry/instrument/source", "/entry/sample"})
+    file.group(group);
+  std::vector<double> frames(6 * 256 * 256, 30000);
+  std::fill_n(frames.begin(), 256 * 256, 10);
+  std::fill_n(frames.begin() + 256 * 256, 256 * 256, 60000);
+  file.dataset("/entry/instrument/detector/data", {6, 256, 256}, frames);
+  file.dataset("/entry/instrument/detector/image_key", {6}, {2, 1, 0, 0, 0, 0}, H5T_STD_I32LE);
+  file.dataset("/entry/sample/rotation_angle", {6}, {0, 0, 0, 90, 180, 270}, H5T_IEEE_F64LE);
+  for (const auto& [name, value] : {std::pair{"/entry/instrument/detector/x_pixel_size", 0.2},
+                                    {"/entry/instrument/detector/y_pixel_size", 0.2},
+                                    {"/entry/instrument/detector/distance", 500.0},
+                                    {"/entry/instrument/source/distance", -500.0}}) {
+    file.dataset(name, {1}, {value}, H5T_IEEE_F64LE);
+    file.attribute(name, "units", "mm");
+  }
+}
+
+// Blocks of docs/inputs.md, "Cone beam", as a user copies them: what begins with '{"proj', '{"hdf5' or
+// '{"nikon' is a scan.json, the others are the files that it names.
 BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
   const std::string text = support::bytes_of(Path(VDVR_SOURCE_DIR) / "docs/inputs.md");
   std::istringstream lines(text.substr(text.find("## Cone beam\n")));
@@ -197,6 +218,7 @@ BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
                                                                       : 30000),
                SAMPLEFORMAT_UINT);
   static_cast<void>(folder.file("angles.txt", "0 90 180 270\n"));
+  write_distances(folder / "scan.nxs");
   std::optional<ProjectionSet> first;
   std::size_t read = 0;
   const auto check = [&](const std::string& scan) {
@@ -211,19 +233,25 @@ BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
     static_cast<void>(folder.file("P.npy", npy_bytes(matrices_of(*first), "4, 3, 4")));
     ++read;
   };
+  const auto describes = [](const std::string& block) {
+    return block.rfind("{\"proj", 0) == 0 || block.rfind("{\"nikon", 0) == 0 ||
+           block.rfind("{\"hdf5", 0) == 0;
+  };
   std::string scan;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::string& block = blocks[i];
-    const bool described = block.rfind("{\"proj", 0) == 0 || block.rfind("{\"nikon", 0) == 0;
+    const bool described = describes(block);
     if (described) scan = block;
     // The files that a description names follow it.
-    const bool file_follows = i + 1 < blocks.size() && blocks[i + 1].rfind("{\"proj", 0) != 0 &&
-                              blocks[i + 1].rfind("{\"nikon", 0) != 0;
+    const bool file_follows = i + 1 < blocks.size() && !describes(blocks[i + 1]);
     if (described && !file_follows) check(scan);
     if (described) continue;
     if (block.rfind("<RTK", 0) == 0) static_cast<void>(folder.file("geometry.xml", block));
     else if (block.rfind("[XTekCT]", 0) == 0) static_cast<void>(folder.file("scan.xtekct", block));
     else if (block.find("\"mode\"") != std::string::npos) static_cast<void>(folder.file("tigre.json", block));
+    else if (block.find("\"sod\"") != std::string::npos) static_cast<void>(folder.file("leap.json", block));
+    else if (block.find("\"source_position\"") != std::string::npos)
+      static_cast<void>(folder.file("cil.json", block));
     else static_cast<void>(folder.file("astra.json", block));
     if (block.find("cone_vec") != std::string::npos) {
       static_cast<void>(folder.file("vectors.json", block));
@@ -231,7 +259,7 @@ BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
     }
     check(scan);
   }
-  BOOST_TEST(read == 7u);
+  BOOST_TEST(read == 10u);
 }
 
 // --- what is assumed, and who wins ---

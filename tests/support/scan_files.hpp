@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -232,10 +233,9 @@ std::string npy_bytes(const std::vector<T>& values, const std::string& shape, bo
   return bytes;
 }
 
-/// A MetaImage stack of float zeros but for its first sample, 1.
-inline std::string stack_bytes(int columns, int rows, int views, const std::string& place) {
-  std::vector<float> samples(static_cast<std::size_t>(columns * rows * views));
-  samples.at(0) = 1;
+/// A MetaImage stack; float samples[view][row][column].
+inline std::string stack_bytes(int columns, int rows, int views, const std::string& place,
+                               const std::vector<float>& samples) {
   std::string bytes = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n" +
                       place + "DimSize = " + std::to_string(columns) + " " + std::to_string(rows) + " " +
                       std::to_string(views) + "\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
@@ -243,15 +243,28 @@ inline std::string stack_bytes(int columns, int rows, int views, const std::stri
   return bytes;
 }
 
+/// One of zeros but for its first sample, 1.
+inline std::string stack_bytes(int columns, int rows, int views, const std::string& place) {
+  std::vector<float> samples(static_cast<std::size_t>(columns * rows * views));
+  samples.at(0) = 1;
+  return stack_bytes(columns, rows, views, place, samples);
+}
+
 inline std::string folder_refusal(const TemporaryFolder& folder, const nlohmann::json& description) {
   static_cast<void>(folder.file("scan.json", description.dump()));
   return refusal(folder.path());
 }
 
-inline Path write_nxtomo(const Path& path, std::vector<double> keys = {2, 1, 0, 0, 3, 0, 1, 0}) {
+inline const std::string nxtomo_entry = "/entry1/tomo_entry";
+
+/// `more` writes what it likes into the file, which has the groups instrument/ccd, instrument/source and
+/// sample.
+inline Path write_nxtomo(const Path& path, std::vector<double> keys = {2, 1, 0, 0, 3, 0, 1, 0},
+                         const std::function<void(Hdf5Writer&)>& more = {}) {
   Hdf5Writer file(path);
-  for (const char* group : {"/entry1", "/entry1/tomo_entry", "/entry1/tomo_entry/instrument",
-                            "/entry1/tomo_entry/instrument/ccd", "/entry1/tomo_entry/sample"})
+  for (const char* group :
+       {"/entry1", "/entry1/tomo_entry", "/entry1/tomo_entry/instrument", "/entry1/tomo_entry/instrument/ccd",
+        "/entry1/tomo_entry/instrument/source", "/entry1/tomo_entry/sample"})
     file.group(group);
   file.attribute("/entry1/tomo_entry/instrument/ccd", "NX_class", "NXdetector");
   const std::string detector = "/entry1/tomo_entry/instrument/ccd/";
@@ -275,6 +288,7 @@ inline Path write_nxtomo(const Path& path, std::vector<double> keys = {2, 1, 0, 
   file.dataset("/entry1/tomo_entry/sample/rotation_angle", {8}, {0, 0, 0, pi / 4, 9, pi / 2, 9, 3 * pi / 4},
                H5T_IEEE_F64LE);
   file.attribute("/entry1/tomo_entry/sample/rotation_angle", "units", "rad");
+  if (more) more(file);
   return path;
 }
 

@@ -105,7 +105,7 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
   const MixedVolume& volume = file.volume;
   const Certificate& c = file.certificate;
   std::optional<ProjectionSet> scan = noted_geometry(c);
-  if (args.has("projections")) scan = load_scan(args.path("projections"), args, c.field, progress);
+  if (args.has("projections")) scan = load_certified_scan(args.path("projections"), args, c, progress);
   if (!scan)
     throw InputError(
         fmt::format("{}: does not say which points are covered; give --projections", path.string()));
@@ -216,6 +216,8 @@ int probe_command(Arguments& args) {
   const InputKind kind = kind_of(path, args);
   if (kind != InputKind::scan) {
     refuse(args, {"exact", "like", "angles-file"}, path.string() + " is not a projection set");
+    if (kind == InputKind::volume || !args.has("projections"))
+      refuse(args, {"beam"}, path.string() + " is not a projection set");
     if (d2vr) refuse(args, {"method"}, path.string() + " is not a projection set");
     refuse(args,
            {"center", "filter", "filter-cutoff", "outliers", "phase", "stripes", "median", "gaussian",

@@ -274,7 +274,7 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   const ErrorSliceOptions options{o.slice_axis, o.slice_position.value_or(middle), o.width, height};
   if (!args.has("projections")) return render_bound(common, o, output, kind, scene, options);
   const auto projections = args.path("projections");
-  const ProjectionSet scan = load_scan(projections, args, scene.certificate->field, progress.callback());
+  const ProjectionSet scan = load_certified_scan(projections, args, *scene.certificate, progress.callback());
   check_projections(projections, scan, *scene.certificate);
   Device device = open_device(common);
   const ErrorSlice slice =

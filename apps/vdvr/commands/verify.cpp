@@ -50,7 +50,7 @@ int verify_command(Arguments& args) {
   const VdvrFile file = read_to_verify(path, common.max_memory);
   const Certificate& certificate = file.certificate;
   check_field_options(args, certificate.field);
-  const ProjectionSet scan = load_scan(projections, args, certificate.field, progress.callback());
+  const ProjectionSet scan = load_certified_scan(projections, args, certificate, progress.callback());
   check_projections(projections, scan, certificate);
   Device device = open_device(common);
   VerifyOptions options;

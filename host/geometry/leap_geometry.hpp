@@ -1,0 +1,14 @@
+// LEAP's geometries `set_conebeam` and `set_modularbeam`, their arguments saved as JSON. Called by
+// host/scan/scan_members.cpp.
+#pragma once
+
+#include <filesystem>
+
+#include "host/geometry/cone_views.hpp"
+
+namespace vdvr::io {
+
+/// Throws FileError.
+ConeViews leap_geometry(const std::filesystem::path& path, const StackShape& stack);
+
+}  // namespace vdvr::io
