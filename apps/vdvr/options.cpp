@@ -81,7 +81,7 @@ void add_field(Arguments& args) {
       .value("phase", "MM,KEV,RATIO",
              "Paganin's phase retrieval: object to detector, energy, delta / beta; parallel beam")
       .value("stripes", "RATIO[,LARGE,SMALL]|on",
-             "take stripes off sinograms, rings off slices; on: 3,51,21 (docs/preparation.md)")
+             "take stripes off sinograms, rings off slices; on: 3, and windows by the detector")
       .value("median", "N", "side of a square median window in pixels, odd")
       .value("gaussian", "SU,SV", "standard deviations of a blur in columns and rows")
       .value("binning", "N", "columns and rows that become one pixel");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -40,8 +41,8 @@ void check_preparation(const Preparation& p) {
   }
   if (p.stripes) {
     require_positive("stripes: the ratio", p.stripes->ratio);
-    require_odd("stripes: the window of large ones", p.stripes->large, widest);
-    require_odd("stripes: the window of small ones", p.stripes->small, widest);
+    if (p.stripes->large != 0) require_odd("stripes: the large window", p.stripes->large, widest);
+    if (p.stripes->small != 0) require_odd("stripes: the small window", p.stripes->small, widest);
   }
   require_odd("median: the window", p.median, widest_square);
   for (const double sigma : p.gaussian)
@@ -49,6 +50,14 @@ void check_preparation(const Preparation& p) {
       throw InputError(fmt::format("gaussian: {} must be from 0 to {} pixels", sigma, widest_blur));
   if (p.binning < 1 || p.binning > most_binning)
     throw InputError(fmt::format("binning: {} must be from 1 to {}", p.binning, most_binning));
+}
+
+Preparation for_columns(Preparation p, std::int64_t columns) {
+  constexpr std::int64_t least = 5, most_large = 51, most_small = 21;
+  const auto odd = [](std::int64_t n) { return static_cast<int>(n - 1 + n % 2); };
+  if (p.stripes && p.stripes->large == 0) p.stripes->large = odd(std::clamp(columns / 6, least, most_large));
+  if (p.stripes && p.stripes->small == 0) p.stripes->small = odd(std::clamp(columns / 15, least, most_small));
+  return p;
 }
 
 std::string text_of(const Preparation& p) {

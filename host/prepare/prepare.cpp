@@ -48,20 +48,18 @@ void remove_stripes(ProjectionSet& scan, const Stripes& stripes, std::uint64_t m
                              static_cast<std::uint64_t>(g.views()) * static_cast<std::uint64_t>(g.columns);
   io::require_memory(scan.data.resident_bytes() + each * std::max(1u, std::thread::hardware_concurrency()),
                      max_memory_bytes, "stripe removal: the projections and a sinogram for each core");
-  std::atomic<std::int64_t> dead{0}, lasting{0}, large{0};
+  std::atomic<std::int64_t> dead{0}, lasting{0};
   parallel_for(g.rows, progress, "stripes", [&](std::int64_t row) {
     Sinogram s = sinogram_of(scan, row);
     dead += remove_dead_stripes(s, stripes.ratio, stripes.large);
-    lasting += remove_lasting_stripes(s, stripes.ratio);
-    large += remove_large_stripes(s, stripes.ratio, stripes.large);
+    lasting += remove_lasting_stripes(s, stripes.ratio, stripes.small);
     remove_small_stripes(s, stripes.small);
     put(s, scan, row);
   });
   scan.report.notes.push_back(
-      fmt::format("stripes: in {} rows {} columns were dead or fluctuating, {} off their neighbours for many "
-                  "views, {} far "
-                  "off; then all got the median of {} columns, rank by rank",
-                  g.rows, dead.load(), lasting.load(), large.load(), stripes.small));
+      fmt::format("stripes: in {} rows {} columns were dead or fluctuating, {} off those around them for "
+                  "many views; then all got the median of {} columns, rank by rank",
+                  g.rows, dead.load(), lasting.load(), stripes.small));
 }
 
 // --- binning ---

@@ -115,19 +115,21 @@ Sinogram binned_views(const Sinogram& s, std::int64_t bins) {
   return out;
 }
 
-// lasting.row(b)[c]: by how much column c lies above its neighbours in most of the bins around b.
-Sinogram lasting_differences(const Sinogram& binned) {
-  constexpr int across = 9, along = 21;  // columns; bins of 120
-  Sinogram out{binned.views, binned.columns, std::vector<double>(binned.data.size())};
-  for (std::int64_t b = 0; b < binned.views; ++b) {
-    const auto around = median_along(binned.row(b), binned.columns, across);
-    for (std::int64_t c = 0; c < binned.columns; ++c) out.row(b)[c] = binned.row(b)[c] - around[at(c)];
-  }
+// lasting.row(b)[c]: by how much column c lies above those around it in most of the bins around b. What a
+// view's neighbours differ by is made of stripes' sides, which stay, and of the object's, which move on: a
+// median along the views leaves the former, whose sum across is the stripes' profile.
+Sinogram lasting_differences(const Sinogram& binned, int window) {
+  constexpr int along = 61;  // bins of 120
+  Sinogram out{binned.views, binned.columns, std::vector<double>(binned.data.size(), 0.0)};
   std::vector<double> column(at(binned.views));
-  for (std::int64_t c = 0; c < binned.columns; ++c) {
-    for (std::int64_t b = 0; b < binned.views; ++b) column[at(b)] = out.row(b)[c];
+  for (std::int64_t c = 1; c < binned.columns; ++c) {
+    for (std::int64_t b = 0; b < binned.views; ++b) column[at(b)] = binned.row(b)[c] - binned.row(b)[c - 1];
     const auto lasting = median_along(column.data(), binned.views, along);
-    for (std::int64_t b = 0; b < binned.views; ++b) out.row(b)[c] = lasting[at(b)];
+    for (std::int64_t b = 0; b < binned.views; ++b) out.row(b)[c] = out.row(b)[c - 1] + lasting[at(b)];
+  }
+  for (std::int64_t b = 0; b < binned.views; ++b) {
+    const auto around = median_along(out.row(b), binned.columns, window);
+    for (std::int64_t c = 0; c < binned.columns; ++c) out.row(b)[c] -= around[at(c)];
   }
   return out;
 }
@@ -176,10 +178,10 @@ std::int64_t remove_dead_stripes(Sinogram& s, double ratio, int window) {
   return std::count(found.begin(), found.end(), true);
 }
 
-std::int64_t remove_lasting_stripes(Sinogram& s, double ratio) {
+std::int64_t remove_lasting_stripes(Sinogram& s, double ratio, int window) {
   constexpr std::int64_t most_bins = 120;
   const std::int64_t bins = std::min(s.views, most_bins);
-  const Sinogram lasting = lasting_differences(binned_views(s, bins));
+  const Sinogram lasting = lasting_differences(binned_views(s, bins), window);
   std::vector<double> most(at(s.columns), 0.0);
   for (std::int64_t b = 0; b < bins; ++b)
     for (std::int64_t c = 0; c < s.columns; ++c)
@@ -190,26 +192,6 @@ std::int64_t remove_lasting_stripes(Sinogram& s, double ratio) {
     for (std::int64_t c = 0; c < s.columns; ++c)
       if (bad[at(c)]) s.row(k)[c] -= lasting.row(b)[c];
   }
-  return std::count(found.begin(), found.end(), true);
-}
-
-std::int64_t remove_large_stripes(Sinogram& s, double ratio, int window) {
-  const Sorted sorted = sorted_columns(s);
-  const Sinogram smooth = smoothed_ranks(sorted.ranks, window);
-  // The twentieth at both ends is left out: a stripe that fills some views only would spoil the mean.
-  const std::int64_t drop = s.views / 20;
-  std::vector<double> difference(at(s.columns), 0.0);
-  for (std::int64_t r = drop; r < s.views - drop; ++r)
-    for (std::int64_t c = 0; c < s.columns; ++c)
-      difference[at(c)] +=
-          (sorted.ranks.row(r)[c] - smooth.row(r)[c]) / static_cast<double>(s.views - 2 * drop);
-  // What is wide belongs to the object, near its axis.
-  const auto wide = median_along(difference.data(), s.columns, 2 * (window / 5) + 1);
-  for (std::size_t c = 0; c < wide.size(); ++c) difference[c] -= wide[c];
-  const std::vector<bool> found = outstanding(difference, ratio, largest_magnitude(s));
-  const std::vector<bool> bad = widened(found);
-  for (std::int64_t c = 0; c < s.columns; ++c)
-    if (bad[at(c)]) put_back(s, sorted, smooth, c);
   return std::count(found.begin(), found.end(), true);
 }
 

@@ -3,8 +3,7 @@
 // sinogram[view][column] of line integrals. Called by prepare.cpp.
 //
 // Deviation: the paper corrects columns by a factor, of intensities. Of line integrals a factor of intensity
-// is an offset, so columns are compared by differences; a column that was found to be far off gets its
-// neighbours' values rank by rank, which no offset changes.
+// is an offset, so columns are compared by differences.
 #pragma once
 
 #include <cstdint>
@@ -26,15 +25,12 @@ std::vector<bool> outstanding(const std::vector<double>& values, double ratio, d
 /// Dead and fluctuating columns (algorithm 6), between their nearest sound neighbours afterwards. Returns how
 /// many there were.
 std::int64_t remove_dead_stripes(Sinogram& sinogram, double ratio, int window);
-/// Columns that differ from their neighbours alike for a sixth of the views or more, which what is seen of an
-/// object that turns does not: the difference is taken off them. Returns how many there were. Not of the
-/// paper: sorting moves such a stripe's views among the ranks, and nine tenths of one that fills half of the
-/// views stay.
-std::int64_t remove_lasting_stripes(Sinogram& sinogram, double ratio);
-/// Columns far off their neighbours (algorithm 5), in stripes of at most a fifth of the window: wider ones
-/// are the object's (the paper takes them too, which damages the middle of a slice). Returns how many there
-/// were.
-std::int64_t remove_large_stripes(Sinogram& sinogram, double ratio, int window);
+/// Columns that lie off those around them alike for a quarter of the scan or more, up to half of `window`
+/// wide: the difference is taken off them. Returns how many there were. Deviation: in place of the paper's
+/// algorithm 5, which compares ranks with those of 51 columns. On a detector of a few hundred columns it
+/// takes the limbs of an object, and what lies near the axis, for stripes; and of a stripe that fills half of
+/// the views sorting leaves nine tenths.
+std::int64_t remove_lasting_stripes(Sinogram& sinogram, double ratio, int window);
 /// All others (algorithm 3): columns sorted along the views, each rank the median of its neighbours', and
 /// back. Cost: views columns (log views + window).
 void remove_small_stripes(Sinogram& sinogram, int window);

@@ -418,8 +418,8 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
-  prepare_scan(scan, options.preparation, options.max_memory_bytes, progress);
-  scan.report.preparation = options.preparation;
+  scan.report.preparation = for_columns(options.preparation, raw.columns);
+  prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
   if (!raw.cone) choose_center(path, raw, options, scan);
   return scan;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -27,12 +28,13 @@ struct PhaseRetrieval {
   bool operator==(const PhaseRetrieval&) const = default;
 };
 
-/// Stripes of a sinogram, rings in a slice (Vo et al., Optics Express 26, 2018, 28396, algorithms 6, 5 and
-/// 3): dead and fluctuating columns, columns far off their neighbours, small differences of all others.
+/// Stripes of a sinogram, rings in a slice (after Vo et al., Optics Express 26, 2018, 28396): dead and
+/// fluctuating columns, columns off those around them for long, small differences of all others. A window of
+/// 0 is set when the scan is read: a sixth and a fifteenth of the columns, at most 51 and 21.
 struct Stripes {
-  double ratio = 3;  ///< of a stripe to noise, above which a column is dead, fluctuating or far off
-  int large = 51;    ///< columns of the median that finds such columns; odd
-  int small = 21;    ///< columns of the median of sorted columns; odd
+  double ratio = 3;  ///< of a stripe to noise, above which a column is dead, fluctuating or off
+  int large = 0;     ///< columns that a dead or fluctuating one is compared with; odd
+  int small = 0;     ///< columns of the median of sorted columns, twice the widest stripe; odd
   bool operator==(const Stripes&) const = default;
 };
 
@@ -51,6 +53,8 @@ struct Preparation {
 
 /// Throws InputError naming the member for a value out of its range.
 VDVR_API void check_preparation(const Preparation& preparation);
+/// With the windows of stripes set for a detector of so many columns.
+VDVR_API Preparation for_columns(Preparation preparation, std::int64_t columns);
 /// "stripes 3,51,21; binning 2": every step with its numbers; "none".
 VDVR_API std::string text_of(const Preparation& preparation);
 /// The column of a detector whose pixels are binned that shows what column `center` showed before.

@@ -181,6 +181,16 @@ BOOST_AUTO_TEST_CASE(json_of_a_preparation_gives_it_back_and_strangers_are_refus
     BOOST_CHECK_THROW(static_cast<void>(preparation_of(nlohmann::json::parse(wrong))), InputError);
 }
 
+BOOST_AUTO_TEST_CASE(windows_of_stripes_follow_the_detector_and_are_recorded) {
+  const TemporaryFolder folder;
+  write_data_exchange(folder / "scan.h5", noise_scan(9, 2, 129));
+  Preparation p;
+  p.stripes.emplace();
+  BOOST_TEST(text_of(read(folder / "scan.h5", p).report.preparation) == "stripes 3,21,7");
+  BOOST_TEST(text_of(for_columns(p, 2560)) == "stripes 3,51,21");
+  BOOST_TEST(text_of(for_columns(p, 4)) == "stripes 3,5,5");
+}
+
 BOOST_AUTO_TEST_CASE(phase_retrieval_of_cone_beam_and_of_nameless_units_is_refused) {
   Preparation p;
   p.phase = PhaseRetrieval{12.5, 30, 250};

@@ -75,8 +75,7 @@ double spread(const Sinogram& s) {
 
 Sinogram without_stripes(Sinogram s) {
   remove_dead_stripes(s, 3, 51);
-  remove_lasting_stripes(s, 3);
-  remove_large_stripes(s, 3, 51);
+  remove_lasting_stripes(s, 3, 21);
   remove_small_stripes(s, 21);
   return s;
 }

@@ -55,6 +55,8 @@ BOOST_AUTO_TEST_CASE(a_certificate_names_the_preparation_and_verify_does_it_agai
   BOOST_TEST(verified.code == 0, verified.err);
   // The same words again say nothing new; others contradict the file.
   BOOST_TEST(run(with({"verify", file, "--projections", noisy_scan(), "--center", "23.3"}, steps)).code == 0);
+  check_refused({"verify", file, "--projections", noisy_scan(), "--stripes", "on"},
+                "verify takes them from it");
   check_refused({"verify", file, "--projections", noisy_scan(), "--binning", "3"},
                 "verify takes them from it");
 }

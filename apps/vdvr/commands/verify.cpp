@@ -14,15 +14,25 @@ namespace vdvr::cli {
 
 namespace {
 
+/// Windows that were left to the detector are those that the file names.
+bool same_preparation(Preparation given, const Preparation& stored) {
+  if (given.stripes && stored.stripes) {
+    if (given.stripes->large == 0) given.stripes->large = stored.stripes->large;
+    if (given.stripes->small == 0) given.stripes->small = stored.stripes->small;
+  }
+  return given == stored;
+}
+
 /// F is the file's; options given anyway must say the same.
 void check_field_options(const Arguments& args, const FieldOptions& stored) {
   if (!has_field_options(args)) return;
   const FieldOptions given = field_options(args);
-  const bool same = (!args.has("filter") || given.filter == stored.filter) &&
-                    (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
-                    (!args.has("center") || binned_center(args.number("center").value(),
-                                                          stored.preparation.binning) == stored.center) &&
-                    (!has_preparation_options(args) || given.preparation == stored.preparation);
+  const bool same =
+      (!args.has("filter") || given.filter == stored.filter) &&
+      (!args.has("filter-cutoff") || given.cutoff == stored.cutoff) &&
+      (!args.has("center") ||
+       binned_center(args.number("center").value(), stored.preparation.binning) == stored.center) &&
+      (!has_preparation_options(args) || same_preparation(given.preparation, stored.preparation));
   if (!same)
     throw InputError(fmt::format(
         "the file was certified for filter {}, cutoff {}, centre {}, preparation {}; verify takes "
