@@ -37,6 +37,8 @@ nlohmann::ordered_json certificate_note(const ExportNote& n) {
     j["epsilon_abs"] = n.epsilon_abs;
   }
   j["exact_between_samples"] = n.exact_between_samples;
+  if (n.certified && n.exact_between_samples && n.samples == SampleType::f32)
+    j["between_samples_abs"] = n.epsilon_abs + n.jump;
   j["content_sha256"] = n.content_sha256;
   j["generator"] = "vdvr " VDVR_VERSION;
   return j;

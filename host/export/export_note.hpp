@@ -16,6 +16,7 @@ struct ExportNote {
   double scale = 1, offset = 0;
   double lowest = 0, highest = 0;  ///< of V; found where a format shows it
   bool exact_between_samples = false;
+  double jump = 0;         ///< as in ExportResult; found where the samples hold all of V
   bool certified = false;  ///< false for the record of a comparison, which promises nothing
   double epsilon = 0, epsilon_abs = 0;
   std::string content_sha256;

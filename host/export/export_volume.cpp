@@ -264,7 +264,7 @@ ExportResult export_volume(const VdvrFile& file, const fs::path& path, const Exp
   if (options.format == ExportFormat::vtm) {
     require_replaceable(export_outputs(path, options.format).front(), options.format);
     const VtkResult vtk = write_vtk(file, path, {options.most_blocks, options.compression}, progress);
-    return {v.grid, vtk.points, vtk.bytes, vtk.blocks, 1, 0, 0, true};
+    return {v.grid, vtk.points, vtk.bytes, vtk.blocks, 1, 0, 0, true, vtk.jump};
   }
   const int finest = std::countr_zero(static_cast<unsigned>(options.oversampling));
   // Sizes are checked before any is multiplied: a hostile file has up to 2^24 cells along each axis.
@@ -275,6 +275,7 @@ ExportResult export_volume(const VdvrFile& file, const fs::path& path, const Exp
   note.exact_between_samples = std::all_of(needed.begin(), needed.end(), [&](int k) { return k <= finest; });
   result.grid = grid;
   result.exact_between_samples = note.exact_between_samples;
+  if (note.exact_between_samples) note.jump = result.jump = largest_jump(v, progress);
   if (options.format == ExportFormat::ome_zarr) {
     require_replaceable(without_slash(path), options.format);
     const ZarrTotals totals = write_ome_zarr(file, path, note, finest, options.compression, progress);

@@ -53,7 +53,10 @@ std::string vti_head(const VtkBlock& b, const ExportNote& note, bool is_packed) 
         "format=\"ascii\">{}</DataArray>\n",
         name, value);
   };
-  if (note.certified) field("epsilon_abs", note.epsilon_abs);
+  if (note.certified) {
+    field("epsilon_abs", note.epsilon_abs);
+    field("between_samples_abs", note.epsilon_abs + note.jump);
+  }
   for (const auto& [name, text] :
        {std::pair{"unit", note.grid.unit}, {"content_sha256", note.content_sha256}})
     fields += fmt::format(
@@ -198,11 +201,12 @@ void vtk_block_samples(const MixedVolume& v, const VtkBlock& block, std::int64_t
   const Index3 n = block.points();
   SampleBox box;
   box.per_cell = block.per_cell;
+  box.end_brick =
+      v.bricks();  // a point on a far face belongs to the brick beyond it, in whatever block that lies
   for (std::size_t a = 0; a < 3; ++a) {
     box.first[a] = block.extent[2 * a];
     box.count[a] = n[a];
     box.first_brick[a] = block.first_brick[a];
-    box.end_brick[a] = block.first_brick[a] + block.bricks[a];
   }
   box.first[2] += first_plane;
   box.count[2] = static_cast<std::int64_t>(out.size()) / (n[0] * n[1]);
@@ -215,12 +219,13 @@ void vtk_block_samples(const MixedVolume& v, const VtkBlock& block, std::int64_t
 VtkResult write_vtk(const VdvrFile& file, const fs::path& path, const VtkOptions& options,
                     const Progress& progress) {
   const MixedVolume& v = file.volume;
-  const ExportNote note = note_of(file, v.grid);
+  ExportNote note = note_of(file, v.grid);
+  note.jump = largest_jump(v, progress);
   report(progress, "blocks", 0);
   const std::vector<VtkBlock> blocks = vtk_blocks(v, options.most_blocks);
   const fs::path folder = fs::path(path).replace_extension();
   io::AtomicFolder files(folder);
-  VtkResult result{blocks.size(), 0, 0};
+  VtkResult result{blocks.size(), 0, 0, note.jump};
   for (const VtkBlock& b : blocks) result.points += static_cast<std::uint64_t>(b.point_count());
   // Large ones first, so that the cores end together.
   std::vector<std::size_t> order(blocks.size());

@@ -58,7 +58,56 @@ void places_along(const MixedVolume& v, const SampleBox& box, const Run& run, st
   }
 }
 
+/// The largest difference of brick p and its neighbour q = p + step (each 0 or 1) on what they share.
+float jump_between(const MixedVolume& v, const Index3& p, const Index3& step) {
+  const Index3 q{p[0] + step[0], p[1] + step[1], p[2] + step[2]};
+  const BrickSamples sp(v, p), sq(v, q);
+  // Both as a box of the samples of either: one plane where they touch.
+  SampleBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.per_cell[a] = std::max(sp.per_cell()[a], sq.per_cell()[a]);
+    const int k = box.per_cell[a];
+    const auto sample = [&](std::int64_t cell) { return k >= 0 ? cell << k : cell >> -k; };
+    box.first[a] = sample(q[a] * v.granularity);
+    box.count[a] =
+        step[a] == 1 ? 1 : sample(std::min(v.grid.cells[a], (q[a] + 1) * v.granularity)) - box.first[a] + 1;
+  }
+  std::array<std::array<std::vector<VdvrLocal>, 3>, 2> places;
+  for (std::size_t a = 0; a < 3; ++a) {
+    places_along(v, box, {p[a], 0, box.count[a]}, a, sp.level()[a], places[0][a]);
+    places_along(v, box, {q[a], 0, box.count[a]}, a, sq.level()[a], places[1][a]);
+  }
+  float jump = 0;
+  for (std::size_t z = 0; z < places[0][2].size(); ++z)
+    for (std::size_t y = 0; y < places[0][1].size(); ++y)
+      for (std::size_t x = 0; x < places[0][0].size(); ++x)
+        jump = std::max(jump, std::abs(sp.at(places[0][0][x], places[0][1][y], places[0][2][z]) -
+                                       sq.at(places[1][0][x], places[1][1][y], places[1][2][z])));
+  return jump;
+}
+
 }  // namespace
+
+double largest_jump(const MixedVolume& v, const Progress& progress) {
+  const Index3 n = v.bricks();
+  float largest = 0;
+  std::mutex lock;
+  parallel_for(n[2] * n[1], progress, "faces", [&](std::int64_t row) {
+    float jump = 0;
+    for (std::int64_t x = 0; x < n[0]; ++x)
+      for (std::int64_t code = 1; code < 8; ++code) {
+        const Index3 p{x, row % n[1], row / n[1]}, step{code & 1, code >> 1 & 1, code >> 2};
+        if (p[0] + step[0] == n[0] || p[1] + step[1] == n[1] || p[2] + step[2] == n[2]) continue;
+        // Bricks of one triple share all samples of their faces, and store the same.
+        const Index3 q{p[0] + step[0], p[1] + step[1], p[2] + step[2]};
+        const auto level = [&](const Index3& b) { return v.level[at((b[2] * n[1] + b[1]) * n[0] + b[0])]; };
+        if (level(p) != level(q)) jump = std::max(jump, jump_between(v, p, step));
+      }
+    const std::lock_guard guard(lock);
+    largest = std::max(largest, jump);
+  });
+  return static_cast<double>(largest);
+}
 
 Index3 fine_samples(const Grid& grid, int log2_per_cell) {
   Index3 n{};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
@@ -32,5 +33,10 @@ void sample_box_parallel(const MixedVolume& volume, const SampleBox& box, float*
 
 /// Least and largest value of V: of the samples that its bricks store.
 std::pair<double, double> range_of_samples(const MixedVolume& volume, const Progress& progress);
+
+/// How far two bricks disagree on what they share: the largest |own value - that of the brick which the point
+/// belongs to| over the points of a brick's far faces where either stores a sample. What interpolation of V
+/// at such points adds to V between them.
+double largest_jump(const MixedVolume& volume, const Progress& progress);
 
 }  // namespace vdvr

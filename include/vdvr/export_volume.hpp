@@ -34,7 +34,7 @@ struct ExportOptions {
   /// the first or last integer.
   std::optional<std::pair<double, double>> range;
   Compression compression = Compression::deflate;  ///< hdf5, ome_zarr and vtm; the others have none
-  std::size_t most_blocks = 1000;                  ///< vtm: as in VtkOptions
+  std::size_t most_blocks = 2000;                  ///< vtm: as in VtkOptions
   std::uint64_t max_memory_bytes = 0;              ///< of the volume and this work together; 0: no limit
 };
 
@@ -45,9 +45,12 @@ struct ExportResult {
   std::size_t blocks = 0;        ///< vtm
   double scale = 1, offset = 0;  ///< value = offset + scale * stored
   std::uint64_t clipped = 0;     ///< values outside of `range`
-  /// Trilinear interpolation of the exported samples is V itself, up to rounding: no brick is finer than
-  /// them. Else |exported - F| <= epsilon at the samples only.
+  /// No brick is finer than the exported samples: at covered points between them trilinear interpolation of
+  /// float32 samples is within epsilon + `jump` of F. Else |exported - F| <= epsilon at the samples only.
   bool exact_between_samples = false;
+  /// How far bricks of different triples disagree on their common faces, where integers were rounded:
+  /// measured, 0 but for rounding in volumes of float32.
+  double jump = 0;
 };
 
 /// Files and folders that an export to `path` puts in place, the one that tells of completeness last.

@@ -36,22 +36,24 @@ struct VtkBlock {
 /// Boxes that fill the grid. Bricks of one level triple become one box; others join where that adds fewer
 /// points than a block is worth, and the worth is raised until there are at most `most_blocks` (as near as
 /// the limit of 2^24 points a block allows). In a box of several triples the coarser bricks are interpolated,
-/// which changes nothing between their samples. Throws InputError where a VTK extent would not fit its 32
-/// bits. Cost: a few passes over the bricks; memory: 6 bytes a brick.
-VDVR_API std::vector<VtkBlock> vtk_blocks(const MixedVolume& volume, std::size_t most_blocks = 1000);
+/// which changes V between their samples by at most ExportResult::jump. Throws InputError where a VTK extent
+/// would not fit its 32 bits. Cost: a few passes over the bricks; memory: 8 bytes a brick.
+VDVR_API std::vector<VtkBlock> vtk_blocks(const MixedVolume& volume, std::size_t most_blocks = 2000);
 
-/// V at the points of planes first_plane ... (counted within the block) of a block, x fastest; on its faces
-/// as its own bricks have it. `out` has a whole number of planes. Runs on the calling thread.
+/// V, as sample_at gives it, at the points of planes first_plane ... (counted within the block) of a block, x
+/// fastest: two blocks that share a point have the same value there, to the bit. `out` has a whole number of
+/// planes. Runs on the calling thread.
 VDVR_API void vtk_block_samples(const MixedVolume& volume, const VtkBlock& block, std::int64_t first_plane,
                                 std::span<float> out);
 
 struct VtkOptions {
-  std::size_t most_blocks = 1000;
+  std::size_t most_blocks = 2000;
   Compression compression = Compression::deflate;  ///< zlib, as vtkZLibDataCompressor; or raw
 };
 struct VtkResult {
   std::size_t blocks = 0;
   std::uint64_t points = 0, bytes = 0;
+  double jump = 0;  ///< as in ExportResult
 };
 
 /// PATH.vtm, a vtkMultiBlockDataSet with one block per level triple, and a folder PATH with its .vti files

@@ -12,18 +12,19 @@ namespace fs = std::filesystem;
 namespace vdvr::cli {
 namespace {
 
-constexpr const char* default_blocks = "1000";
+constexpr const char* default_blocks = "2000";
 
 ExportFormat format_of(const Arguments& args, const fs::path& output) {
   const auto by_name = export_format_of(output);
-  const std::string text =
-      args.choice("format", {"mha", "nrrd", "tiff", "hdf5", "npy", "raw", "ome-zarr", "vtm"}, "");
-  if (text.empty() && !by_name)
+  if (!args.has("format")) {
+    if (by_name) return *by_name;
     throw InputError(
         fmt::format("{}: end the name in .mha, .nrrd, .tif, .h5, .npy, .raw, .zarr or .vtm, or say "
                     "--format (tiff for a folder of slices)",
                     output.string()));
-  if (text.empty()) return *by_name;
+  }
+  const std::string text =
+      args.choice("format", {"mha", "nrrd", "tiff", "hdf5", "npy", "raw", "ome-zarr", "vtm"}, "mha");
   for (const ExportFormat f :
        {ExportFormat::mha, ExportFormat::nrrd, ExportFormat::tiff, ExportFormat::hdf5, ExportFormat::npy,
         ExportFormat::raw, ExportFormat::ome_zarr, ExportFormat::vtm})
@@ -89,6 +90,7 @@ Json result_json(const fs::path& output, const ExportOptions& o, const ExportRes
   j["samples"] = r.samples;
   j["bytes"] = r.bytes;
   j["exact_between_samples"] = r.exact_between_samples;
+  if (r.exact_between_samples) j["jump"] = r.jump;
   if (o.samples != SampleType::f32) {
     j["scale"] = r.scale;
     j["offset"] = r.offset;
@@ -105,15 +107,18 @@ void print_export(const fs::path& output, const ExportOptions& o, const ExportRe
   if (o.samples != SampleType::f32)
     fmt::print("integers       value = {} + {} * integer; {} samples lay outside\n", r.offset, r.scale,
                r.clipped);
+  const double epsilon = file.certificate.epsilon_abs;
   if (file.certificate.comparison) fmt::print("certified      no: the volume is a comparison\n");
   else if (o.samples != SampleType::f32)
     fmt::print(
         "certified      |value - F| <= {:.4g} at covered samples{}: epsilon and half an integer's step\n",
-        file.certificate.epsilon_abs + r.scale / 2, r.clipped > 0 ? " that did not lie outside" : "");
+        epsilon + r.scale / 2, r.clipped > 0 ? " that did not lie outside" : "");
+  else if (r.exact_between_samples)
+    fmt::print("certified      |value - F| <= {:.4g} at covered samples, {:.4g} between them (trilinear)\n",
+               epsilon, epsilon + r.jump);
   else
-    fmt::print("certified      |value - F| <= {:.4g} at covered {}\n", file.certificate.epsilon_abs,
-               r.exact_between_samples ? "points, samples and between them by trilinear interpolation"
-                                       : "samples; between them it is coarser than the volume");
+    fmt::print("certified      |value - F| <= {:.4g} at covered samples; between them they are too coarse\n",
+               epsilon);
   fmt::print("written        {} ({})\n", output.string(), bytes_text(r.bytes));
 }
 
