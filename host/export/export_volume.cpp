@@ -124,13 +124,6 @@ void set_scale(ExportNote& note, const ExportOptions& options) {
   note.scale = hi > lo ? (hi - lo) / top : 1;
 }
 
-/// What the volume holds in memory.
-std::uint64_t resident_bytes(const MixedVolume& v) {
-  std::uint64_t bytes = v.level.size() * (sizeof(LevelTriple) + sizeof(std::uint32_t)) + v.base.bytes();
-  for (const auto& [kind, block] : v.tiles) bytes += block.bytes();
-  return bytes;
-}
-
 /// Planes that a slab has: as many as 64 MiB hold, or as memory leaves.
 std::int64_t slab_planes(const MixedVolume& v, const Grid& grid, const ExportOptions& options,
                          std::int64_t together, const std::string& name) {
@@ -263,7 +256,8 @@ ExportResult export_volume(const VdvrFile& file, const fs::path& path, const Exp
   ExportResult result;
   if (options.format == ExportFormat::vtm) {
     require_replaceable(export_outputs(path, options.format).front(), options.format);
-    const VtkResult vtk = write_vtk(file, path, {options.most_blocks, options.compression}, progress);
+    const VtkResult vtk =
+        write_vtk(file, path, {options.most_blocks, options.compression, options.max_memory_bytes}, progress);
     return {v.grid, vtk.points, vtk.bytes, vtk.blocks, 1, 0, 0, true, vtk.jump};
   }
   const int finest = std::countr_zero(static_cast<unsigned>(options.oversampling));
@@ -278,7 +272,7 @@ ExportResult export_volume(const VdvrFile& file, const fs::path& path, const Exp
   if (note.exact_between_samples) note.jump = result.jump = largest_jump(v, progress);
   if (options.format == ExportFormat::ome_zarr) {
     require_replaceable(without_slash(path), options.format);
-    const ZarrTotals totals = write_ome_zarr(file, path, note, finest, options.compression, progress);
+    const ZarrTotals totals = write_ome_zarr(file, path, note, finest, options, progress);
     result.samples = totals.samples;
     result.bytes = totals.bytes;
     return result;

@@ -30,6 +30,8 @@ namespace fs = std::filesystem;
 // VTK's own writers take blocks of 32 KiB; larger ones have fewer sizes to write and pack as well.
 constexpr std::uint64_t packed_block_bytes = std::uint64_t{1} << 20;
 constexpr int zlib_level = 4;
+// Points that are sampled at once, or a plane, if that is more.
+constexpr std::int64_t points_together = std::int64_t{1} << 20;
 
 /// Bytes as the character codes by which VTK writes strings in ASCII.
 std::string codes_of(const std::string& text) {
@@ -130,8 +132,7 @@ std::uint64_t write_block(const MixedVolume& v, const VtkBlock& block, const Exp
                           const fs::path& path, const fs::path& shown) {
   const Index3 n = block.points();
   const std::int64_t plane = n[0] * n[1];
-  constexpr std::int64_t together = std::int64_t{1} << 20;
-  const std::int64_t planes = std::clamp<std::int64_t>(together / plane, 1, n[2]);
+  const std::int64_t planes = std::clamp<std::int64_t>(points_together / plane, 1, n[2]);
   std::vector<float> samples(at(plane * planes));
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << vti_head(block, note, is_packed);
@@ -223,6 +224,13 @@ VtkResult write_vtk(const VdvrFile& file, const fs::path& path, const VtkOptions
   note.jump = largest_jump(v, progress);
   report(progress, "blocks", 0);
   const std::vector<VtkBlock> blocks = vtk_blocks(v, options.most_blocks);
+  constexpr std::uint64_t bytes_of_brick = 16;  // of the partition
+  std::int64_t most = 0;
+  for (const VtkBlock& b : blocks)
+    most =
+        std::max(most, std::min(b.point_count(), std::max(points_together, b.points()[0] * b.points()[1])));
+  require_memory_of_cores(v, static_cast<std::uint64_t>(most) * sizeof(float) + 2 * packed_block_bytes,
+                          bytes_of_brick * v.level.size(), options.max_memory_bytes, path.string());
   const fs::path folder = fs::path(path).replace_extension();
   io::AtomicFolder files(folder);
   VtkResult result{blocks.size(), 0, 0, note.jump};

@@ -157,8 +157,9 @@ void make_folders(const Level& level, const fs::path& shown) {
 }  // namespace
 
 ZarrTotals write_ome_zarr(const VdvrFile& file, const fs::path& path, const ExportNote& note, int finest,
-                          Compression compression, const Progress& progress) {
+                          const ExportOptions& options, const Progress& progress) {
   const MixedVolume& v = file.volume;
+  const Compression compression = options.compression;
   io::AtomicFolder folder(path);
   std::vector<Level> levels;
   ZarrTotals totals;
@@ -168,6 +169,10 @@ ZarrTotals write_ome_zarr(const VdvrFile& file, const fs::path& path, const Expo
   }
   if (compression == Compression::none)
     require_disk(path, folder.temporary(), totals.samples * sizeof(float));
+  // Samples of a chunk, and what they pack to, which may be a little more.
+  const Index3 largest = levels.front().chunk;
+  const auto chunk_bytes = static_cast<std::uint64_t>(largest[0] * largest[1] * largest[2]) * sizeof(float);
+  require_memory_of_cores(v, 2 * chunk_bytes + chunk_bytes / 8, 0, options.max_memory_bytes, path.string());
   std::atomic<std::uint64_t> bytes{0};
   double done = 0;
   for (const Level& level : levels) {

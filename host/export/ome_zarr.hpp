@@ -16,9 +16,6 @@ struct ZarrTotals {
 /// its own samples, no average. `note` is of the finest. Chunks are made on all cores, each from V itself:
 /// memory is a few MiB a core.
 ZarrTotals write_ome_zarr(const VdvrFile& file, const std::filesystem::path& path, const ExportNote& note,
-                          int finest, Compression compression, const Progress& progress);
-
-/// How many arrays that makes.
-constexpr int zarr_levels(int finest) { return finest + 1; }
+                          int finest, const ExportOptions& options, const Progress& progress);
 
 }  // namespace vdvr

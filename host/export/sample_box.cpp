@@ -5,9 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "host/system/casts.hpp"
+#include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
 
@@ -98,10 +101,12 @@ double largest_jump(const MixedVolume& v, const Progress& progress) {
       for (std::int64_t code = 1; code < 8; ++code) {
         const Index3 p{x, row % n[1], row / n[1]}, step{code & 1, code >> 1 & 1, code >> 2};
         if (p[0] + step[0] == n[0] || p[1] + step[1] == n[1] || p[2] + step[2] == n[2]) continue;
-        // Bricks of one triple share all samples of their faces, and store the same.
+        // Two of level 0 read the same samples.
         const Index3 q{p[0] + step[0], p[1] + step[1], p[2] + step[2]};
-        const auto level = [&](const Index3& b) { return v.level[at((b[2] * n[1] + b[1]) * n[0] + b[0])]; };
-        if (level(p) != level(q)) jump = std::max(jump, jump_between(v, p, step));
+        const auto in_base = [&](const Index3& b) {
+          return v.level[at((b[2] * n[1] + b[1]) * n[0] + b[0])] == LevelTriple{};
+        };
+        if (!in_base(p) || !in_base(q)) jump = std::max(jump, jump_between(v, p, step));
       }
     const std::lock_guard guard(lock);
     largest = std::max(largest, jump);
@@ -181,6 +186,20 @@ std::pair<double, double> range_of_samples(const MixedVolume& v, const Progress&
     highest = std::max(highest, hi);
   });
   return {static_cast<double>(lowest), static_cast<double>(highest)};
+}
+
+std::uint64_t resident_bytes(const MixedVolume& v) {
+  std::uint64_t bytes = v.level.size() * (sizeof(LevelTriple) + sizeof(std::uint32_t)) + v.base.bytes();
+  for (const auto& [kind, block] : v.tiles) bytes += block.bytes();
+  return bytes;
+}
+
+void require_memory_of_cores(const MixedVolume& v, std::uint64_t per_core, std::uint64_t shared,
+                             std::uint64_t limit, const std::string& what) {
+  if (limit == 0) return;
+  const std::uint64_t cores = std::max(1u, std::thread::hardware_concurrency());
+  io::require_memory(resident_bytes(v) + shared + cores * per_core, limit,
+                     what + ": the volume and what each core works on");
 }
 
 }  // namespace vdvr

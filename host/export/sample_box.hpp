@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <utility>
 
 #include "vdvr/mixed_volume.hpp"
@@ -38,5 +39,11 @@ std::pair<double, double> range_of_samples(const MixedVolume& volume, const Prog
 /// belongs to| over the points of a brick's far faces where either stores a sample. What interpolation of V
 /// at such points adds to V between them.
 double largest_jump(const MixedVolume& volume, const Progress& progress);
+
+/// What the volume holds in memory.
+std::uint64_t resident_bytes(const MixedVolume& volume);
+/// ResourceError where it, `shared` and `per_core` on every core exceed `limit` (0: none).
+void require_memory_of_cores(const MixedVolume& volume, std::uint64_t per_core, std::uint64_t shared,
+                             std::uint64_t limit, const std::string& what);
 
 }  // namespace vdvr

@@ -49,6 +49,7 @@ VDVR_API void vtk_block_samples(const MixedVolume& volume, const VtkBlock& block
 struct VtkOptions {
   std::size_t most_blocks = 2000;
   Compression compression = Compression::deflate;  ///< zlib, as vtkZLibDataCompressor; or raw
+  std::uint64_t max_memory_bytes = 0;              ///< of the volume and this work together; 0: no limit
 };
 struct VtkResult {
   std::size_t blocks = 0;

@@ -136,6 +136,13 @@ BOOST_AUTO_TEST_CASE(a_slab_of_any_depth_makes_the_same_file) {
   tight.max_memory_bytes = held + plane - 1;
   BOOST_CHECK_THROW(export_volume(file, folder / "none.raw", tight), ResourceError);
   BOOST_TEST(!fs::exists(folder / "none.raw"));
+  for (const auto& [name, format] :
+       {std::pair{"v.zarr", ExportFormat::ome_zarr}, {"v.vtm", ExportFormat::vtm}}) {
+    ExportOptions least = options(format, 2);
+    least.max_memory_bytes = held + 100;
+    BOOST_CHECK_THROW(export_volume(file, folder / name, least), ResourceError);
+    BOOST_TEST(!fs::exists(folder / name));
+  }
 }
 
 BOOST_AUTO_TEST_CASE(blocks_fill_the_grid_once_and_agree_wherever_they_meet) {
