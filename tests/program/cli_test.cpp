@@ -232,7 +232,7 @@ BOOST_AUTO_TEST_CASE(exports_say_what_they_wrote_and_refuse_what_does_not_fit) {
   check_refused({"export", volume, "-o", at("x.npy"), "--range", "0,1"}, "--range");
   check_refused({"export", volume, "-o", at("x.tif"), "--samples", "u8", "--range", "1,0"}, "--range");
   check_refused({"export", small_scan(), "-o", at("x.tif")}, "not a certified volume");
-  for (const std::string& name : {"e.vtm", "e.zarr", "e.tif", "slices"}) {
+  for (const std::string name : {"e.vtm", "e.zarr", "e.tif", "slices"}) {
     std::vector<std::string> words{"export", volume, "-o", at(name), "--json"};
     if (name == "slices") words.insert(words.end(), {"--format", "tiff"});
     const Ended first = run(words);
