@@ -22,7 +22,7 @@ const std::vector<Command>& commands() {
       {"probe", "FILE --points P.csv -o V.csv", "values at points of a volume or of the exact field",
        probe_command},
       {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
-      {"export", "OUT.vdvr -o VOL.mha", "a uniform volume from a certified one", export_command},
+      {"export", "OUT.vdvr -o VOL", "a certified volume in the format of other programs", export_command},
       {"convert-geometry", "IN -o geometry.xml", "RTK's geometry file of a cone-beam scan",
        convert_geometry_command},
       {"run", "IN --epsilon E -o DIR", "plan, build, verify, render: everything from one scan", run_command},

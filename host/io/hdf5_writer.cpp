@@ -128,6 +128,28 @@ void Writer::create_dataset(const std::string& path, const Shape& shape, const S
   write_dataset(path, type, simple_space(shape), creation, values);
 }
 
+Handle Writer::chunked_dataset(const std::string& path, const Shape& shape, const Shape& chunk, hid_t type,
+                               unsigned deflate_level) {
+  const Handle creation = properties(H5P_DATASET_CREATE);
+  const std::vector<hsize_t> extent(chunk.begin(), chunk.end());
+  const bool is_shuffled = deflate_level > 0 && H5Tget_size(type) > 1;
+  if (H5Pset_chunk(creation.id(), static_cast<int>(extent.size()), extent.data()) < 0 ||
+      (is_shuffled && H5Pset_shuffle(creation.id()) < 0) ||
+      (deflate_level > 0 && H5Pset_deflate(creation.id(), deflate_level) < 0))
+    fail(fmt::format("{} cannot be chunked", path));
+  Handle dataset(H5Dcreate2(file_.id(), path.c_str(), type, simple_space(shape).id(), H5P_DEFAULT,
+                            creation.id(), H5P_DEFAULT),
+                 H5Dclose);
+  if (!dataset) fail(fmt::format("{} cannot be written", path));
+  return dataset;
+}
+
+void Writer::chunk(const Handle& dataset, const Shape& place, std::span<const std::byte> bytes) {
+  const std::vector<hsize_t> offset(place.begin(), place.end());
+  if (H5Dwrite_chunk(dataset.id(), H5P_DEFAULT, 0, offset.data(), bytes.size(), bytes.data()) < 0)
+    fail("a chunk cannot be written");
+}
+
 void Writer::text(const std::string& path, const std::string& text) {
   const Handle type = text_type(std::max<std::size_t>(1, text.size()));
   if (text.size() > header_text_bytes) return create_dataset(path, {1}, {1}, type.id(), 0, text.data());

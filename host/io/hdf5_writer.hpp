@@ -1,8 +1,9 @@
 // Writes HDF5 files in which every stored number is under a checksum: datasets are chunked, deflated if asked
 // for, with the Fletcher32 filter last; object headers, chunk indexes and superblock carry HDF5's own
-// checksums (format of HDF5 1.10). Called by vdvr_file.cpp and read_scan.cpp.
+// checksums (format of HDF5 1.10). Called by vdvr_file.cpp, read_scan.cpp, hdf5_sink.cpp.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -45,6 +46,13 @@ class Writer {
     create_dataset(path, shape, chunk.empty() ? chunk_shape(shape, sizeof(T)) : chunk, element_type<T>(),
                    form_.deflate_level, values.data());
   }
+  /// A dataset whose chunks come one by one, through the filters shuffle (elements of more than one byte) and
+  /// deflate already where `deflate_level` is above 0. Under no Fletcher32: deflate has a checksum of its
+  /// own.
+  Handle chunked_dataset(const std::string& path, const Shape& shape, const Shape& chunk, hid_t type,
+                         unsigned deflate_level);
+  /// One of its chunks, whole, with its first element at `place`.
+  void chunk(const Handle& dataset, const Shape& place, std::span<const std::byte> bytes);
   /// A scalar string kept in its object header, where HDF5's checksum covers it; longer than 60,000 bytes,
   /// where a header cannot hold it, a string dataset of one element under Fletcher32.
   void text(const std::string& path, const std::string& text);

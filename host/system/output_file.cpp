@@ -33,7 +33,7 @@ void sync_path(const std::filesystem::path& path, int flags) {
 
 struct Temporaries {
   std::mutex lock;
-  std::set<std::filesystem::path> paths;
+  std::set<std::filesystem::path> paths, trees;
 };
 Temporaries& temporaries() {
   static Temporaries all;
@@ -78,6 +78,88 @@ void AtomicFile::commit() {
   sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
 }
 
+namespace {
+
+/// A new folder beside `target`, noted as temporary.
+std::filesystem::path folder_beside(const std::filesystem::path& target) {
+  const auto folder = folder_of(target);
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw FileError(fmt::format("{}: folder '{}' does not exist", target.string(), folder.string()));
+  std::string name = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
+  if (::mkdtemp(name.data()) == nullptr) {
+    const int why = errno;
+    if (why == ENOSPC) throw ResourceError(fmt::format("{}: disk full", target.string()));
+    throw FileError(
+        fmt::format("{}: cannot write into '{}': {}", target.string(), folder.string(), std::strerror(why)));
+  }
+  ::chmod(name.c_str(), 0755);
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.trees.insert(name);
+  return name;
+}
+
+void remove_tree(const std::filesystem::path& path) {
+  std::error_code ignored;
+  std::filesystem::remove_all(path, ignored);
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.trees.erase(path);
+}
+
+void forget_tree(const std::filesystem::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.trees.erase(path);
+}
+
+/// All that was written to the disk of `path`: one call for thousands of small files.
+void sync_disk_of(const std::filesystem::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY);
+  if (fd < 0) return;
+  const int failed = ::syncfs(fd);
+  const int why = errno;
+  ::close(fd);
+  if (failed != 0 && (why == ENOSPC || why == EDQUOT || why == EIO))
+    throw ResourceError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(why)));
+}
+
+}  // namespace
+
+AtomicFolder::AtomicFolder(std::filesystem::path target) : target_(std::move(target)) {
+  if (!target_.has_filename()) target_ = target_.parent_path();  // "slices/"
+  temporary_ = folder_beside(target_);
+}
+
+AtomicFolder::~AtomicFolder() {
+  if (!committed_) remove_tree(temporary_);
+}
+
+void AtomicFolder::commit() {
+  sync_disk_of(temporary_);
+  // A folder is renamed over an empty one only: what was there steps aside first, and goes last.
+  std::error_code error;
+  std::filesystem::path old;
+  if (std::filesystem::exists(target_, error)) {
+    old = folder_beside(target_);
+    forget_tree(old);  // what will lie there is the user's until the new one is in place
+    std::filesystem::rename(target_, old, error);
+  }
+  if (!error) std::filesystem::rename(temporary_, target_, error);
+  if (error) {
+    std::error_code ignored;
+    if (!old.empty() && !std::filesystem::exists(target_, ignored))
+      std::filesystem::rename(old, target_, ignored);
+    else if (!old.empty()) std::filesystem::remove(old, ignored);  // still empty
+    throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
+  }
+  committed_ = true;
+  forget_tree(temporary_);
+  if (!old.empty()) remove_tree(old);
+  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
 void note_temporary(const std::filesystem::path& path) {
   Temporaries& all = temporaries();
   const std::lock_guard guard(all.lock);
@@ -94,7 +176,9 @@ void remove_temporaries() {
   Temporaries& all = temporaries();
   const std::lock_guard guard(all.lock);
   std::error_code ignored;
+  for (const auto& path : all.trees) std::filesystem::remove_all(path, ignored);
   for (const auto& path : all.paths) std::filesystem::remove(path, ignored);
+  all.trees.clear();
   all.paths.clear();
 }
 

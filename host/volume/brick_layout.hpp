@@ -82,6 +82,10 @@ class BrickSamples {
   }
   /// The field at a cell coordinate of this brick, by the shared sampler; c may lie on its far faces.
   [[nodiscard]] float at(float cx, float cy, float cz) const;
+  /// The same where the places along x, y, z are known already.
+  [[nodiscard]] float at(const VdvrLocal& x, const VdvrLocal& y, const VdvrLocal& z) const {
+    return vdvr_sample_in_brick(data_, record_, x, y, z);
+  }
   /// Levels along x, y, z.
   [[nodiscard]] std::array<int, 3> level() const {
     return {static_cast<int>(record_.level_x), static_cast<int>(record_.level_y),

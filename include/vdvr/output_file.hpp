@@ -1,5 +1,5 @@
-// An output file that appears only whole: written under a temporary name in the same folder, flushed,
-// renamed.
+// An output file or folder that appears only whole: written under a temporary name in the same folder,
+// flushed, renamed.
 #pragma once
 
 #include <filesystem>
@@ -28,12 +28,34 @@ class VDVR_API AtomicFile {
   bool committed_ = false;
 };
 
+/// The same for a folder, with all that is put into it.
+class VDVR_API AtomicFolder {
+ public:
+  /// Throws FileError when the folder around it does not exist or cannot be written.
+  explicit AtomicFolder(std::filesystem::path target);
+  /// Removes the temporary folder and what is in it unless commit() was called.
+  ~AtomicFolder();
+  AtomicFolder(const AtomicFolder&) = delete;
+  AtomicFolder& operator=(const AtomicFolder&) = delete;
+
+  /// Where to put files; close them before commit().
+  [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
+  /// Flushes, and puts it in the place of the target, which is removed with all that is in it: whoever calls
+  /// this has looked whether it may be. Throws ResourceError (disk).
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+  bool committed_ = false;
+};
+
 /// Removes temporary files that killed writers of `target` left in its folder. Only for whoever knows that no
 /// other process writes it now.
 VDVR_API void remove_leftovers(const std::filesystem::path& target);
 
 /// For a program that ends without unwinding: what remove_temporaries removes, files, and folders if they are
-/// empty. Every AtomicFile notes its temporary file.
+/// empty. Every AtomicFile notes its temporary file, and every AtomicFolder its temporary folder, which goes
+/// with all that is in it.
 VDVR_API void note_temporary(const std::filesystem::path& path);
 VDVR_API void forget_temporary(const std::filesystem::path& path);
 VDVR_API void remove_temporaries();

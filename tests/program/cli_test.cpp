@@ -219,3 +219,37 @@ BOOST_AUTO_TEST_CASE(interruption_leaves_nothing_behind) {
   }
   check_no_temporary_file_is_left();
 }
+
+BOOST_AUTO_TEST_CASE(exports_say_what_they_wrote_and_refuse_what_does_not_fit) {
+  const std::string& volume = small_volume();
+  check_refused({"export", volume, "-o", at("x")}, "--format");
+  check_refused({"export", volume, "-o", at("x.txt")}, "--format");
+  check_refused({"export", volume, "-o", at("x.vtm"), "--oversampling", "2"}, "--oversampling");
+  check_refused({"export", volume, "-o", at("x.mha"), "--compression", "none"}, "--compression");
+  check_refused({"export", volume, "-o", at("x.mha"), "--blocks", "9"}, "--blocks");
+  check_refused({"export", volume, "-o", at("x.mha"), "--format", "npy"}, "--format");
+  check_refused({"export", volume, "-o", at("x.zarr"), "--samples", "u8"}, "x.zarr");
+  check_refused({"export", volume, "-o", at("x.npy"), "--range", "0,1"}, "--range");
+  check_refused({"export", volume, "-o", at("x.tif"), "--samples", "u8", "--range", "1,0"}, "--range");
+  check_refused({"export", small_scan(), "-o", at("x.tif")}, "not a certified volume");
+  for (const std::string name : {"e.vtm", "e.zarr", "e.tif", "slices"}) {
+    std::vector<std::string> words{"export", volume, "-o", at(name), "--json"};
+    if (name == "slices") words.insert(words.end(), {"--format", "tiff"});
+    const Ended first = run(words);
+    BOOST_TEST_CONTEXT(name << ": " << first.err) {
+      BOOST_REQUIRE(first.code == 0);
+      const auto json = nlohmann::json::parse(first.out);
+      BOOST_TEST(json.at("output") == at(name));
+      BOOST_TEST(json.at("samples") > 0);
+      BOOST_TEST(json.at("bytes") > 0);
+    }
+    check_refused(words, "--force");
+    words.push_back("--force");
+    BOOST_TEST(run(words).code == 0);
+  }
+  // What somebody else put into a folder stays there.
+  write(at("slices") + "/mine.txt", "mine");
+  check_refused({"export", volume, "-o", at("slices"), "--format", "tiff", "--force"}, "mine.txt");
+  BOOST_TEST(bytes_of(at("slices") + "/mine.txt") == "mine");
+  check_no_temporary_file_is_left();
+}

@@ -53,6 +53,22 @@ std::vector<Words> writers(const std::string& out) {
           {"run", in.scan, "--epsilon", "5%", "-o", out + ".dir"}};
 }
 
+/// Exports that are folders, or several files.
+std::vector<Words> exports(const std::string& out) {
+  const std::string& volume = inputs().volume;
+  return {
+      {"export", volume, "-o", out + ".npy"},  {"export", volume, "-o", out + ".tif"},
+      {"export", volume, "-o", out + ".nrrd"}, {"export", volume, "--format", "tiff", "-o", out + "-slices"},
+      {"export", volume, "-o", out + ".h5"},   {"export", volume, "-o", out + ".zarr"},
+      {"export", volume, "-o", out + ".vtm"}};
+}
+
+std::vector<Words> writers_and_exports(const std::string& out) {
+  std::vector<Words> all = writers(out), more = exports(out);
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
 /// A stream of a program in no file. Holds 64 KiB: more would stop the program.
 class Pipe {
  public:
@@ -110,7 +126,7 @@ void check_failed(const Ended& r, int code, const Words& words, std::initializer
 BOOST_AUTO_TEST_CASE(full_disk_ends_every_writer_with_code_3_and_no_file) {
   const TemporaryFolder folder, streams;
   Program program(streams.path());
-  for (const Words& words : writers((folder / "o").string())) {
+  for (const Words& words : writers_and_exports((folder / "o").string())) {
     if (words[0] == "probe") continue;  // one line of CSV fits
     // Files of streams would be limited as well, and a compiler that cannot write its words to one (Intel's)
     // ends the process with a code of its own.
@@ -162,6 +178,19 @@ BOOST_AUTO_TEST_CASE(file_system_of_any_small_size_holds_a_whole_file_or_none) {
       }
       for (const auto& entry : fs::directory_iterator(disk)) fs::remove_all(entry.path());
     }
+    for (const Words& words : exports((disk / "o").string())) {
+      const Ended r = program.run(words);
+      const auto left = files_below(disk);
+      BOOST_TEST_CONTEXT(size << ": vdvr " << joined(words) << "left " << joined(left) << "and said "
+                              << r.err) {
+        BOOST_TEST((r.code == 0) == fs::exists(words.back()));
+        if (r.code != 0) {
+          check_failed(r, 3, words, {"disk", "space", "written"});
+          BOOST_TEST(joined(left) == "");
+        }
+      }
+      for (const auto& entry : fs::directory_iterator(disk)) fs::remove_all(entry.path());
+    }
     ::umount(disk.c_str());
   }
   BOOST_TEST(failed >= 5);
@@ -174,7 +203,7 @@ BOOST_AUTO_TEST_CASE(folder_that_takes_no_file_is_named) {
   const std::string file = streams.file("file", "no folder").string();
   // Root may write anywhere but here, and a file is a folder to nobody.
   for (const std::string& where : {file + "/o", std::string("/proc/self/o")})
-    for (const Words& words : writers(where)) {
+    for (const Words& words : writers_and_exports(where)) {
       const Ended r = program.run(words);
       check_failed(r, 2, words, {where.c_str(), file.c_str(), "/proc/self"});
       BOOST_TEST(!fs::exists(words.back()));

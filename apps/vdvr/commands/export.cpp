@@ -1,77 +1,163 @@
-// vdvr export: a uniform volume from a certified one, for programs that know nothing of bricks.
+// vdvr export: a certified volume as files of other programs: uniform ones, and VTK's boxes of bricks.
 #include <fmt/format.h>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/export_volume.hpp"
+
+namespace fs = std::filesystem;
 
 namespace vdvr::cli {
 namespace {
 
-Grid finer(const Grid& grid, int oversampling) {
-  Grid result = grid;
-  for (std::size_t a = 0; a < 3; ++a) {
-    result.cells[a] *= oversampling;
-    result.spacing[a] /= oversampling;
+constexpr const char* default_blocks = "2000";
+
+ExportFormat format_of(const Arguments& args, const fs::path& output) {
+  const auto by_name = export_format_of(output);
+  if (!args.has("format")) {
+    if (by_name) return *by_name;
+    throw InputError(
+        fmt::format("{}: end the name in .mha, .nrrd, .tif, .h5, .npy, .raw, .zarr or .vtm, or say "
+                    "--format (tiff for a folder of slices)",
+                    output.string()));
   }
-  return result;
+  const std::string text =
+      args.choice("format", {"mha", "nrrd", "tiff", "hdf5", "npy", "raw", "ome-zarr", "vtm"}, "mha");
+  for (const ExportFormat f :
+       {ExportFormat::mha, ExportFormat::nrrd, ExportFormat::tiff, ExportFormat::hdf5, ExportFormat::npy,
+        ExportFormat::raw, ExportFormat::ome_zarr, ExportFormat::vtm})
+    if (text == text_of(f)) {
+      // Their readers, and VTK's, go by the name.
+      const bool by_its_name = f == ExportFormat::mha || f == ExportFormat::nrrd || f == ExportFormat::vtm;
+      if (by_name != f && (by_its_name || by_name))
+        throw InputError(
+            fmt::format("{}: --format {} needs another ending of the name", output.string(), text));
+      return f;
+    }
+  throw InputError("--format: unknown");
 }
 
-/// The field on every sample of `grid`. Cost: one host sample each.
-Volume sample_all(const MixedVolume& source, const Grid& grid, std::uint64_t max_memory,
-                  const Progress& progress) {
-  // In double: oversampling multiplies the count by up to 512, which may pass 2^63 for a hostile file.
-  double bytes = sizeof(float);
-  for (const auto cells : grid.cells) bytes *= static_cast<double>(cells) + 1;
-  const double limit = max_memory == 0 ? 0x1p40 : static_cast<double>(max_memory);
-  if (bytes > limit)
-    throw ResourceError(
-        fmt::format("the exported volume needs {:.1f} MiB; raise --max-memory or lower --oversampling",
-                    bytes / (1 << 20)));
-  Volume volume{grid, {}};
-  volume.samples.reserve(static_cast<std::size_t>(grid.sample_count()));
-  const Index3 n = grid.samples();
-  for (std::int64_t z = 0; z < n[2]; ++z) {
-    report(progress, "export", static_cast<double>(z) / static_cast<double>(n[2]));
-    for (std::int64_t y = 0; y < n[1]; ++y)
-      for (std::int64_t x = 0; x < n[0]; ++x)
-        volume.samples.push_back(sample_at(source, grid.position({x, y, z})));
+/// Options that mean nothing to the format are refused by name.
+void refuse_unused(const Arguments& args, ExportFormat format) {
+  const auto only = [&](const char* option, bool used, const char* of) {
+    if (args.has(option) && !used)
+      throw InputError(fmt::format("--{} is for {}, not for {}", option, of, text_of(format)));
+  };
+  const bool vtm = format == ExportFormat::vtm;
+  only("oversampling", !vtm, "uniform samples");
+  only("blocks", vtm, "vtm");
+  only("compression", vtm || format == ExportFormat::hdf5 || format == ExportFormat::ome_zarr,
+       "hdf5, ome-zarr and vtm");
+}
+
+ExportOptions options_of(const Arguments& args, const CommonOptions& common, ExportFormat format) {
+  ExportOptions o;
+  o.format = format;
+  const char* fallback = format == ExportFormat::ome_zarr ? "4" : "1";
+  o.oversampling = std::stoi(args.choice("oversampling", {"1", "2", "4", "8"}, fallback));
+  const std::string samples = args.choice("samples", {"f32", "u16", "u8"}, "f32");
+  o.samples = samples == "u8" ? SampleType::u8 : samples == "u16" ? SampleType::u16 : SampleType::f32;
+  if (const auto range = args.numbers("range", 2)) o.range = {(*range)[0], (*range)[1]};
+  if (args.choice("compression", {"none", "deflate"}, "deflate") == "none") o.compression = Compression::none;
+  o.most_blocks =
+      static_cast<std::size_t>(args.integer_or("blocks", std::stoi(default_blocks), 1, 10'000'000));
+  o.max_memory_bytes = common.max_memory;
+  return o;
+}
+
+/// As check_output, where an output may be a folder too.
+void check_outputs(const fs::path& output, ExportFormat format, bool force, const fs::path& input) {
+  std::error_code ignored;
+  for (const fs::path& path : export_outputs(output, format)) {
+    if (!fs::is_directory(path, ignored)) {
+      check_output(path, force, {input});
+    } else if (format != ExportFormat::tiff && format != ExportFormat::ome_zarr &&
+               (format != ExportFormat::vtm || path == output)) {
+      throw InputError(fmt::format("{}: is a folder, not a file to write", path.string()));
+    } else if (!fs::is_empty(path, ignored) && !force) {
+      throw InputError(fmt::format("{}: exists already; --force overwrites it", path.string()));
+    }
   }
-  return volume;
+}
+
+Json result_json(const fs::path& output, const ExportOptions& o, const ExportResult& r) {
+  Json j = {{"output", output.string()}, {"format", text_of(o.format)}};
+  if (o.format == ExportFormat::vtm) j["blocks"] = r.blocks;
+  else j["oversampling"] = o.oversampling;
+  j["grid"] = grid_json(r.grid);
+  j["samples"] = r.samples;
+  j["bytes"] = r.bytes;
+  j["exact_between_samples"] = r.exact_between_samples;
+  if (r.exact_between_samples) j["jump"] = r.jump;
+  if (o.samples != SampleType::f32) {
+    j["scale"] = r.scale;
+    j["offset"] = r.offset;
+    j["clipped"] = r.clipped;
+  }
+  return j;
+}
+
+void print_export(const fs::path& output, const ExportOptions& o, const ExportResult& r,
+                  const VdvrFile& file) {
+  print_grid(r.grid);
+  if (o.format == ExportFormat::vtm)
+    fmt::print("blocks         {} of {} points together\n", r.blocks, r.samples);
+  if (o.samples != SampleType::f32)
+    fmt::print("integers       value = {} + {} * integer; {} samples lay outside\n", r.offset, r.scale,
+               r.clipped);
+  const double epsilon = file.certificate.epsilon_abs;
+  if (file.certificate.comparison) fmt::print("certified      no: the volume is a comparison\n");
+  else if (o.samples != SampleType::f32)
+    fmt::print(
+        "certified      |value - F| <= {:.4g} at covered samples{}: epsilon and half an integer's step\n",
+        epsilon + r.scale / 2, r.clipped > 0 ? " that did not lie outside" : "");
+  else if (r.exact_between_samples)
+    fmt::print("certified      |value - F| <= {:.4g} at covered samples, {:.4g} between them (trilinear)\n",
+               epsilon, epsilon + r.jump);
+  else
+    fmt::print("certified      |value - F| <= {:.4g} at covered samples; between them they are too coarse\n",
+               epsilon);
+  fmt::print("written        {} ({})\n", output.string(), bytes_text(r.bytes));
 }
 
 }  // namespace
 
 int export_command(Arguments& args) {
   args.positional("FILE", "the certified volume")
-      .value("output,o", "VOL.mha|.nrrd", "the uniform volume to write")
-      .value("oversampling", "1|2|4|8", "samples per base cell and axis (default 1)")
+      .value("output,o", "VOL",
+             "what to write: .mha .nrrd .tif .h5 .npy .raw .zarr .vtm, or a folder of TIFF slices")
+      .value("format", "NAME", "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm (default: by the ending of VOL)")
+      .value("oversampling", "1|2|4|8",
+             "samples per cell of the grid and axis (default 1; of ome-zarr 4, the finest of its levels)")
+      .value(
+          "samples", "f32|u16|u8",
+          "type in tiff, hdf5, npy and raw (default f32); integers span the range of the values, scale and "
+          "offset are recorded")
+      .value("range", "LO,HI", "what integers span instead; values outside become the nearest of them")
+      .value("compression", "none|deflate", "of hdf5, ome-zarr and vtm (default deflate)")
+      .value("blocks", "N",
+             std::string("vtm: at most about so many .vti files (default ") + default_blocks +
+                 "); fewer hold more points")
       .flag("unverified", "export although content and certificate do not match");
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const int oversampling = std::stoi(args.choice("oversampling", {"1", "2", "4", "8"}, "1"));
   const auto path = args.path("FILE"), output = args.path("output");
-  if (!is_volume_path(output))
-    throw InputError(fmt::format("{}: write a volume as .mha or .nrrd", output.string()));
-  check_output(output, common.force, {path});
+  const ExportFormat format = format_of(args, output);
+  refuse_unused(args, format);
+  const ExportOptions options = options_of(args, common, format);
+  check_outputs(output, format, common.force, path);
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args, args.has("unverified"));
-  const Grid grid = finer(file.volume.grid, oversampling);
-  const Volume volume = sample_all(file.volume, grid, common.max_memory, progress.callback());
-  throw_if_stopped();
-  write_volume(output, volume);
+  const ExportResult result = export_volume(file, output, options, progress.callback());
   progress.clear();
-  print_result(common,
-               {{"output", output.string()}, {"oversampling", oversampling}, {"grid", grid_json(grid)}}, [&] {
-                 print_grid(grid);
-                 fmt::print("written        {}\n", output.string());
-               });
+  print_result(common, result_json(output, options, result),
+               [&] { print_export(output, options, result, file); });
   return 0;
 }
 

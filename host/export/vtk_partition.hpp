@@ -1,0 +1,14 @@
+// Which bricks share a vtkImageData. Called by export_vtk.cpp.
+#pragma once
+
+#include <vector>
+
+#include "vdvr/export_vtk.hpp"
+
+namespace vdvr {
+
+/// What a block is worth, in points: where a box at its finest triple costs no more than `worth` beyond what
+/// its parts cost, it is one block.
+std::vector<VtkBlock> partition(const MixedVolume& volume, double worth);
+
+}  // namespace vdvr

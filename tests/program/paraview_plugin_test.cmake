@@ -1,0 +1,17 @@
+# share/paraview/vdvr_reader.py opens a .vdvr in pvpython. Skipped where ParaView, or h5py in its Python, is missing.
+find_program(PVPYTHON pvpython)
+if(NOT PVPYTHON)
+  message("paraview_plugin_test skipped: no pvpython; install python3-paraview and python3-h5py")
+  return()
+endif()
+set(ENV{PYTHONPATH} "${SOURCE}/share/paraview/debian-12:$ENV{PYTHONPATH}")
+execute_process(COMMAND "${PVPYTHON}" --force-offscreen-rendering -c "import h5py" RESULT_VARIABLE code OUTPUT_QUIET ERROR_QUIET)
+if(NOT code EQUAL 0)
+  message("paraview_plugin_test skipped: ParaView's Python has no h5py; install python3-h5py")
+  return()
+endif()
+execute_process(COMMAND "${PVPYTHON}" --force-offscreen-rendering "${CMAKE_CURRENT_LIST_DIR}/paraview_plugin.py" "${VDVR}"
+  "${SOURCE}/share/paraview/vdvr_reader.py" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "paraview_plugin.py failed with ${code}")
+endif()
