@@ -152,11 +152,12 @@ Place Reader::locate(const std::string& path) const {
   return place;
 }
 
-Handle Reader::open_object(const std::string& path) const {
+Place Reader::require(const std::string& path) const {
   Place place = locate(path);
   if (!place.problem.empty()) throw FileError(place.problem);
   if (!place.object) refuse(path, links_ == Links::hard ? "is missing" : "no such dataset");
-  return std::move(place.object);
+  if (files_) files_->use(place);
+  return place;
 }
 
 bool Reader::is_group(const std::string& path) const { return H5Iget_type(find(path).id()) == H5I_GROUP; }
@@ -321,8 +322,12 @@ std::optional<double> Reader::find_real(const std::string& object, const std::st
 
 // --- datasets ---
 
+Dataset Reader::declared(const std::string& path) const {
+  return declare(open_object(path), fmt::format("{}: {}", shown_, path));
+}
+
 Dataset Reader::dataset(const std::string& path) const {
-  Dataset d = declare(open_object(path), fmt::format("{}: {}", shown_, path));
+  Dataset d = declared(path);
   if (d.shape.empty()) refuse(path, "is not an array");
   if (d.element == Element::other)
     refuse(path, fmt::format("elements are {}, expected little-endian float32, uint8, uint16 or uint32",
@@ -338,10 +343,7 @@ void Reader::read(const Dataset& d, void* values) const {
 }
 
 Dataset Reader::numeric_dataset(const std::string& path) const {
-  Place place = locate(path);
-  if (!place.problem.empty()) throw FileError(place.problem);
-  if (!place.object) refuse(path, "no such dataset");
-  return hdf5::numeric_dataset(files_, std::move(place), fmt::format("{}: {}", shown_, path));
+  return hdf5::numeric_dataset(files_, require(path), fmt::format("{}: {}", shown_, path));
 }
 
 bool Reader::flag(const std::string& path) const {
@@ -358,7 +360,7 @@ bool Reader::flag(const std::string& path) const {
 }
 
 std::string Reader::text(const std::string& path, std::uint64_t max_bytes) const {
-  const Dataset d = declare(open_object(path), fmt::format("{}: {}", shown_, path));
+  const Dataset d = declared(path);
   if (d.kind != H5T_STRING) refuse(path, "is not a string");
   if (d.count != 1) refuse(path, "is not one string");
   if (d.outside) refuse(path, "lies outside the file");

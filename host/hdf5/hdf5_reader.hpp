@@ -81,7 +81,10 @@ class Reader {
   /// What the policy lets be reached; its object is invalid where nothing is.
   [[nodiscard]] Place locate(const std::string& path) const;
   [[nodiscard]] Handle find(const std::string& path) const { return locate(path).object; }
-  [[nodiscard]] Handle open_object(const std::string& path) const;
+  /// The same, refused where nothing is; its files are used from then on.
+  [[nodiscard]] Place require(const std::string& path) const;
+  [[nodiscard]] Handle open_object(const std::string& path) const { return require(path).object; }
+  [[nodiscard]] Dataset declared(const std::string& path) const;
   [[nodiscard]] std::vector<std::string> texts_at(const Place& place, const std::string& object,
                                                   const std::string& name) const;
 
