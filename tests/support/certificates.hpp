@@ -28,7 +28,7 @@ inline Certificate full_certificate() {
   c.bounds = {{"projection", "amplitude", 8, 0.1, false},
               {"projection", "curvature", 16, 1.0 / 11, true},
               {"gold", "paper Eq. 7", 8, 0.25, false}};
-  c.field = {RampWindow::hann, 0.9, 85.85};
+  c.field = {RampWindow::hann, 0.9, 85.85, {}};
   c.padding = 256;
   c.window = {0.1, 0.4};
   c.roi = std::array<double, 6>{-1, -2, -3, 1.5, 2.5, 3.5};
