@@ -24,6 +24,7 @@ const std::set<std::string>& fields_with_options() {
                                            "epsilon",
                                            "epsilon_abs",
                                            "filter_cutoff",
+                                           "follow_links",
                                            "gold",
                                            "gradient",
                                            "granularity",

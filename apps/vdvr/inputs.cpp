@@ -50,6 +50,7 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
+  options.follow_links = args.has("follow-links");
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;

@@ -13,7 +13,8 @@
 
 namespace vdvr::cli {
 
-/// --angles-file, for stacks that carry no angles, and --beam.
+/// --angles-file, for stacks that carry no angles, --beam, and --follow-links, for HDF5 files in several
+/// folders.
 void add_scan(Arguments& args);
 void add_field(Arguments& args);
 void add_grid(Arguments& args);

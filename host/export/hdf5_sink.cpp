@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/export/pack.hpp"
-#include "host/io/hdf5_writer.hpp"
+#include "host/hdf5/hdf5_writer.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"

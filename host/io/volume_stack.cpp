@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "host/io/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
 #include "host/io/natural_order.hpp"
 #include "host/io/tiff.hpp"
 #include "host/system/limits.hpp"
@@ -157,8 +157,9 @@ Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
 }
 
 Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
-  const io::hdf5::Reader file(path, io::hdf5::Links::within_file);
-  const io::hdf5::Dataset data = file.numeric_dataset(dataset);
+  const io::hdf5::Reader file(path, io::hdf5::Links::within_folder);
+  io::hdf5::Dataset data = file.numeric_dataset(dataset);
+  data.may_be_sparse = true;
   const auto shape = data.extents();
   if (shape.size() != 3)
     throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name, shape.size()));

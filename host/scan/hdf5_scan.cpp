@@ -12,7 +12,7 @@
 #include <memory>
 #include <numbers>
 
-#include "host/io/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
 #include "host/scan/nxtomo_beam.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
@@ -197,7 +197,7 @@ std::string child_of(const Reader& file, const std::string& group, const std::st
                      const std::string& name) {
   if (file.is_group(group + "/" + name)) return group + "/" + name;
   for (const std::string& child : file.members(group))
-    if (file.find_text(group + "/" + child, "NX_class") == nx_class) return group + "/" + child;
+    if (file.nexus_class(group + "/" + child) == nx_class) return group + "/" + child;
   return "";
 }
 
@@ -282,8 +282,9 @@ RawScan open_nxtomo(const Reader& file, const TomoEntry& where, bool cone) {
 
 }  // namespace
 
-RawScan open_hdf5_scan(const std::filesystem::path& path, bool cone) {
-  const Reader file(path, hdf5::Links::within_file);
+RawScan open_hdf5_scan(const std::filesystem::path& path, const std::filesystem::path& folder,
+                       bool follow_links, bool cone) {
+  const Reader file(path, follow_links ? hdf5::Links::anywhere : hdf5::Links::within_folder, folder);
   RawScan scan;
   if (cone && file.is_dataset("/exchange/data"))
     throw FileError(
@@ -295,10 +296,15 @@ RawScan open_hdf5_scan(const std::filesystem::path& path, bool cone) {
   else if (file.find_text("/", "format") == "vdvr")
     throw FileError(path.string() + ": is a certified volume, not a scan");
   else
-    throw FileError(path.string() +
-                    ": HDF5, but neither Data Exchange (/exchange/data) nor NXtomo (instrument/detector "
-                    "with data and image_key, within this file)");
-  scan.files.emplace_back(path.filename().string(), path);
+    throw FileError(fmt::format(
+        "{}: HDF5, but neither Data Exchange (/exchange/data) nor NXtomo (instrument/detector with data and "
+        "image_key){}",
+        path.string(),
+        file.broken_link().empty() ? "" : "; a link could not be followed: " + file.broken_link()));
+  scan.files = file.used();
+  if (scan.files.size() > 1)
+    scan.notes.push_back(
+        fmt::format("its numbers lie in {} HDF5 files; the hash covers all", scan.files.size()));
   return scan;
 }
 

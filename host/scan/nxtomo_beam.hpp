@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/io/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
 #include "host/scan/raw_scan.hpp"
 
 namespace vdvr::io {

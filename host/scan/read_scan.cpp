@@ -13,7 +13,7 @@
 #include <numbers>
 #include <thread>
 
-#include "host/io/hdf5_writer.hpp"
+#include "host/hdf5/hdf5_writer.hpp"
 #include "host/io/raster_file.hpp"
 #include "host/prepare/prepare.hpp"
 #include "host/scan/find_center.hpp"
@@ -74,12 +74,12 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
   if (options.angles_file && !raster)
     throw InputError(path.string() +
                      ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
-  if (folder) return io::open_scan_folder(path, options.max_memory_bytes, options.beam);
+  if (folder) return io::open_scan_folder(path, options.max_memory_bytes, options.beam, options.follow_links);
   if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
   if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
   const bool cone = options.beam == Beam::cone;
   if (is_hdf5(path)) {
-    io::RawScan raw = io::open_hdf5_scan(path, cone);
+    io::RawScan raw = io::open_hdf5_scan(path, {}, options.follow_links, cone);
     if (raw.cone)
       raw.notes.insert(raw.notes.end(), raw.cone->geometry.notes.begin(), raw.cone->geometry.notes.end());
     return raw;
@@ -99,7 +99,7 @@ io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& fo
       throw FileError(path.string() + ": a scan's description is named scan.json");
     folder = true;
     return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes,
-                                options.beam);
+                                options.beam, options.follow_links);
   }
   throw FileError(path.string() +
                   ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "
@@ -381,6 +381,9 @@ bool holds_hdf5(const fs::path& path) {
 void read_frames(const fs::path& path, const ScanOptions& options) {
   bool folder = false;
   const io::RawScan raw = open_scan(path, options, folder);
+  std::uint64_t bytes = 0;
+  for (const auto& stamp : stamps_of(raw)) bytes += stamp.first;
+  io::extend_rehearsal(bytes);
   static_cast<void>(geometry_of(raw, path.string()));
   require_room(raw, options, path.string());
   const std::int64_t step = block_views(raw, options.max_memory_bytes);

@@ -140,14 +140,13 @@ bool wants_distances(const Description& about, std::optional<Beam> beam) {
   return true;
 }
 
-RawScan open_hdf5(const Description& about, bool cone) {
+RawScan open_hdf5(const Description& about, bool follow_links, bool cone) {
   for (const char* key : {"flats", "darks", "description"})
     if (about.has(key))
       about.fail(fmt::format("'{}' goes with 'projections'; an HDF5 file brings its own", key));
   const std::string name = about.text("hdf5");
-  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), cone);
-  scan.files.clear();
-  use_file(scan, about, name);
+  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), about.folder(), follow_links, cone);
+  scan.files.front().first = name;  // as scan.json has it
   return scan;
 }
 
@@ -179,7 +178,8 @@ void set_angles(const Description& about, RawScan& scan) {
 
 }  // namespace
 
-RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes, std::optional<Beam> beam) {
+RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes, std::optional<Beam> beam,
+                         bool follow_links) {
   const Description about(folder / "scan.json", known_members());
   std::optional<NikonScan> nikon;
   if (about.has("nikon")) nikon = read_nikon(about.inside(about.text("nikon"), "nikon"));
@@ -190,7 +190,7 @@ RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes,
   RawScan scan;
   std::vector<std::string> names;  // of the projections, one file each; empty for one file of all
   if (about.has("hdf5")) {
-    scan = open_hdf5(about, distances);
+    scan = open_hdf5(about, follow_links, distances);
   } else {
     names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
     const bool stack = names.size() == 1 && is_raster_file(folder / names.front());

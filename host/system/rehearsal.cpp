@@ -53,14 +53,20 @@ void limit_memory(std::uint64_t max_memory_bytes) {
 void limit_memory(std::uint64_t) {}
 #endif
 
+/// SIGXCPU ends a process at the first of its two limits, which the process may raise up to the second.
+void limit_time(std::uint64_t bytes) {
+  const rlimit cpu{least_cpu_s + bytes / slowest_bytes_per_s, RLIM_INFINITY};
+  ::setrlimit(RLIMIT_CPU, &cpu);
+}
+
+bool rehearsing = false;
+
 void set_limits(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   std::error_code error;
   const std::uint64_t file_bytes = std::filesystem::is_regular_file(path, error)
                                        ? static_cast<std::uint64_t>(std::filesystem::file_size(path, error))
                                        : std::uint64_t{1} << 36;
-  const rlim_t seconds = least_cpu_s + (error ? 0 : file_bytes / slowest_bytes_per_s);
-  const rlimit cpu{seconds, seconds + 1};
-  ::setrlimit(RLIMIT_CPU, &cpu);
+  limit_time(error ? 0 : file_bytes);
   limit_memory(max_memory_bytes);
 }
 
@@ -131,6 +137,12 @@ bool metadata_unchecked(const std::filesystem::path& path) {
   return !file || std::string(start.data(), 8) != "\x89HDF\r\n\x1a\n" || start[8] < 2;
 }
 
+void extend_rehearsal(std::uint64_t bytes) {
+  rlimit now{};
+  if (!rehearsing || ::getrlimit(RLIMIT_CPU, &now) != 0) return;
+  if (least_cpu_s + bytes / slowest_bytes_per_s > now.rlim_cur) limit_time(bytes);
+}
+
 void rehearse(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
               const std::function<void()>& work) {
   std::array<int, 2> ends{};
@@ -148,6 +160,7 @@ void rehearse(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
     for (const int signal : {SIGINT, SIGTERM, SIGXCPU}) std::signal(signal, SIG_DFL);
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
+    rehearsing = true;
     set_limits(path, max_memory_bytes);
     play(ends[1], work);
     ::_exit(0);

@@ -16,6 +16,10 @@ namespace vdvr::io {
 void rehearse(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
               const std::function<void()>& work);
 
+/// Within `work`, once it knows how many bytes it reads in all, in other files too: gives it the time for
+/// that. Elsewhere nothing.
+void extend_rehearsal(std::uint64_t bytes);
+
 /// True unless the file starts with a superblock of version 2 or later, as a .vdvr of ours does: from then on
 /// HDF5 checks its metadata by checksums.
 bool metadata_unchecked(const std::filesystem::path& path);

@@ -15,8 +15,8 @@
 #include <optional>
 #include <span>
 
-#include "host/io/hdf5_reader.hpp"
-#include "host/io/hdf5_writer.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_writer.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "host/volume/seal.hpp"

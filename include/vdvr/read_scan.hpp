@@ -30,6 +30,9 @@ struct ScanOptions {
   /// Folder of the scratch files that hold a scan of more than an eighth of the limit, and what is made of it
   /// as a whole; empty: default_scratch_folder().
   std::filesystem::path scratch;
+  /// External links and virtual datasets of an HDF5 file may lead out of the scan's folder. What they lead to
+  /// is hashed either way.
+  bool follow_links = false;
 };
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'

@@ -1,7 +1,7 @@
-// Data Exchange in HDF5: as others write it, compressed, and as we write it.
+// Data Exchange in HDF5: as others write it, compressed, virtual and behind a link, and as we write it.
 #include "tests/fuzz/seeds.hpp"
 #include "tests/fuzz/target.hpp"
-#include "tests/support/scan_files.hpp"
+#include "tests/support/hdf5_sources.hpp"
 
 namespace vdvr::fuzz {
 namespace {
@@ -24,6 +24,23 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
                      std::vector<double>(2 * support::V * support::U, 10100));
     write_compressed(file.id(), "/exchange/data_dark", {2, support::V, support::U},
                      std::vector<double>(2 * support::V * support::U, 100));
+  }
+  all.push_back(support::bytes_of(path));
+  support::write_virtual_exchange(path);  // and two more files, which stay
+  all.push_back(support::bytes_of(path));
+  all.push_back(in_layout(path, true));
+  std::filesystem::copy_file(path, folder / "virtual.h5");
+  {
+    support::Hdf5Writer file(path);
+    support::write_exchange_rest(file);
+    support::link_external(file.id(), "/exchange/data", "virtual.h5", "/exchange/data");
+  }
+  all.push_back(support::bytes_of(path));
+  {
+    support::Hdf5Writer file(path);
+    support::write_exchange_rest(file);
+    support::write_filtered(file.id(), "/exchange/data", {support::K, support::V, support::U},
+                            support::raw_counts(), io::hdf5::zstd_filter_number);
   }
   all.push_back(support::bytes_of(path));
   return all;

@@ -202,17 +202,6 @@ BOOST_AUTO_TEST_CASE(wrong_counts_of_angles_and_shapes_are_refused) {
   BOOST_TEST(has(refusal(folder / "empty.h5"), "neither Data Exchange"));
 }
 
-BOOST_AUTO_TEST_CASE(links_out_of_the_file_are_refused) {
-  const TemporaryFolder folder;
-  write_exchange(folder / "a.h5", {});
-  {
-    Hdf5Writer file(folder / "b.h5");
-    H5Lcreate_external((folder / "a.h5").c_str(), "/exchange", file.id(), "/exchange", H5P_DEFAULT,
-                       H5P_DEFAULT);
-  }
-  BOOST_TEST(refusal(folder / "b.h5") != "accepted");
-}
-
 // --- NXtomo ---
 
 BOOST_AUTO_TEST_CASE(nxtomo_is_sorted_by_its_image_key) {

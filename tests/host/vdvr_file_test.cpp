@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/io/hdf5_reader.hpp"
-#include "host/io/hdf5_writer.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_writer.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -1,8 +1,8 @@
 // Reads HDF5 files and refuses: every failure is a FileError naming file and object. What links may lead to
-// is one policy for a whole Reader. A dataset comes in one of two ways: checksummed, as our writer makes
-// them, checked down to its stored bytes; or numeric, as others make them, read and converted by HDF5. Either
-// is handed out only after its declaration has been checked, so that callers can size memory by it. Called by
-// vdvr_file.cpp (volumes), hdf5_scan.cpp and volume_stack.cpp (files of others).
+// (hdf5_links.hpp) is one policy for a whole Reader. A dataset comes in one of two ways: checksummed, as our
+// writer makes them, checked down to its stored bytes; or numeric, as others make them, read and converted by
+// HDF5. Either is handed out only after its declaration has been checked, so that callers can size memory by
+// it. Called by vdvr_file.cpp (volumes), hdf5_scan.cpp and volume_stack.cpp (files of others).
 #pragma once
 
 #include <filesystem>
@@ -10,22 +10,18 @@
 #include <string>
 #include <vector>
 
-#include "host/io/hdf5.hpp"
+#include "host/hdf5/hdf5_links.hpp"
 
 namespace vdvr::io::hdf5 {
 
-/// How an object may be reached. In both, all that is read lies in the one file, which its hash covers.
-enum class Links {
-  hard,        ///< a soft or external link on the path is refused, and so is what cannot be opened
-  within_file  ///< soft links too; what lies behind an external one or cannot be opened counts as absent
-};
-
 class Reader {
  public:
-  Reader(const std::filesystem::path& path, Links links);
+  /// `root`: the scan's folder, for names in its hash and for Links::within_folder; empty: the file's own.
+  Reader(const std::filesystem::path& path, Links links, const std::filesystem::path& root = {});
 
   [[nodiscard]] bool has(const std::string& path) const { return static_cast<bool>(find(path)); }
   [[nodiscard]] bool is_group(const std::string& path) const;
+  /// Throws where a link on the path leads out of the file and cannot be followed.
   [[nodiscard]] bool is_dataset(const std::string& path) const;
   void require_group(const std::string& path) const;
   /// Link names in a group, sorted.
@@ -48,6 +44,8 @@ class Reader {
   /// The first of them.
   [[nodiscard]] std::optional<std::string> find_text(const std::string& object,
                                                      const std::string& name) const;
+  /// The attribute NX_class, for a search: does not make the file one of those whose content was used.
+  [[nodiscard]] std::optional<std::string> nexus_class(const std::string& object) const;
   /// Refused when it is there and not `count` numbers.
   [[nodiscard]] std::optional<std::vector<double>> find_reals(const std::string& object,
                                                               const std::string& name,
@@ -60,12 +58,18 @@ class Reader {
   [[nodiscard]] Dataset dataset(const std::string& path) const;
   /// All of such a one, each chunk against its checksum, into dataset.bytes bytes.
   void read(const Dataset& dataset, void* values) const;
-  /// Any with numbers stored in this file; Dataset::read converts them.
+  /// Any with numbers, where links may lead to them; Dataset::read converts them. Not with Links::hard.
   [[nodiscard]] Dataset numeric_dataset(const std::string& path) const;
   /// One boolean, as h5py writes it (an enumeration) or as a whole number.
   [[nodiscard]] bool flag(const std::string& path) const;
   /// A string dataset, fixed or variable length, scalar or of one element, of at most `max_bytes`.
   [[nodiscard]] std::string text(const std::string& path, std::uint64_t max_bytes) const;
+
+  // --- files that links led to; not with Links::hard ---
+  /// The file itself, and each whose datasets or attributes were handed out.
+  [[nodiscard]] const UsedFiles& used() const { return files_->used(); }
+  /// Why the first link out of a file that was met could not be followed; empty when all could.
+  [[nodiscard]] const std::string& broken_link() const { return broken_link_; }
 
   /// Throws FileError: "path: object: what".
   [[noreturn]] void refuse(const std::string& object, const std::string& what) const;
@@ -74,16 +78,23 @@ class Reader {
 
  private:
   [[nodiscard]] bool hard_linked(const std::string& path) const;
-  /// What the policy lets be reached; invalid where nothing is.
-  [[nodiscard]] Handle find(const std::string& path) const;
-  [[nodiscard]] Handle open_object(const std::string& path) const;
+  /// What the policy lets be reached; its object is invalid where nothing is.
+  [[nodiscard]] Place locate(const std::string& path) const;
+  [[nodiscard]] Handle find(const std::string& path) const { return locate(path).object; }
+  /// The same, refused where nothing is; its files are used from then on.
+  [[nodiscard]] Place require(const std::string& path) const;
+  [[nodiscard]] Handle open_object(const std::string& path) const { return require(path).object; }
   [[nodiscard]] Dataset declared(const std::string& path) const;
+  [[nodiscard]] std::vector<std::string> texts_at(const Place& place, const std::string& object,
+                                                  const std::string& name) const;
 
   Silence silence_;
   std::string shown_;
   Links links_;
   std::uint64_t file_bytes_ = 0;
-  Handle file_, access_;  // access_: of links, refuses external ones
+  Handle file_;                               // of Links::hard
+  std::shared_ptr<const LinkedFiles> files_;  // of the others
+  mutable std::string broken_link_;
 };
 
 }  // namespace vdvr::io::hdf5

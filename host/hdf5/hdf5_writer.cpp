@@ -1,5 +1,5 @@
 // Checksummed HDF5 files: see hdf5_writer.hpp.
-#include "host/io/hdf5_writer.hpp"
+#include "host/hdf5/hdf5_writer.hpp"
 
 #include <fmt/format.h>
 

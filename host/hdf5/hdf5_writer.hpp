@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "host/io/hdf5.hpp"
+#include "host/hdf5/hdf5.hpp"
 
 namespace vdvr::io::hdf5 {
 

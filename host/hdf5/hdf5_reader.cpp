@@ -1,12 +1,13 @@
 // See hdf5_reader.hpp.
-#include "host/io/hdf5_reader.hpp"
+#include "host/hdf5/hdf5_reader.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
-#include "host/io/hdf5_chunks.hpp"
+#include "host/hdf5/hdf5_chunks.hpp"
+#include "host/hdf5/hdf5_virtual.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io::hdf5 {
@@ -19,30 +20,6 @@ constexpr hsize_t most_attributes = 256;
 constexpr hssize_t most_texts = 4096;
 constexpr std::size_t longest_text = 1 << 20;
 
-std::string class_name(H5T_class_t c, std::size_t size) {
-  switch (c) {
-    case H5T_INTEGER:
-      return fmt::format("a {}-byte integer", size);
-    case H5T_FLOAT:
-      return fmt::format("a {}-byte float", size);
-    case H5T_STRING:
-      return "a string";
-    case H5T_COMPOUND:
-      return "a compound";
-    default:
-      return "another type";
-  }
-}
-
-Element element_of(hid_t type) {
-  const auto is = [&](hid_t known) { return H5Tequal(type, known) > 0; };
-  if (is(H5T_IEEE_F32LE)) return Element::f32;
-  if (is(H5T_STD_U8LE) || is(H5T_STD_U8BE)) return Element::u8;
-  if (is(H5T_STD_U16LE)) return Element::u16;
-  if (is(H5T_STD_U32LE)) return Element::u32;
-  return is(H5T_STD_I32LE) ? Element::i32 : Element::other;
-}
-
 // --- attributes ---
 
 /// An attribute as its header declares it; without an `id` where it cannot be opened.
@@ -54,7 +31,7 @@ struct Found {
   int rank = 0;
 
   [[nodiscard]] bool is_number() const { return kind == H5T_INTEGER || kind == H5T_FLOAT; }
-  [[nodiscard]] std::string type_name() const { return class_name(kind, H5Tget_size(type.id())); }
+  [[nodiscard]] std::string type_text() const { return type_name(kind, H5Tget_size(type.id())); }
 };
 
 Found find_attribute(const Handle& object, const std::string& name) {
@@ -81,7 +58,7 @@ Found require_attribute(const Reader& file, const Handle& parent, const std::str
   if (!a.exists) file.refuse(shown, "is missing");
   if (!a.id) file.refuse(shown, reason());
   if (number ? !a.is_number() : a.kind != H5T_STRING)
-    file.refuse(shown, fmt::format("is {}, expected {}", a.type_name(), number ? "a number" : "a string"));
+    file.refuse(shown, fmt::format("is {}, expected {}", a.type_text(), number ? "a number" : "a string"));
   if (a.count < 0 || static_cast<std::uint64_t>(a.count) != count || a.rank > 1)
     file.refuse(shown, fmt::format("holds {} values, expected {}", a.count, count));
   return a;
@@ -124,30 +101,21 @@ std::optional<std::string> read_texts(const Found& a, std::vector<std::string>& 
 
 }  // namespace
 
-Reader::Reader(const std::filesystem::path& path, Links links)
-    : shown_(path.string()), links_(links), access_(H5Pcreate(H5P_LINK_ACCESS), H5Pclose) {
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  if (links == Links::hard) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-      throw FileError(fmt::format("{}: no such file", shown_));
-    file_bytes_ = std::filesystem::file_size(path, error);
-    if (error) throw FileError(fmt::format("{}: {}", shown_, error.message()));
-    if (file_bytes_ == 0) throw FileError(fmt::format("{}: the file is empty", shown_));
-    H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG);
+Reader::Reader(const std::filesystem::path& path, Links links, const std::filesystem::path& root)
+    : shown_(path.string()), links_(links) {
+  if (links != Links::hard) {
+    files_ = std::make_shared<const LinkedFiles>(path, root, links);
+    return;
   }
-  H5Pset_elink_cb(
-      access_.id(),
-      [](const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) -> herr_t {
-        return -1;
-      },
-      nullptr);
-  file_ = Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose);
-  if (file_) return;
-  throw FileError(links == Links::hard
-                      ? fmt::format("{}: cannot be read as HDF5: {}", shown_, reason())
-                      : fmt::format("{}: cannot be opened as HDF5: missing, truncated or damaged (HDF5: {})",
-                                    shown_, reason()));
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    throw FileError(fmt::format("{}: no such file", shown_));
+  file_bytes_ = std::filesystem::file_size(path, error);
+  if (error) throw FileError(fmt::format("{}: {}", shown_, error.message()));
+  if (file_bytes_ == 0) throw FileError(fmt::format("{}: the file is empty", shown_));
+  std::string why;
+  file_ = open_to_read(path, true, why);
+  if (!file_) throw FileError(fmt::format("{}: {}", shown_, why));
 }
 
 void Reader::refuse(const std::string& object, const std::string& what) const {
@@ -171,23 +139,34 @@ bool Reader::hard_linked(const std::string& path) const {
   }
 }
 
-Handle Reader::find(const std::string& path) const {
-  if (links_ == Links::hard && path != "/" && !hard_linked(path)) return {};
-  Handle object(H5Oopen(file_.id(), path.c_str(), access_.id()), H5Oclose);
-  if (!object && links_ == Links::hard) refuse(path, reason());
-  return object;
+Place Reader::locate(const std::string& path) const {
+  if (links_ != Links::hard) {
+    Place place = files_->follow(files_->first(), path);
+    if (broken_link_.empty()) broken_link_ = place.problem;
+    return place;
+  }
+  Place place;
+  if (path != "/" && !hard_linked(path)) return place;
+  place.object = Handle(H5Oopen(file_.id(), path.c_str(), H5P_DEFAULT), H5Oclose);
+  if (!place.object) refuse(path, reason());
+  return place;
 }
 
-Handle Reader::open_object(const std::string& path) const {
-  Handle object = find(path);
-  if (object) return object;
-  if (links_ == Links::hard) refuse(path, "is missing");
-  refuse(path, fmt::format("no such dataset, or a link that leaves the file (HDF5: {})", reason()));
+Place Reader::require(const std::string& path) const {
+  Place place = locate(path);
+  if (!place.problem.empty()) throw FileError(place.problem);
+  if (!place.object) refuse(path, links_ == Links::hard ? "is missing" : "no such dataset");
+  if (files_) files_->use(place);
+  return place;
 }
 
 bool Reader::is_group(const std::string& path) const { return H5Iget_type(find(path).id()) == H5I_GROUP; }
 
-bool Reader::is_dataset(const std::string& path) const { return H5Iget_type(find(path).id()) == H5I_DATASET; }
+bool Reader::is_dataset(const std::string& path) const {
+  const Place place = locate(path);
+  if (!place.problem.empty()) throw FileError(place.problem);
+  return H5Iget_type(place.object.id()) == H5I_DATASET;
+}
 
 void Reader::require_group(const std::string& path) const {
   if (H5Iget_type(open_object(path).id()) != H5I_GROUP) refuse(path, "is not a group");
@@ -279,7 +258,7 @@ std::vector<Attribute> Reader::attributes(const std::string& object) const {
       const std::string text = text_attribute(object, name);
       all.push_back({object, name, 't', text.size(), text});
     } else {
-      refuse(shown, fmt::format("is {} values of {}: neither numbers nor one text", count, a.type_name()));
+      refuse(shown, fmt::format("is {} values of {}: neither numbers nor one text", count, a.type_text()));
     }
   }
   return all;
@@ -287,8 +266,9 @@ std::vector<Attribute> Reader::attributes(const std::string& object) const {
 
 // --- attributes that may be there ---
 
-std::vector<std::string> Reader::find_texts(const std::string& object, const std::string& name) const {
-  const Found a = find_attribute(find(object), name);
+std::vector<std::string> Reader::texts_at(const Place& place, const std::string& object,
+                                          const std::string& name) const {
+  const Found a = find_attribute(place.object, name);
   if (a.kind != H5T_STRING || a.count <= 0 || a.count > most_texts) return {};
   const bool fixed = H5Tis_variable_str(a.type.id()) <= 0;
   const std::size_t size = H5Tget_size(a.type.id());
@@ -302,6 +282,19 @@ std::vector<std::string> Reader::find_texts(const std::string& object, const std
   return texts;
 }
 
+std::vector<std::string> Reader::find_texts(const std::string& object, const std::string& name) const {
+  const Place place = locate(object);
+  std::vector<std::string> texts = texts_at(place, object, name);
+  if (files_ && !texts.empty()) files_->use(place);
+  return texts;
+}
+
+std::optional<std::string> Reader::nexus_class(const std::string& object) const {
+  const std::vector<std::string> texts = texts_at(locate(object), object, "NX_class");
+  if (texts.empty()) return std::nullopt;
+  return texts.front();
+}
+
 std::optional<std::string> Reader::find_text(const std::string& object, const std::string& name) const {
   const std::vector<std::string> texts = find_texts(object, name);
   if (texts.empty()) return std::nullopt;
@@ -310,8 +303,10 @@ std::optional<std::string> Reader::find_text(const std::string& object, const st
 
 std::optional<std::vector<double>> Reader::find_reals(const std::string& object, const std::string& name,
                                                       std::uint64_t count) const {
-  const Found a = find_attribute(find(object), name);
+  const Place place = locate(object);
+  const Found a = find_attribute(place.object, name);
   if (!a.id) return std::nullopt;
+  if (files_) files_->use(place);
   std::vector<double> values(count);
   if (!a.is_number() || a.count != static_cast<hssize_t>(count) || !read_numbers(a, values))
     refuse(object, fmt::format("attribute '{}' is not {}", name,
@@ -328,35 +323,7 @@ std::optional<double> Reader::find_real(const std::string& object, const std::st
 // --- datasets ---
 
 Dataset Reader::declared(const std::string& path) const {
-  Dataset d;
-  d.name = fmt::format("{}: {}", shown_, path);
-  d.id = open_object(path);
-  if (H5Iget_type(d.id.id()) != H5I_DATASET) refuse(path, "is not a dataset");
-  const Handle space(H5Dget_space(d.id.id()), H5Sclose), type(H5Dget_type(d.id.id()), H5Tclose);
-  const Handle creation(H5Dget_create_plist(d.id.id()), H5Pclose);
-  d.kind = H5Tget_class(type.id());
-  d.element = element_of(type.id());
-  d.element_bytes = H5Tget_size(type.id());
-  std::vector<hsize_t> extents(H5S_MAX_RANK), largest(H5S_MAX_RANK), chunk(H5S_MAX_RANK);
-  const int rank = H5Sget_simple_extent_dims(space.id(), extents.data(), largest.data());
-  d.shape.assign(extents.begin(), extents.begin() + std::max(rank, 0));
-  d.largest.assign(largest.begin(), largest.begin() + std::max(rank, 0));
-  d.count = H5Sget_simple_extent_type(space.id()) == H5S_NULL ? 0 : 1;
-  for (const std::uint64_t n : d.shape) d.count = saturating_product(d.count, n);
-  d.bytes = saturating_product(d.count, d.element_bytes);
-  d.layout = H5Pget_layout(creation.id());
-  d.outside = d.layout == H5D_VIRTUAL || H5Pget_external_count(creation.id()) > 0;
-  if (d.layout == H5D_CHUNKED) {
-    const int axes = H5Pget_chunk(creation.id(), static_cast<int>(chunk.size()), chunk.data());
-    d.chunk.assign(chunk.begin(), chunk.begin() + std::clamp(axes, 0, static_cast<int>(chunk.size())));
-  }
-  for (int i = 0; i < H5Pget_nfilters(creation.id()); ++i) {
-    unsigned flags = 0;
-    std::size_t parameters = 0;
-    d.filters.push_back(H5Pget_filter2(creation.id(), static_cast<unsigned>(i), &flags, &parameters, nullptr,
-                                       0, nullptr, nullptr));
-  }
-  return d;
+  return declare(open_object(path), fmt::format("{}: {}", shown_, path));
 }
 
 Dataset Reader::dataset(const std::string& path) const {
@@ -364,7 +331,7 @@ Dataset Reader::dataset(const std::string& path) const {
   if (d.shape.empty()) refuse(path, "is not an array");
   if (d.element == Element::other)
     refuse(path, fmt::format("elements are {}, expected little-endian float32, uint8, uint16 or uint32",
-                             class_name(d.kind, d.element_bytes)));
+                             type_name(d.kind, d.element_bytes)));
   if (d.count == 0) refuse(path, "is empty");
   if (const auto problem = check_storage(d, file_bytes_)) refuse(path, *problem);
   return d;
@@ -376,13 +343,7 @@ void Reader::read(const Dataset& d, void* values) const {
 }
 
 Dataset Reader::numeric_dataset(const std::string& path) const {
-  Dataset d = declared(path);
-  if (!d.is_number()) refuse(path, "is not numeric");
-  if (d.outside) refuse(path, "its numbers lie in other files; copy them into one with h5repack");
-  const bool null = d.shape.empty() && d.count == 0;
-  if (null || H5Dget_storage_size(d.id.id()) == 0) refuse(path, "holds no data");
-  if (const auto problem = check_extents(d)) refuse(path, *problem);
-  return d;
+  return hdf5::numeric_dataset(files_, require(path), fmt::format("{}: {}", shown_, path));
 }
 
 bool Reader::flag(const std::string& path) const {

@@ -1,6 +1,7 @@
 // The base of the HDF5 layer: handles that close themselves, HDF5's messages silenced and quoted, attributes
 // and datasets as their headers declare them. hdf5_reader.hpp opens and reads, hdf5_writer.hpp writes,
-// hdf5_chunks.hpp judges what is stored. Called by those, their callers and seal.cpp.
+// hdf5_chunks.hpp and hdf5_filters.hpp judge what is stored, hdf5_links.hpp and hdf5_virtual.hpp find it in
+// other files. Called by those, their callers and seal.cpp.
 //
 // The HDF5 library is not thread-safe: one thread at a time.
 #pragma once
@@ -9,6 +10,8 @@
 
 #include <bit>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -104,6 +107,15 @@ struct Packing {
   bool deflated = false, shuffled = false;
 };
 
+/// Where the numbers of a virtual dataset lie.
+class VirtualLayout {
+ public:
+  virtual ~VirtualLayout() = default;
+  /// The elements that `wanted` selects of the virtual dataset, as doubles to where `memory` puts them. What
+  /// is wrong, or nothing.
+  virtual std::optional<std::string> read(hid_t wanted, hid_t memory, double* out) const = 0;
+};
+
 /// A dataset as its header declares it. Its numbers can be read as long as it lives, without its Reader.
 struct Dataset {
   Handle id;
@@ -116,7 +128,10 @@ struct Dataset {
   std::uint64_t bytes = 0;  ///< in memory
   H5D_layout_t layout = H5D_LAYOUT_ERROR;
   bool outside = false;  ///< the numbers lie in other files, or in other datasets
-  Shape chunk;           ///< empty unless chunked
+  std::shared_ptr<const VirtualLayout> virtual_layout;  ///< of a virtual one that may be read
+  std::uint64_t missing_chunks = 0;                     ///< never written: HDF5 gives fill values there
+  bool may_be_sparse = false;  ///< and these are what is wanted; else reading one is refused
+  Shape chunk;                 ///< empty unless chunked
   Filters filters;
   // Of a checksummed one, filled in by check_storage:
   Packing packing;
@@ -132,6 +147,16 @@ struct Dataset {
   void read(std::span<const std::int64_t> start, std::span<const std::int64_t> block_count,
             double* out) const;
   [[nodiscard]] std::vector<double> read_all() const;
+  /// The elements that `wanted` selects of its space, as doubles to where `memory` puts them. What is wrong,
+  /// or nothing.
+  std::optional<std::string> read_selected(hid_t wanted, hid_t memory, double* out) const;
 };
+
+/// "a 4-byte float"
+std::string type_name(H5T_class_t type, std::size_t bytes);
+
+/// A dataset as its header declares it; `object` is its handle, `name` its name in messages. Throws FileError
+/// where it is none, and before HDF5 opens any source of a virtual dataset that has no fixed shape.
+Dataset declare(Handle object, std::string name);
 
 }  // namespace vdvr::io::hdf5

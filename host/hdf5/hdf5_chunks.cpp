@@ -1,7 +1,7 @@
 // See hdf5_chunks.hpp. HDF5 finds a chunk and hands out its stored bytes; everything after that is here.
 // A stored chunk: shuffle, then deflate, where the dataset has them; then Fletcher32, 4 bytes, little-endian.
 #define H5Dread_chunk_vers 1  // HDF5 2.0 has a second one, with another argument
-#include "host/io/hdf5_chunks.hpp"
+#include "host/hdf5/hdf5_chunks.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,0 +1,10 @@
+# Scans as h5py and hdf5plugin write them, by hdf5_files.py. Skipped where these cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_python_with(hdf5_files_test 240 h5py numpy hdf5plugin)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/hdf5_files.py" "${VDVR}" "${WORK}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "hdf5_files.py failed with ${code}")
+endif()
