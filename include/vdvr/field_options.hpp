@@ -36,7 +36,7 @@ struct FieldOptions {
   double cutoff = 1.0;           ///< fraction of the detector's Nyquist frequency
   std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections
   /// What was done to the projections. It is done where they are read (ScanOptions), and recorded here.
-  Preparation preparation;
+  Preparation preparation{};
 };
 
 }  // namespace vdvr
