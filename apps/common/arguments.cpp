@@ -79,8 +79,14 @@ Arguments::Arguments(const Command& command, std::vector<std::string> tokens)
   group("Options");
 }
 
+Arguments::Arguments(const Command& command, std::vector<std::string> tokens, OptionTable& table)
+    : Arguments(command, std::move(tokens)) {
+  asked_ = &table;
+}
+
 Arguments& Arguments::group(const std::string& title) {
   groups_.emplace_back(title, 110, 70);
+  titles_.push_back(title);
   return *this;
 }
 
@@ -132,7 +138,27 @@ bool Arguments::asks(const std::string& name, const std::string& value) const {
   return false;
 }
 
+OptionTable Arguments::table() const {
+  OptionTable result{usage().substr(std::string("usage: ").size()), positional_help_, {}};
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    if (groups_[i].options().empty()) continue;
+    OptionGroup group{titles_[i], {}};
+    for (const auto& o : groups_[i].options()) {
+      const std::string shown = o->canonical_display_name(po::command_line_style::allow_dash_for_short);
+      group.options.push_back({"--" + o->long_name(), shown[0] == '-' ? shown : "",
+                               o->semantic()->max_tokens() == 0 ? "" : o->semantic()->name(),
+                               o->description()});
+    }
+    result.groups.push_back(std::move(group));
+  }
+  return result;
+}
+
 bool Arguments::parse() {
+  if (asked_ != nullptr) {
+    *asked_ = table();
+    return false;
+  }
   po::options_description all;
   for (const auto& g : groups_) all.add(g);
   all.add(hidden_);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/common/command.hpp"
+#include "apps/common/option_table.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr::cli {
@@ -18,6 +19,8 @@ namespace vdvr::cli {
 class Arguments {
  public:
   Arguments(const Command& command, std::vector<std::string> tokens);
+  /// Not to run the command but to learn its options: parse() fills `table` and gives false.
+  Arguments(const Command& command, std::vector<std::string> tokens, OptionTable& table);
 
   /// Opens a new heading of the help text; options declared next belong to it.
   Arguments& group(const std::string& title);
@@ -65,14 +68,17 @@ class Arguments {
 
  private:
   void print_help() const;
+  [[nodiscard]] OptionTable table() const;
   /// "vdvr build"; "vdvr bench tune" once the case was taken.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::string usage() const;
 
   const Command& command_;
+  OptionTable* asked_ = nullptr;  ///< whoever wants the table instead of the command
   std::vector<std::string> tokens_;
   std::string case_;  ///< the word that take_word took
   std::vector<boost::program_options::options_description> groups_;
+  std::vector<std::string> titles_;  ///< of the groups, which Boost does not give back
   boost::program_options::options_description hidden_;
   boost::program_options::positional_options_description positionals_;
   std::vector<std::pair<std::string, std::string>> positional_help_;

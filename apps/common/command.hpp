@@ -14,6 +14,7 @@ struct Command {
   const char* purpose;  ///< one line
   int (*run)(Arguments& args);
   const char* program = "vdvr";
+  std::vector<std::string> cases = {};  ///< words of which one comes first, each with options of its own
 
   /// "vdvr build": what stands before messages.
   [[nodiscard]] std::string who() const { return std::string(program) + (*name ? " " : "") + name; }

@@ -5,6 +5,8 @@
 #include <chrono>
 
 #include "apps/common/command.hpp"
+#include "apps/common/completion.hpp"
+#include "apps/common/manual.hpp"
 #include "apps/common/progress.hpp"
 #include "apps/paper/report.hpp"
 #include "vdvr/error.hpp"
@@ -83,12 +85,21 @@ int run(cli::Arguments& args) {
 }  // namespace vdvr::paper
 
 int main(int argc, char** argv) {
-  if (argc == 2 && std::string(argv[1]) == "--version") {
-    fmt::print("vdvr-paper {}\n", VDVR_VERSION);
-    return 0;
-  }
   const vdvr::cli::Command command{"", "-o DIR [--quick] [--head FILE.mha]",
                                    "every figure and table of the paper, measured again", vdvr::paper::run,
                                    "vdvr-paper"};
-  return vdvr::cli::run_guarded(command, {argv + 1, argv + argc});
+  const std::vector<std::string> words{argv + 1, argv + argc};
+  if (words == std::vector<std::string>{"--version"}) {
+    fmt::print("vdvr-paper {}\n", VDVR_VERSION);
+    return 0;
+  }
+  if (words == std::vector<std::string>{"--man"}) {
+    fmt::print("{}", vdvr::cli::command_page(command));
+    return 0;
+  }
+  if (words == std::vector<std::string>{"--completion", "bash"}) {
+    fmt::print("{}", vdvr::cli::bash_completion("vdvr-paper", {command}));
+    return 0;
+  }
+  return vdvr::cli::run_guarded(command, words);
 }

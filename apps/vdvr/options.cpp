@@ -75,7 +75,7 @@ void add_scan(Arguments& args) {
 void add_field(Arguments& args) {
   args.group("Field (what is certified)")
       .value("center", "C", "column onto which the rotation axis projects")
-      .value("filter", "NAME", fmt::format("{} (default ram-lak)", fmt::join(filter_names(), "|")))
+      .value("filter", fmt::format("{}", fmt::join(filter_names(), "|")), "default ram-lak")
       .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)");
   args.group("Preparation (F is that of the prepared projections)")
       .value("outliers", "T[,N]",

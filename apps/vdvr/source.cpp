@@ -32,7 +32,7 @@ void add_projection_options(Arguments& args) {
       .value("spacing", "S[,SZ]", "cell width, and height where it differs (default: the detector pitch)")
       .value("origin", "X,Y,Z", "the box's corner (default: centred)")
       .value("center", "C", "column onto which the rotation axis projects")
-      .value("filter", "NAME", "as `build` takes it (default ram-lak)")
+      .value("filter", "ram-lak|shepp-logan|cosine|hamming|hann", "default ram-lak")
       .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)")
       .value("upsampling", "N",
              "columns and rows per detector pixel, a power of two (default 1: as published)")

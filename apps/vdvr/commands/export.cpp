@@ -128,7 +128,7 @@ int export_command(Arguments& args) {
   args.positional("FILE", "the certified volume")
       .value("output,o", "VOL",
              "what to write: .mha .nrrd .tif .h5 .npy .raw .zarr .vtm, or a folder of TIFF slices")
-      .value("format", "NAME", "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm (default: by the ending of VOL)")
+      .value("format", "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm", "default: by the ending of VOL")
       .value("oversampling", "1|2|4|8",
              "samples per cell of the grid and axis (default 1; of ome-zarr 4, the finest of its levels)")
       .value(
