@@ -42,7 +42,7 @@ th, td { text-align: left; vertical-align: top; padding: .35rem .6rem .35rem 0; 
 thead th { color: #555d68; font-weight: 600; overflow-wrap: normal; }
 tbody th { font-weight: 600; } .pairs th { width: 12rem; font-weight: 400; color: #555d68; overflow-wrap: normal; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td.b { width: 26%; vertical-align: middle; }
+td.b { width: 26%; vertical-align: middle; padding-left: .4rem; }
 .bar { display: block; width: 100%; height: 1.5rem; border-radius: 3px; } td.b .bar { height: .8rem; }
 .row { display: flex; flex-wrap: wrap; justify-content: space-between; gap: 0 1rem; margin: .7rem 0 .15rem; font-size: .9rem; }
 .legend { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; font-size: .85rem; margin: .6rem 0; }
