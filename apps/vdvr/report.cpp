@@ -40,7 +40,7 @@ table { border-collapse: collapse; width: 100%; font-size: .9rem; margin: .6rem 
 th, td { text-align: left; vertical-align: top; padding: .35rem .6rem .35rem 0; border-bottom: 1px solid #e4e7eb;
   overflow-wrap: anywhere; }
 thead th { color: #555d68; font-weight: 600; overflow-wrap: normal; }
-tbody th { font-weight: 600; } .pairs th { width: 12rem; font-weight: 400; color: #555d68; overflow-wrap: normal; }
+tbody th { font-weight: 600; } th small { display: block; font-weight: 400; color: #555d68; } .pairs th { width: 12rem; font-weight: 400; color: #555d68; overflow-wrap: normal; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 td.b { width: 26%; vertical-align: middle; padding-left: .4rem; }
 .bar { display: block; width: 100%; height: 1.5rem; border-radius: 3px; } td.b .bar { height: .8rem; }
@@ -55,7 +55,7 @@ footer { margin-top: 3rem; font-size: .85rem; color: #555d68; }
   main { padding: 1rem .9rem 2rem; } h1 { font-size: 1.5rem; }
   .pairs, .pairs tbody, .pairs tr, .pairs th, .pairs td { display: block; width: auto; border: 0; padding: 0; }
   .pairs tr { border-bottom: 1px solid #e4e7eb; padding: .35rem 0; }
-  .method { display: none; } td.b { width: 20%; }
+  td.b { width: 18%; }
 }
 @media print {
   @page { margin: 16mm; }
@@ -118,7 +118,8 @@ std::string verdict(const RunReport& run) {
   const std::string where =
       fmt::format("{}{}", c.roi ? " of the region of interest" : "", c.window ? " within the window" : "");
   const std::string promise = fmt::format(
-      "At every covered point{} the field that you see lies within {} density units of F: {} % of the range "
+      "At every covered point{} the field that you see lies within {} density units of F: {}&nbsp;% of the "
+      "range "
       "of F, which is {}.",
       where, number_html(c.epsilon_abs, "epsilon_abs"), number_text(100 * c.epsilon),
       number_html(c.reference_range, "reference_range"));
@@ -143,8 +144,9 @@ std::string head(const RunReport& run) {
          fmt::format("<p class=\"over\">{} views of {} \xC3\x97 {} pixels, {} beam</p>\n", g.views(),
                      g.columns, g.rows, run.scan.cone ? "cone" : "parallel") +
          verdict(run) + "<div class=\"facts\">\n" +
-         fact(number_html(c.epsilon_abs), fmt::format("tolerance in density units, {} % of the range of F",
-                                                      number_text(100 * c.epsilon))) +
+         fact(number_html(c.epsilon_abs),
+              fmt::format("tolerance in density units, {}&nbsp;% of the range of F",
+                          number_text(100 * c.epsilon))) +
          fact(percent(total, c.epsilon_abs), "of the tolerance is used by all errors together") +
          fact(percent(storage.bytes_ratio, 1), "of the bytes of the uniform float32 grid") +
          fact(percent(run.verified.total, c.epsilon_abs), "of the tolerance, measured again by verify") +
@@ -267,16 +269,15 @@ std::string bars(const RunReport& run) {
 
 std::string terms(const Certificate& c) {
   std::string html =
-      "<h3>The largest of each term</h3>\n<table><thead><tr><th>term</th><th class=\"n\">density "
-      "units</th><th "
-      "class=\"n\">share</th><th></th><th class=\"method\">how it was found</th></tr></thead><tbody>\n";
+      "<h3>The largest of each term</h3>\n<table><thead><tr><th>term, and how it was found</th><th "
+      "class=\"n\">density units</th><th class=\"n\">share</th><th></th></tr></thead><tbody>\n";
   const auto row = [&](const std::string& name, const ErrorTerm& t, const std::string& member,
                        const char* color) {
     html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{}</td><td "
-        "class=\"b\">{}</td><td class=\"method\">{}</td></tr>\n",
-        name, number_html(t.value, "budget." + member + ".value"), percent(t.value, c.epsilon_abs),
-        stacked_bar({{name, color, t.value}}, c.epsilon_abs, 0, name), escaped(t.method));
+        "<tr><th scope=\"row\">{}<small>{}</small></th><td class=\"n\">{}</td><td class=\"n\">{}</td><td "
+        "class=\"b\">{}</td></tr>\n",
+        name, escaped(t.method), number_html(t.value, "budget." + member + ".value"),
+        percent(t.value, c.epsilon_abs), stacked_bar({{name, color, t.value}}, c.epsilon_abs, 0, name));
   };
   row("grid", c.budget.grid, "grid", kGrid);
   row("gold", c.budget.gold, "gold", kBetween);
