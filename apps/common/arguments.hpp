@@ -36,6 +36,8 @@ class Arguments {
   [[nodiscard]] bool parse();
 
   [[nodiscard]] std::string who() const { return command_.who(); }
+  /// All words as they were given, but for what take_word took.
+  [[nodiscard]] const std::vector<std::string>& words() const { return tokens_; }
   /// Takes the first word away (the case of `bench`); empty when there is none or it is an option.
   std::string take_word();
 

@@ -1,16 +1,21 @@
 // vdvr run: plan, build, verify, render: everything a user wants from a scan, with defaults that work.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <fstream>
+#include <iterator>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/report.hpp"
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
+#include "vdvr/output_file.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -39,8 +44,8 @@ auto timed(std::map<std::string, double>& seconds, const std::string& name, Step
 }
 
 std::vector<std::string> file_names() {
-  return {"volume.vdvr", "dvr.png",     "bound.png", "iso.png",         "slice-x.png",
-          "slice-y.png", "slice-z.png", "error.png", "certificate.json"};
+  return {"volume.vdvr", "dvr.png",     "bound.png", "iso.png",     "slice-x.png",
+          "slice-y.png", "slice-z.png", "error.png", "report.html", "certificate.json"};
 }
 
 /// The error slice and its picture lie across z through the dense part: there the interpolation errs
@@ -101,6 +106,52 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   write_png(folder.file("error.png"), out.error.image);
   out.files.emplace_back(
       "error.png", fmt::format("|V - F| on the slice at z = {:.4g}", out.built.certificate.worst_at[2]));
+}
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::string bytes(std::filesystem::file_size(path), '\0');
+  std::ifstream in(path, std::ios::binary);
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+    throw FileError(fmt::format("{}: cannot be read again", path.string()));
+  return bytes;
+}
+
+/// The words that measure the certificate again; verify takes the field from the file.
+std::vector<std::string> verify_words(const Arguments& args, const OutputFolder& folder) {
+  std::vector<std::string> words{"vdvr",          "verify",        folder.file("volume.vdvr").string(),
+                                 "--projections", args.text("IN"), "--exhaustive"};
+  for (const std::string option : {"angles-file", "beam", "device"})
+    if (args.has(option)) words.insert(words.end(), {"--" + option, args.text(option)});
+  return words;
+}
+
+/// The `run` line without what belongs to that one run.
+std::vector<std::string> run_words(const Arguments& args) {
+  std::vector<std::string> words{"vdvr", "run"};
+  std::copy_if(args.words().begin(), args.words().end(), std::back_inserter(words),
+               [](const std::string& word) { return word != "--resume" && word != "--quiet"; });
+  return words;
+}
+
+void write_report(const Device& device, const Arguments& args, const OutputFolder& folder, Outcome& out) {
+  RunReport page{out.planned.scan, out.built.volume, out.built.certificate, out.verified, out.error};
+  page.sampler = out.sampler;
+  page.sampler_reason = out.sampler_reason;
+  page.device = device.info();
+  for (const std::string stage : {"plan", "build", "verify", "pictures"})
+    page.seconds.emplace_back(stage, out.seconds.at(stage));
+  page.build_seconds = out.built.seconds;
+  page.file_bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
+  for (const auto& [name, caption] : out.files) {
+    if (!name.ends_with(".png")) continue;
+    const auto outside = out.outside.find(name);
+    page.pictures.push_back(
+        {name, caption, outside == out.outside.end() ? "" : outside->second, bytes_of(folder.file(name))});
+  }
+  page.run_words = run_words(args);
+  page.verify_words = verify_words(args, folder);
+  io::write_file(folder.file("report.html"), report_page(page));
+  out.files.emplace_back("report.html", "all of this on one page");
 }
 
 Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::uint64_t file_bytes) {
@@ -170,6 +221,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
     throw MismatchError(fmt::format("the error slice shows {:.6g}, above epsilon {:.6g}", out.error.max_error,
                                     certificate.epsilon_abs));
   throw_if_stopped();
+  write_report(device, args, folder, out);
   folder.finish(to_json(certificate));
   wanted.options.build.journal->remove();
   out.files.emplace_back("certificate.json", "what is promised, and by which argument");
@@ -184,7 +236,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
 
 int run_command(Arguments& args) {
   args.positional("IN", "projections")
-      .value("output,o", "DIR", "the folder for volume, pictures and certificate");
+      .value("output,o", "DIR", "the folder for volume, pictures, report.html and certificate");
   add_certify_options(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
