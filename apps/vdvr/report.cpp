@@ -40,8 +40,9 @@ table { border-collapse: collapse; width: 100%; font-size: .9rem; margin: .6rem 
 th, td { text-align: left; vertical-align: top; padding: .35rem .6rem .35rem 0; border-bottom: 1px solid #e4e7eb;
   overflow-wrap: anywhere; }
 thead th { color: #555d68; font-weight: 600; overflow-wrap: normal; }
+th { overflow-wrap: break-word; }
 tbody th { font-weight: 600; } th small { display: block; font-weight: 400; color: #555d68; } .pairs th { width: 12rem; font-weight: 400; color: #555d68; overflow-wrap: normal; }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; } td.n { white-space: nowrap; }
 td.b { width: 26%; vertical-align: middle; padding-left: .4rem; }
 .bar { display: block; width: 100%; height: 1.5rem; border-radius: 3px; } td.b .bar { height: .8rem; }
 .row { display: flex; flex-wrap: wrap; justify-content: space-between; gap: 0 1rem; margin: .7rem 0 .15rem; font-size: .9rem; }
@@ -55,7 +56,7 @@ footer { margin-top: 3rem; font-size: .85rem; color: #555d68; }
   main { padding: 1rem .9rem 2rem; } h1 { font-size: 1.5rem; }
   .pairs, .pairs tbody, .pairs tr, .pairs th, .pairs td { display: block; width: auto; border: 0; padding: 0; }
   .pairs tr { border-bottom: 1px solid #e4e7eb; padding: .35rem 0; }
-  td.b { width: 18%; }
+  td.b { width: 14%; } th.n, td.n { padding-right: .4rem; } table { font-size: .82rem; }
 }
 @media print {
   @page { margin: 16mm; }
