@@ -1,6 +1,6 @@
 // A scan from whatever file holds it: told apart by content, read block by block, pre-processed in double,
 // rounded to float once; then the centre. Layout float data[view][v][u]. Called by every command that takes a
-// scan; calls host/io readers, host/scan/preprocess.cpp and host/scan/find_center.cpp.
+// scan; calls host/io readers, host/scan/preprocess.cpp and host/center/find_center.cpp.
 #include "vdvr/read_scan.hpp"
 
 #include <fmt/format.h>
@@ -16,7 +16,6 @@
 #include "host/hdf5/hdf5_writer.hpp"
 #include "host/io/raster_file.hpp"
 #include "host/prepare/prepare.hpp"
-#include "host/scan/find_center.hpp"
 #include "host/scan/hdf5_scan.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/raster_scan.hpp"
@@ -24,6 +23,7 @@
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/find_center.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
 
@@ -273,6 +273,23 @@ void require_on_detector(const fs::path& path, double center, std::int64_t colum
   }
 }
 
+// In columns of the file.
+std::string note_of(const CenterEstimate& found, int binning) {
+  const double column = unbinned_center(found.center, binning);
+  std::string others;
+  for (const CenterWitness& w : found.others)
+    if (w.quality >= 0.5)
+      others += fmt::format("{} {} {:.2f}", others.empty() ? "; beside it" : ",", w.method,
+                            unbinned_center(w.center, binning));
+  if (!found.sure)
+    return fmt::format(
+        "centre of rotation UNSURE: column {:.2f} from {}, but {}{}; look at slices around it with `vdvr "
+        "center`, then give `center`",
+        column, found.method, found.doubt, others);
+  return fmt::format("centre of rotation found from {}: column {:.2f} +- {:.2g}{}", found.method, column,
+                     std::max(0.01, found.uncertainty * binning), others);
+}
+
 void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
                    ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
@@ -286,16 +303,14 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
   } else if (const auto found = find_center(scan)) {
     g.center = found->center;
     r.center_source = "found";
-    r.notes.push_back(
-        fmt::format("centre of rotation found from {}: column {:.2f} (mirror symmetry explains {:.1f} %)",
-                    found->method, found->center, 100 * found->quality));
+    r.notes.push_back(note_of(*found, options.preparation.binning));
   } else {
     g.center = 0.5 * static_cast<double>(g.columns - 1);
     r.center_source = "default";
-    r.notes.push_back(fmt::format(
-        "centre of rotation assumed in the detector's middle, column {}: the views do not tell; give "
-        "`center` where it is elsewhere",
-        g.center));
+    r.notes.push_back(
+        fmt::format("centre of rotation assumed in the detector's middle, column {}: the views do not tell; "
+                    "`vdvr center` draws slices to choose from, `center` sets it",
+                    unbinned_center(g.center, options.preparation.binning)));
   }
   require_on_detector(path, g.center, g.columns, options);
 }

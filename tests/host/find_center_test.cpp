@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE find_center
-#include "host/scan/find_center.hpp"
+#include "vdvr/find_center.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
