@@ -13,6 +13,7 @@ const std::vector<Command>& commands();
 int devices_command(Arguments& args);
 int simulate_command(Arguments& args);
 int info_command(Arguments& args);
+int center_command(Arguments& args);
 int reconstruct_command(Arguments& args);
 int plan_command(Arguments& args);
 int build_command(Arguments& args);

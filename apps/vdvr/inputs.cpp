@@ -54,16 +54,24 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
-  ProjectionSet scan = read_scan(path, options, progress);
+  return read_scan(path, options, progress);
+}
+
+ProjectionSet checked(ProjectionSet scan) {
   for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
   return scan;
 }
 
 }  // namespace
 
+ProjectionSet load_any_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                            const Progress& progress) {
+  return load(path, args, field, {}, progress);
+}
+
 ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress) {
-  return load(path, args, field, {}, progress);
+  return checked(load(path, args, field, {}, progress));
 }
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
@@ -72,8 +80,9 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
   std::error_code error;
   // Folders say it themselves; no other file is of cone beam.
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
-  return load(path, args, certificate.field,
-              geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, progress);
+  return checked(load(path, args, certificate.field,
+                      geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
+                      progress));
 }
 
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {

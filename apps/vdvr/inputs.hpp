@@ -22,8 +22,12 @@ InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
 ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress);
 
-/// The same under a certificate's field options. An HDF5 file that the certificate says is of cone beam is
-/// read so (--beam).
+/// The same without the check: of what reconstruction may refuse, too.
+ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& args,
+                            const FieldOptions& field, const Progress& progress);
+
+/// The checked scan under a certificate's field options. An HDF5 file that the certificate says is of cone
+/// beam is read so (--beam).
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
 

@@ -14,6 +14,8 @@ const std::vector<Command>& commands() {
       {"simulate", "(--phantom NAME|FILE.json | --volume FILE) -o FILE.h5",
        "projections of a phantom or of a volume", simulate_command},
       {"info", "FILE", "what a file is: geometry, certificate, storage", info_command},
+      {"center", "IN [-o SHEET.png]", "the centre of rotation, how sure it is, slices around it",
+       center_command},
       {"reconstruct", "IN -o OUT", "uniform filtered back-projection", reconstruct_command},
       {"plan", "IN --epsilon E", "bounds, rates, storage, memory and time foreseen; builds nothing",
        plan_command},

@@ -259,7 +259,8 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
   if (arc > 1.5 * std::numbers::pi && std::min(below, above) < 0.5 * std::max(below, above)) {
     throw InputError(fmt::format(
         "the axis projects onto column {:.2f} of {} in a scan over {:.0f} degrees: half acquisition, "
-        "which needs weights in u that this version does not have. `vdvr center` draws slices of it; join its "
+        "which needs weights in u that this version does not have. `vdvr center` draws slices of it; join "
+        "its "
         "opposite views to half a turn of a wider detector first, or correct `center`",
         g.center, g.columns, arc * 180 / std::numbers::pi));
   }

@@ -1,0 +1,170 @@
+// vdvr center: the centre that the data tell, how sure that is, and slices around it to look at.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/common/progress.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "vdvr/center_sheet.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/find_center.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+Json witness_json(const CenterWitness& w, int binning) {
+  return {{"center", unbinned_center(w.center, binning)},
+          {"uncertainty", w.uncertainty * binning},
+          {"quality", w.quality},
+          {"method", w.method}};
+}
+
+Json found_json(const std::optional<CenterEstimate>& found, int binning) {
+  if (!found) return nullptr;
+  Json json = witness_json(*found, binning);
+  json["sure"] = found->sure;
+  json["doubt"] = found->doubt;
+  json["others"] = Json::array();
+  for (const CenterWitness& w : found->others) json["others"].push_back(witness_json(w, binning));
+  return json;
+}
+
+/// Half a column, or as far as methods differ; without any of them a sixteenth of the detector in all.
+double step_of(const std::optional<CenterEstimate>& found, std::int64_t columns, std::int64_t count) {
+  const double half = 0.5 * std::ceil(static_cast<double>(columns) / 1024),
+               steps = static_cast<double>(count - 1);
+  if (!found) return std::max(half, static_cast<double>(columns) / 16 / steps);
+  if (found->sure) return half;
+  double reach = 4 * found->uncertainty;
+  for (const CenterWitness& w : found->others)
+    if (w.quality >= 0.5) reach = std::max(reach, 1.25 * std::abs(w.center - found->center));
+  return std::max(half, std::min(2 * reach, static_cast<double>(columns) / 8) / steps);
+}
+
+struct Wanted {
+  FieldOptions field;
+  std::int64_t row = -1, count = 15;
+  std::optional<double> step;
+};
+
+CenterSheetOptions sheet_of(const ProjectionSet& scan, const std::optional<CenterEstimate>& found,
+                            const Wanted& wanted) {
+  const int binning = wanted.field.preparation.binning;
+  const double middle = wanted.field.center ? *wanted.field.center
+                        : found             ? found->center
+                                            : scan.geometry.center;
+  const double step =
+      wanted.step ? *wanted.step / binning : step_of(found, scan.geometry.columns, wanted.count);
+  CenterSheetOptions options;
+  options.field = wanted.field;
+  options.row = wanted.row;
+  options.marked = static_cast<std::size_t>(wanted.count / 2);
+  for (std::int64_t k = 0; k < wanted.count; ++k) {
+    options.centers.push_back(middle + static_cast<double>(k - wanted.count / 2) * step);
+    options.captions.push_back(fmt::format("{:.2f}", unbinned_center(options.centers.back(), binning)));
+  }
+  options.title = fmt::format("{}: row {}, columns of the axis; marked {}", scan.report.name, wanted.row,
+                              wanted.field.center ? "as --center says"
+                              : !found            ? "the scan's own: none was found"
+                              : found->sure       ? "the centre found"
+                                                  : "the centre found, UNSURE");
+  return options;
+}
+
+void print_found(const std::optional<CenterEstimate>& found, int binning) {
+  if (!found) {
+    fmt::print("centre         not found: no method applies to these views, or none explains them\n");
+    return;
+  }
+  fmt::print("centre         {:.2f} +- {:.2g}, {}\n", unbinned_center(found->center, binning),
+             std::max(0.01, found->uncertainty * binning), found->sure ? "sure" : "UNSURE: " + found->doubt);
+  fmt::print("  method       {}, which explains {:.1f} %\n", found->method, 100 * found->quality);
+  for (const CenterWitness& w : found->others)
+    fmt::print("  beside it    {:.2f} +- {:.2g}, {}, which explains {:.1f} %\n",
+               unbinned_center(w.center, binning), std::max(0.01, w.uncertainty * binning), w.method,
+               100 * w.quality);
+}
+
+}  // namespace
+
+int center_command(Arguments& args) {
+  args.positional("IN", "projections")
+      .value("output,o", "SHEET.png",
+             "slices around the centre and a figure of merit; without it none are drawn")
+      .value("row", "R", "row of the detector (default the middle one)")
+      .value("step", "S", "columns from slice to slice (default 0.5, more where it is unsure)")
+      .value("count", "N", "slices, an odd number (default 15)");
+  add_scan(args);
+  add_field(args);
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const auto path = args.path("IN");
+  Wanted wanted;
+  wanted.field = field_options(args);
+  wanted.count = args.integer_or("count", wanted.count, 3, 99);
+  if (wanted.count % 2 == 0)
+    throw InputError(
+        fmt::format("--count: {} is even; the slice in the middle needs an odd one", wanted.count));
+  if (args.has("step")) wanted.step = args.positive_or("step", 0);
+  const bool draws = args.has("output");
+  if (!draws) refuse(args, {"row", "step", "count"}, "is for the sheet, which --output asks for");
+  if (draws) {
+    if (args.path("output").extension() != ".png")
+      throw InputError(fmt::format("{}: write the sheet as .png", args.text("output")));
+    check_output(args.path("output"), common.force, {path});
+  }
+
+  ProgressLine progress(args.who(), common.quiet);
+  const ProjectionSet scan = load_any_scan(path, args, wanted.field, progress.callback());
+  const int binning = wanted.field.preparation.binning;
+  wanted.row =
+      args.integer_or("row", scan.geometry.rows * binning / 2, 0, scan.geometry.rows * binning - 1) / binning;
+  report(progress.callback(), "search", 0);
+  const auto found = find_center(scan);
+  Json json = {{"file", path.string()},
+               {"geometry", geometry_json(scan.geometry)},
+               {"report", report_json(scan.report)},
+               {"found", found_json(found, binning)}};
+  std::optional<CenterSheet> sheet;
+  CenterSheetOptions options;
+  if (draws) {
+    Device device = open_device(common);
+    options = sheet_of(scan, found, wanted);
+    sheet = center_sheet(device, scan, options, progress.callback());
+    throw_if_stopped();
+    write_png(args.path("output"), sheet->image);
+    Json slices = Json::array();
+    for (std::size_t k = 0; k < options.centers.size(); ++k)
+      slices.push_back(
+          {{"center", unbinned_center(options.centers[k], binning)}, {"merit", sheet->merit[k]}});
+    json["sheet"] = {
+        {"output", args.text("output")},
+        {"row", wanted.row * binning},
+        {"slices", slices},
+        {"best", sheet->best ? Json(unbinned_center(options.centers[*sheet->best], binning)) : Json()},
+        {"joined", sheet->joined}};
+  }
+  progress.clear();
+  json["seconds"] = seconds_json(progress.seconds());
+  print_result(common, json, [&] {
+    print_found(found, binning);
+    fmt::print("in use         {:.2f}, from: {}\n", unbinned_center(scan.geometry.center, binning),
+               scan.report.center_source);
+    if (sheet) {
+      if (sheet->best)
+        fmt::print("merit          best at {:.2f} of the slices\n",
+                   unbinned_center(options.centers[*sheet->best], binning));
+      else fmt::print("merit          best at an end of the slices, so it says nothing\n");
+      if (sheet->joined)
+        fmt::print(
+            "half acquired  slices are of opposite views joined; `reconstruct` and `build` do not do that\n");
+      fmt::print("written        {}\n", args.text("output"));
+    }
+  });
+  return 0;
+}
+
+}  // namespace vdvr::cli
