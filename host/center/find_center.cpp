@@ -36,6 +36,10 @@ void decide(CenterEstimate& found, const std::vector<CenterWitness>& halves, dou
     found.doubt = fmt::format("the views leave it open by {:.2g} columns", found.uncertainty);
     return;
   }
+  if (!halves.empty() && rival > most_rival) {
+    found.doubt = "another place on the detector fits nearly as well";
+    return;
+  }
   const auto says = [&](bool for_it, double uncertainty) {
     return std::find_if(found.others.begin(), found.others.end(), [&](const CenterWitness& w) {
       return speaks(w, uncertainty) && agree(found, w) == for_it;
@@ -52,11 +56,20 @@ void decide(CenterEstimate& found, const std::vector<CenterWitness>& halves, dou
     return;
   }
   // Of opposite views or rays alone: each half of them says the same, and no other place comes near.
-  if (rival > most_rival) found.doubt = "another place on the detector fits nearly as well";
-  else if (!speaks(halves[0]) || !speaks(halves[1]) || !agree(halves[0], halves[1]))
+  if (!speaks(halves[0]) || !speaks(halves[1]) || !agree(halves[0], halves[1]))
     found.doubt = fmt::format("the halves of its views differ by {:.2f} columns",
                               std::abs(halves[0].center - halves[1].center));
   found.sure = found.doubt.empty();
+}
+
+// Rows that are constant but for rounding have no mirror, though tapers and rounding errors do.
+bool is_flat(const ProjectionSet& scan) {
+  const std::int64_t U = scan.geometry.columns;
+  for (std::size_t at = 0; at < scan.data.size(); at += static_cast<std::size_t>(U)) {
+    const auto [low, high] = std::minmax_element(scan.data.data() + at, scan.data.data() + at + U);
+    if (*high - *low > 1e-5f * std::max(std::abs(*low), std::abs(*high))) return false;
+  }
+  return true;
 }
 
 std::optional<CenterEstimate> of_cone(const ProjectionSet& scan) {
@@ -74,6 +87,7 @@ std::optional<CenterEstimate> find_center(const ProjectionSet& scan) {
   if (static_cast<std::int64_t>(scan.data.size()) != scan.size())
     throw InputError(fmt::format("{} samples for {} views of {} x {}", scan.data.size(),
                                  scan.geometry.views(), scan.geometry.rows, scan.geometry.columns));
+  if (is_flat(scan)) return std::nullopt;
   if (scan.cone) return of_cone(scan);
   const auto opposite = center::from_opposite_views(scan);
   std::vector<CenterWitness> all;

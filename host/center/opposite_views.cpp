@@ -33,10 +33,12 @@ void for_opposite_views(const std::vector<double>& theta, double tolerance, cons
 std::vector<Opposite> opposite_views(const std::vector<double>& theta, std::int64_t most) {
   const double step = median_step(theta);
   constexpr double slack = 1 + 1e-6;  // an odd number of views over a turn is off by half a step to rounding
-  double best = step / 2 * slack;
+  // Beyond 5 degrees views are too unlike to be compared.
+  const double most_mismatch = std::min(step / 2 * slack, pi / 36);
+  double best = most_mismatch;
   for_opposite_views(theta, best, [&](const Opposite& o) { best = std::min(best, o.mismatch); });
   std::vector<Opposite> pairs;
-  for_opposite_views(theta, std::min(std::max(best * slack, step / 20), step / 2 * slack),
+  for_opposite_views(theta, std::min(std::max(best * slack, step / 20), most_mismatch),
                      [&](const Opposite& o) { pairs.push_back(o); });
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const Opposite& a, const Opposite& b) { return a.angle < b.angle; });

@@ -119,7 +119,9 @@ void centred_text(Image& image, std::int64_t x, std::int64_t y, const std::strin
 }
 
 struct Slices {
-  std::int64_t side = 0;
+  std::int64_t side = 0;  // of a slice, in samples
+  std::int64_t zoom = 1;  // pixels of a sample
+  [[nodiscard]] std::int64_t pixels() const { return side * zoom; }
   std::vector<std::vector<float>> values;  // [slice][y][x]
 };
 
@@ -131,10 +133,14 @@ std::pair<float, float> window_of(const Slices& slices, std::size_t marked) {
   return {sorted[cut], sorted[sorted.size() - 1 - cut]};
 }
 
+std::string merit_text(const CenterSheet& sheet) {
+  return sheet.sharpness ? "figure of merit: mean |slice| / its root mean square; least is best"
+                         : "figure of merit: integral of |slice| / integral of |view|; least is best";
+}
+
 void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& options, const CenterSheet& sheet) {
   const std::int64_t x0 = kEdge + 10, x1 = image.width - kEdge - 10, y0 = top + kLine, y1 = y0 + kChart;
-  draw_text(image, kEdge, top,
-            "figure of merit by centre: mean |slice| over mean |line integral|; least is best", 2, kInk);
+  draw_text(image, kEdge, top, merit_text(sheet), 2, kInk);
   const auto [low, high] = std::minmax_element(sheet.merit.begin(), sheet.merit.end());
   const double first = options.centers.front(), span = options.centers.back() - first;
   const auto place = [&](std::size_t i) {
@@ -160,7 +166,7 @@ void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& option
 
 Image draw(const CenterSheetOptions& options, const Slices& slices, const CenterSheet& sheet) {
   const auto count = static_cast<std::int64_t>(slices.values.size()), across = std::min(kAcross, count),
-             down = (count + across - 1) / across, tile = slices.side + kGap;
+             down = (count + across - 1) / across, tile = slices.pixels() + kGap;
   Image image{
       2 * kEdge + across * tile, kEdge + kLine + down * (tile + kLine) + 2 * kLine + kChart + kEdge, {}};
   image.rgb.assign(static_cast<std::size_t>(image.width * image.height * 3), kPaper[0]);
@@ -169,15 +175,15 @@ Image draw(const CenterSheetOptions& options, const Slices& slices, const Center
   for (std::int64_t k = 0; k < count; ++k) {
     const std::int64_t x0 = kEdge + k % across * tile, y0 = kEdge + kLine + k / across * (tile + kLine);
     const auto s = static_cast<std::size_t>(k);
-    if (s == options.marked) fill(image, x0 - 4, y0 - 4, slices.side + 8, slices.side + 8, kMark);
+    if (s == options.marked) fill(image, x0 - 4, y0 - 4, slices.pixels() + 8, slices.pixels() + 8, kMark);
     for (std::int64_t y = 0; y < slices.side; ++y)
       for (std::int64_t x = 0; x < slices.side; ++x) {
         const float v = slices.values[s][static_cast<std::size_t>(y * slices.side + x)];
         const float part = high > low ? std::clamp((v - low) / (high - low), 0.0f, 1.0f) : 0.5f;
         const auto grey = static_cast<std::uint8_t>(std::lround(255 * part));
-        fill(image, x0 + x, y0 + y, 1, 1, {grey, grey, grey});
+        fill(image, x0 + x * slices.zoom, y0 + y * slices.zoom, slices.zoom, slices.zoom, {grey, grey, grey});
       }
-    centred_text(image, x0 + slices.side / 2, y0 + slices.side + 8, options.captions[s],
+    centred_text(image, x0 + slices.pixels() / 2, y0 + slices.pixels() + 8, options.captions[s],
                  s == options.marked ? kMark : kInk);
   }
   draw_chart(image, kEdge + kLine + down * (tile + kLine), options, sheet);
@@ -209,18 +215,31 @@ double height_of(const ProjectionSet& scan, std::int64_t row) {
   return (static_cast<double>(row) - middle) * scan.geometry.pitch_v;
 }
 
-// The mean magnitude over the disc that every slice covers.
-double magnitude(const std::vector<float>& slice, std::int64_t side) {
+// Of a view's magnitude along its row; of half a turn, that of a slice which is nowhere negative.
+double mean_integral(const ProjectionSet& row) {
   double sum = 0;
-  std::int64_t count = 0;
+  for (const float p : row.data) sum += std::abs(static_cast<double>(p));
+  return sum * row.geometry.pitch_u / static_cast<double>(row.geometry.views() * row.geometry.rows);
+}
+
+struct Means {
+  double magnitude = 0, square = 0;
+};
+
+// Over the disc that every slice covers.
+Means means_of(const std::vector<float>& slice, std::int64_t side) {
+  Means sum;
+  double count = 0;
   const double middle = 0.5 * static_cast<double>(side - 1), radius = 0.95 * middle;
   for (std::int64_t y = 0; y < side; ++y)
     for (std::int64_t x = 0; x < side; ++x)
       if (std::hypot(static_cast<double>(x) - middle, static_cast<double>(y) - middle) <= radius) {
-        sum += std::abs(static_cast<double>(slice[static_cast<std::size_t>(y * side + x)]));
+        const auto v = static_cast<double>(slice[static_cast<std::size_t>(y * side + x)]);
+        sum.magnitude += std::abs(v);
+        sum.square += v * v;
         ++count;
       }
-  return sum / static_cast<double>(std::max<std::int64_t>(1, count));
+  return {sum.magnitude / count, sum.square / count};
 }
 
 }  // namespace
@@ -231,7 +250,11 @@ CenterSheet center_sheet(Device& device, const ProjectionSet& scan, const Center
   const ProjectionSet row = row_of(scan, options.row);
   CenterSheet sheet;
   sheet.joined = !scan.cone && is_half_acquisition(scan.geometry, options.centers[options.marked]);
-  const auto at = [&](double center) { return sheet.joined ? joined(row, center) : with_center(row, center); };
+  // Streaks of half a turn; of a full one the two halves blur each other.
+  sheet.sharpness = !sheet.joined && arc_of(scan.geometry) > 1.5 * pi;
+  const auto at = [&](double center) {
+    return sheet.joined ? joined(row, center) : with_center(row, center);
+  };
   ReconstructOptions reconstruction;
   reconstruction.field = options.field;
   reconstruction.field.center.reset();
@@ -250,17 +273,16 @@ CenterSheet center_sheet(Device& device, const ProjectionSet& scan, const Center
   wanted.spacing = diameter / static_cast<double>(cells);
   wanted.spacing_z = scan.geometry.pitch_v;
   wanted.origin = Vec3{-diameter / 2, -diameter / 2, height_of(scan, options.row)};
-  double integrals = 0;
-  for (const float p : row.data)
-    integrals += std::abs(static_cast<double>(p)) / static_cast<double>(row.data.size());
-  Slices slices{cells + 1, {}};
+  constexpr std::int64_t fewest_pixels = 240;
+  Slices slices{cells + 1, (fewest_pixels + cells) / (cells + 1), {}};
   for (std::size_t k = 0; k < options.centers.size(); ++k) {
     report(progress, "slices", static_cast<double>(k) / static_cast<double>(options.centers.size()));
     const ProjectionSet one = at(options.centers[k]);
     const Volume volume = reconstruct(device, one, make_grid(one, wanted), reconstruction);
     slices.values.emplace_back(volume.samples.begin(), volume.samples.begin() + slices.side * slices.side);
-    const double mean = magnitude(slices.values.back(), slices.side);
-    sheet.merit.push_back(integrals > 0 ? mean * diameter / integrals : 0);
+    const Means mean = means_of(slices.values.back(), slices.side);
+    const double over = sheet.sharpness ? std::sqrt(mean.square) : mean_integral(one) / (diameter * diameter);
+    sheet.merit.push_back(over > 0 ? mean.magnitude / over : 0);
   }
   const auto best = static_cast<std::size_t>(std::min_element(sheet.merit.begin(), sheet.merit.end()) -
                                              sheet.merit.begin());

@@ -26,11 +26,13 @@ struct CenterSheetOptions {
 
 struct CenterSheet {
   Image image;
-  /// The mean magnitude over that of the line integrals (Donath et al., Journal of the Optical Society of
-  /// America A 23, 2006, 1048, their metric of absolute values): a wrong centre throws streaks to both sides
-  /// of 0. By centre; the least is the best.
+  /// By centre; the least is the best. Of half a turn the integral of the magnitude over that of a view
+  /// (Donath et al., Journal of the Optical Society of America A 23, 2006, 1048, their metric of absolute
+  /// values): a wrong centre throws streaks to both sides of 0. Of a full turn the mean magnitude over the
+  /// root mean square: there a wrong centre blurs.
   std::vector<double> merit;
   std::optional<std::size_t> best;  ///< of merit, where it has a least one that is not the first or the last
+  bool sharpness = false;           ///< the merit is that of a full turn
   bool joined = false;  ///< half acquisition: opposite views were joined to views of a wider detector
 };
 
