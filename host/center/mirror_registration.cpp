@@ -58,10 +58,11 @@ double likelihood(const RowBands& d, const std::vector<Pair>& pairs, std::int64_
         xx += a * a, yy += b * b, xy += a * b;
       }
     }
-  // 1e-12: rows without noise have a finite likelihood too.
+  // Of rows without noise a thousandth is left by interpolation and edges, wherever they fit.
+  constexpr double least_rest = 1e-3;
   if (!(xy > 0) || !(xx > 0) || !(yy > 0)) return 0;
   const double r2 = xy / xx * (xy / yy);
-  return -0.5 * static_cast<double>(last - first + 1) * std::log(std::max(1 - r2, 1e-12));
+  return -0.5 * static_cast<double>(last - first + 1) * std::log(std::max(1 - r2, least_rest));
 }
 
 }  // namespace

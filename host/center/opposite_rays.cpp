@@ -81,7 +81,7 @@ Fit fit_at(const Orbit& orbit, const std::vector<std::int64_t>& views, double c)
   if (!(n > 0) || !(xx > 0) || !(yy > 0)) return {};
   Fit fit;
   fit.correlation = xy / std::sqrt(xx * yy);
-  const double rest = std::max(1 - fit.correlation * fit.correlation, 1e-12);
+  const double rest = std::max(1 - fit.correlation * fit.correlation, 1e-3);
   fit.likelihood = fit.correlation > 0 ? -0.5 * n / static_cast<double>(views.size()) * std::log(rest) : 0;
   return fit;
 }

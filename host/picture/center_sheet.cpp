@@ -55,6 +55,33 @@ double linear_at(const float* row, std::int64_t columns, double at) {
   return (1 - f) * value(j) + f * value(j + 1);
 }
 
+// The view nearest to the one that looks from the other side.
+std::int64_t opposite_of(const ParallelGeometry& g, double theta) {
+  const auto off = [&](double t) { return std::abs(std::remainder(t - theta - pi, 2 * pi)); };
+  return std::min_element(g.theta_rad.begin(), g.theta_rad.end(),
+                          [&](double a, double b) { return off(a) < off(b); }) -
+         g.theta_rad.begin();
+}
+
+// Of the columns that opposite views both see: squares of the difference over those of the views.
+double mismatch(const ProjectionSet& row, double center) {
+  const ParallelGeometry& g = row.geometry;
+  const auto reach =
+      static_cast<std::int64_t>(std::floor(std::min(center, static_cast<double>(g.columns - 1) - center)));
+  double apart = 0, both = 0;
+  for (std::int64_t k = 0; k < g.views(); ++k) {
+    const std::int64_t opposite = opposite_of(g, g.theta_rad[static_cast<std::size_t>(k)]);
+    const float *own = row.data.data() + k * g.columns, *other = row.data.data() + opposite * g.columns;
+    for (std::int64_t t = -reach; t <= reach; ++t) {
+      const double a = linear_at(own, g.columns, center + static_cast<double>(t)),
+                   b = linear_at(other, g.columns, center - static_cast<double>(t));
+      apart += (a - b) * (a - b);
+      both += a * a + b * b;
+    }
+  }
+  return both > 0 ? apart / both : 0;
+}
+
 // The first half turn of the views, each with its opposite one beyond the axis, which is then the middle of a
 // wider detector. Where both see, the weight goes over from one to the other.
 ProjectionSet joined(const ProjectionSet& row, double center) {
@@ -72,14 +99,7 @@ ProjectionSet joined(const ProjectionSet& row, double center) {
   for (std::int64_t k = 0; k < g.views(); ++k) {
     const double theta = g.theta_rad[static_cast<std::size_t>(k)];
     if (theta - first >= pi * (1 - 1e-9)) continue;
-    const auto opposite = std::min_element(g.theta_rad.begin(), g.theta_rad.end(),
-                                           [&](double a, double b) {
-                                             const auto off = [&](double t) {
-                                               return std::abs(std::remainder(t - theta - pi, 2 * pi));
-                                             };
-                                             return off(a) < off(b);
-                                           }) -
-                          g.theta_rad.begin();
+    const auto opposite = opposite_of(g, theta);
     out.geometry.theta_rad.push_back(theta);
     const float *own = row.data.data() + k * g.columns, *other = row.data.data() + opposite * g.columns;
     for (std::int64_t i = 0; i < out.geometry.columns; ++i) {
@@ -134,6 +154,7 @@ std::pair<float, float> window_of(const Slices& slices, std::size_t marked) {
 }
 
 std::string merit_text(const CenterSheet& sheet) {
+  if (sheet.joined) return "figure of merit: difference of opposite views where both see; least is best";
   return sheet.sharpness ? "figure of merit: mean |slice| / its root mean square; least is best"
                          : "figure of merit: integral of |slice| / integral of |view|; least is best";
 }
@@ -280,6 +301,10 @@ CenterSheet center_sheet(Device& device, const ProjectionSet& scan, const Center
     const ProjectionSet one = at(options.centers[k]);
     const Volume volume = reconstruct(device, one, make_grid(one, wanted), reconstruction);
     slices.values.emplace_back(volume.samples.begin(), volume.samples.begin() + slices.side * slices.side);
+    if (sheet.joined) {
+      sheet.merit.push_back(mismatch(row, options.centers[k]));
+      continue;
+    }
     const Means mean = means_of(slices.values.back(), slices.side);
     const double over = sheet.sharpness ? std::sqrt(mean.square) : mean_integral(one) / (diameter * diameter);
     sheet.merit.push_back(over > 0 ? mean.magnitude / over : 0);

@@ -29,7 +29,8 @@ struct CenterSheet {
   /// By centre; the least is the best. Of half a turn the integral of the magnitude over that of a view
   /// (Donath et al., Journal of the Optical Society of America A 23, 2006, 1048, their metric of absolute
   /// values): a wrong centre throws streaks to both sides of 0. Of a full turn the mean magnitude over the
-  /// root mean square: there a wrong centre blurs.
+  /// root mean square: there a wrong centre blurs. Of a half acquisition, whose slices may be cut, the
+  /// squares of what opposite views differ by where both see, over their own.
   std::vector<double> merit;
   std::optional<std::size_t> best;  ///< of merit, where it has a least one that is not the first or the last
   bool sharpness = false;           ///< the merit is that of a full turn
