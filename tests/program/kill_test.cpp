@@ -243,12 +243,15 @@ BOOST_AUTO_TEST_CASE(run_killed_and_resumed_has_the_same_content_and_all_its_fil
   std::map<std::string, std::string> files;  // bytes of each, uninterrupted
   for (const auto& entry : fs::directory_iterator(w.out))
     files[entry.path().filename().string()] = vdvr::support::bytes_of(entry.path());
-  // What stands under its own name is whole: pictures to the bit, the volume by its hash, JSON to its end.
+  // What stands under its own name is whole: pictures to the bit, the volume by its hash, JSON and the page
+  // to their ends.
   const auto is_whole = [&](const fs::path& path) {
     const std::string name = path.filename().string();
     if (!files.contains(name)) return false;
     if (path.extension() == ".png") return vdvr::support::bytes_of(path) == files[name];
     if (path.extension() == ".vdvr") return vdvr::content_sha256(vdvr::read_vdvr(path).volume) == w.hash;
+    // The page names seconds of its own run.
+    if (path.extension() == ".html") return vdvr::support::bytes_of(path).ends_with("</html>\n");
     return nlohmann::json::accept(vdvr::support::bytes_of(path));
   };
   std::mt19937 random(60);
