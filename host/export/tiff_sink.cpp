@@ -2,14 +2,13 @@
 #include "host/export/tiff_sink.hpp"
 
 #include <fmt/format.h>
-#include <tiffio.h>
 
 #include <algorithm>
 #include <array>
-#include <cstdarg>
 #include <cstdio>
 #include <fstream>
 
+#include "host/io/tiff_messages.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -19,14 +18,6 @@ namespace vdvr {
 namespace {
 
 namespace fs = std::filesystem;
-
-int keep_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
-  std::array<char, 512> text{};
-  std::vsnprintf(text.data(), text.size(), format, arguments);
-  auto& message = *static_cast<std::string*>(user);
-  if (message.empty()) message = text.data();
-  return 1;  // handled: the global handlers stay silent
-}
 
 /// A TIFF file that is being written.
 class Pages {
@@ -48,8 +39,8 @@ class Pages {
     const bool big = (page_bytes_ + tags_of_page) * static_cast<std::uint64_t>(pages) > classic;
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
                                                                                    &TIFFOpenOptionsFree);
-    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_message, &message_);
-    TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_message, &ignored_);
+    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), io::keep_tiff_message, &message_);
+    TIFFOpenOptionsSetWarningHandlerExtR(options.get(), io::keep_tiff_message, &ignored_);
     tiff_.reset(TIFFOpenExt(file.c_str(), big ? "w8l" : "wl", options.get()));
     if (!tiff_) fail();
   }

@@ -2,7 +2,6 @@
 #include "host/io/tiff.hpp"
 
 #include <fmt/format.h>
-#include <tiffio.h>
 
 #include <algorithm>
 #include <array>
@@ -11,19 +10,12 @@
 #include <cstring>
 #include <memory>
 
+#include "host/io/tiff_messages.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
 namespace {
-
-int keep_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
-  std::array<char, 512> text{};
-  std::vsnprintf(text.data(), text.size(), format, arguments);
-  auto& message = *static_cast<std::string*>(user);
-  if (message.empty()) message = text.data();
-  return 1;  // handled: the global handlers stay silent
-}
 
 int ignore_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
@@ -42,7 +34,7 @@ class Reader {
     if (file_bytes_ == 0) throw FileError(path_ + ": is empty");
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
                                                                                    &TIFFOpenOptionsFree);
-    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_message, &message_);
+    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_tiff_message, &message_);
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), ignore_message, nullptr);
     // libtiff itself holds tables and packed strips, none longer than the file but for its own small buffers;
     // samples go into memory of ours, which read_header asks for.

@@ -100,18 +100,16 @@ std::filesystem::path folder_beside(const std::filesystem::path& target) {
   return name;
 }
 
-void remove_tree(const std::filesystem::path& path) {
-  std::error_code ignored;
-  std::filesystem::remove_all(path, ignored);
+void forget_tree(const std::filesystem::path& path) {
   Temporaries& all = temporaries();
   const std::lock_guard guard(all.lock);
   all.trees.erase(path);
 }
 
-void forget_tree(const std::filesystem::path& path) {
-  Temporaries& all = temporaries();
-  const std::lock_guard guard(all.lock);
-  all.trees.erase(path);
+void remove_tree(const std::filesystem::path& path) {
+  std::error_code ignored;
+  std::filesystem::remove_all(path, ignored);
+  forget_tree(path);
 }
 
 /// All that was written to the disk of `path`: one call for thousands of small files.

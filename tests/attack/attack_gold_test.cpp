@@ -147,7 +147,10 @@ BOOST_AUTO_TEST_CASE(second_differences_err_by_no_more_than_is_charged) {
       }
   }
   BOOST_TEST_MESSAGE("  second differences: error / bound " << closest);
-  BOOST_TEST(closest >= 0.02);
+  // An attack that comes nowhere near tests nothing. This one reaches a sixth: the bound charges the sups of
+  // all views at once, and of noise only some add up.
+  constexpr double weakest_attack = 0.1;
+  BOOST_TEST(closest >= weakest_attack);
 }
 
 // Every filtered sample wrong by e, with the signs that add up at a node.

@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 
+#include "tests/support/tolerance.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -75,7 +76,8 @@ BOOST_AUTO_TEST_CASE(planned_before_or_at_once_it_is_the_same_volume) {
 BOOST_AUTO_TEST_CASE(a_region_of_interest_makes_the_default_grid_as_large_as_it) {
   CertifyOptions options;
   options.build.roi = {-5.5, -2, -1, 1, 6.25, 2};
-  const Tolerance tolerance{{}, 0.05};
+  constexpr double asked = 1.0 / 20;  // of the certificate, not of this test
+  const Tolerance tolerance{{}, asked};
   const BuildResult part = certify(device(), scan(), tolerance, options);
   const Plan whole = make_plan(device(), scan(), tolerance),
              planned = make_plan(device(), scan(), tolerance, options);
@@ -135,7 +137,7 @@ BOOST_AUTO_TEST_CASE(a_region_of_interest_beyond_the_scan_is_refused) {
 }
 
 BOOST_AUTO_TEST_CASE(a_tolerance_out_of_reach_is_refused) {
-  BOOST_CHECK_THROW(certify(device(), scan(), part_of_range(1e-9)), ToleranceError);
+  BOOST_CHECK_THROW(certify(device(), scan(), part_of_range(tolerance::unit_roundoff)), ToleranceError);
   BOOST_CHECK_THROW(certify(device(), scan(), part_of_range(0)), InputError);
 }
 

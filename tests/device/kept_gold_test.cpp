@@ -163,8 +163,10 @@ BOOST_AUTO_TEST_CASE(gold_of_any_lattice_is_within_its_errors_of_the_field) {
     for (const int rate : c.rates) {
       const GoldLattice lattice = kept.lattice(c.grid, rate);
       const GoldErrors e = kept.errors(lattice);
-      // Six taps and sixteen: a hundred-thousandth of what the field can be, but for the ramp.
-      BOOST_TEST(e.interpolation <= 2e-5 * chain.sups.value);
+      // What docs/error-bounds.md, section 16, allows the filters along one axis. Of parallel beam all three
+      // together stay below it, so that gold's share of a tolerance does not grow unseen.
+      constexpr double most_of_filters = 2e-5;
+      BOOST_TEST(e.interpolation <= most_of_filters * chain.sups.value);
       const Nodes nodes = nodes_of(kept, lattice, whole(c.grid, rate, 3), 64);
       const Compared r = compare(chain, c.grid, rate, nodes, c.reach, e.interpolation + e.rounding + e.ramp);
       BOOST_TEST_MESSAGE(c.name << ", " << rate << "x (" << lattice.phases[0] << " / " << lattice.step[0]

@@ -65,11 +65,12 @@ CenterSheetOptions sheet_of(const ProjectionSet& scan, const std::optional<Cente
     options.centers.push_back(middle + static_cast<double>(k - wanted.count / 2) * step);
     options.captions.push_back(fmt::format("{:.2f}", unbinned_center(options.centers.back(), binning)));
   }
-  options.title = fmt::format("{}: row {}, columns of the axis; marked {}", scan.report.name, wanted.row * binning,
-                              wanted.field.center ? "as --center says"
-                              : !found            ? "the scan's own: none was found"
-                              : found->sure       ? "the centre found"
-                                                  : "the centre found, UNSURE");
+  options.title =
+      fmt::format("{}: row {}, columns of the axis; marked {}", scan.report.name, wanted.row * binning,
+                  wanted.field.center ? "as --center says"
+                  : !found            ? "the scan's own: none was found"
+                  : found->sure       ? "the centre found"
+                                      : "the centre found, UNSURE");
   return options;
 }
 
