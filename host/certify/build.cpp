@@ -5,21 +5,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
-#include "host/bounds/covered_range.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
-#include "host/certify/classify_bricks.hpp"
 #include "host/certify/close_boundaries.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/certify/fill_certificate.hpp"
 #include "host/certify/raise_levels.hpp"
 #include "host/certify/result_units.hpp"
+#include "host/crew/crew.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
-#include "host/gold/worst_node.hpp"
+#include "host/gold/prepared_scan.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
 #include "host/system/casts.hpp"
@@ -33,29 +31,32 @@ namespace {
 // Of scratch, where the device has no limit.
 constexpr std::uint64_t least_resident = std::uint64_t{64} << 20;
 
-class Stopwatch {
- public:
-  explicit Stopwatch(std::map<std::string, double>& seconds) : seconds_(seconds) {}
-  void lap(const std::string& stage) {
-    const auto now = std::chrono::steady_clock::now();
-    seconds_[stage] += std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-  }
-
- private:
-  std::map<std::string, double>& seconds_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
 // Where bricks of the region read it, the base that suits the trilinear filter best; elsewhere F. The plan
 // gives its samples away.
 std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, Plan& plan,
                                const GoldSettings& settings, const std::vector<std::uint8_t>& selected,
-                               const Progress& progress) {
+                               Crew* crew, const Progress& progress) {
   std::vector<float> base = take_base(std::exchange(plan.base, {}), plan.layout.coarsening);
-  if (plan.settings.comparison.coefficients == Coefficients::midrange)
-    fit_base_samples(state, from.filtered, from.sups, settings, selected, base, progress,
-                     from.source(settings));
+  if (plan.settings.comparison.coefficients != Coefficients::midrange) return base;
+  GoldStream gold(state, from.filtered, from.sups, fitting_settings(settings), from.source(settings));
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::fit;
+  pass.purpose = GoldStream::For::samples;
+  pass.selected = bricks_to_fit(gold, settings, selected);
+  const auto shared = std::make_shared<const BlockPass>(std::move(pass));
+  // Where blocks meet, the later one in the order of a single device counts.
+  std::map<std::array<std::int64_t, 8>, Bytes> records;
+  run_blocks(crew, gold, shared, nullptr, gold.works(shared->selected, shared->purpose),
+             [&](const Bytes& record) {
+               ByteReader in(record);
+               records[get_key(in).place()] = record;
+             },
+             progress, "fit");
+  for (const auto& [place, record] : records) {
+    ByteReader in(record);
+    get_key(in);
+    read_fit(in, [&](std::size_t i, float sample) { base.at(i) = sample; });
+  }
   return base;
 }
 
@@ -67,19 +68,6 @@ Lattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units
                         units.density());
 }
 
-// What every step of a build reads. All but the scan, and what is thrown, in `units`.
-struct Inputs {
-  opencl::State& state;
-  const Units& units;
-  const Plan& plan;
-  const std::vector<std::uint8_t>& selected;  // by brick: in the region of interest
-  JournalledRates& gold;
-  double arithmetic = 0;  // fp32 error bound of any gold sample
-  const Room& room;       // for what is made of the bricks
-  const Progress& progress;
-  Stopwatch& watch;
-};
-
 Room room_for(const opencl::State& state, const ProjectionSet& scan, const BuildOptions& options) {
   const std::uint64_t share = state.memory.limit() / 8;
   if (share == 0 && !options.in_memory_bytes) return {};
@@ -90,14 +78,6 @@ Room room_for(const opencl::State& state, const ProjectionSet& scan, const Build
                                   std::max(share, least_resident));
   return room;
 }
-
-// A closed and packed volume that was measured, node by node, to be within a tolerance.
-struct Measured {
-  MixedVolume volume;
-  std::vector<BrickMeasure> bricks;
-  ClassifyBricks::Bounds slack;
-  std::int64_t repaired = 0;  // bricks that closing raised
-};
 
 GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const Lattice& lattice, bool cone) {
   const Comparison& comparison = plan.settings.comparison;
@@ -176,7 +156,30 @@ double node_tolerance(const Inputs& in, const SamplerTerms& sampler) {
                                    to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 
-void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, double tolerance) {
+// Of blocks of either rate, which lie on one lattice: whole cells of it, in order, that hold as many bricks to
+// test as those of the other shares.
+void keep_share(const Inputs& in, const BuildShare& share, std::vector<std::uint8_t>& near) {
+  const Bricks bricks(in.plan.grid, in.plan.layout.granularity);
+  const Index3 n = bricks.along(), block = in.rates.block_bricks();
+  const auto total = std::max<std::int64_t>(1, std::count(near.begin(), near.end(), 1));
+  std::int64_t before = 0;
+  Index3 c{};
+  for (c[2] = 0; c[2] < n[2]; c[2] += block[2])
+    for (c[1] = 0; c[1] < n[1]; c[1] += block[1])
+      for (c[0] = 0; c[0] < n[0]; c[0] += block[0]) {
+        const bool mine = before * share.parts / total == share.part - 1;
+        for (std::int64_t z = c[2]; z < std::min(n[2], c[2] + block[2]); ++z)
+          for (std::int64_t y = c[1]; y < std::min(n[1], c[1] + block[1]); ++y)
+            for (std::int64_t x = c[0]; x < std::min(n[0], c[0] + block[0]); ++x) {
+              std::uint8_t& brick = near[at(bricks.number({x, y, z}))];
+              before += brick;
+              brick = brick && mine;
+            }
+      }
+}
+
+void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, double tolerance,
+              const BuildShare& share = {}) {
   // Gold computed in two blocks differs by rounding; a brick at the gold rate must pass all the same. The
   // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
   double largest = 0;
@@ -185,7 +188,10 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
   // Those that may hold a tested node.
   std::vector<std::uint8_t> near = in.gold.fine.gold().bricks_near_coverage();
   for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && in.selected[i];
-  const DeviceField base(in.state, as_mixed(bricks.base, in.gold.fine.gold().settings()));
+  keep_share(in, share, near);
+  const MixedVolume level0 = as_mixed(bricks.base, in.gold.fine.gold().settings());
+  const DeviceField base(in.state, level0);
+  if (in.crew) in.crew->use(level0, in.room);
   test.classify(base, strict, near);
   in.watch.lap("classify");
 }
@@ -259,6 +265,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
     closed_bytes = memory_bytes(volume);
     in.watch.lap("close");
     const DeviceField field(in.state, volume, in.room.for_bytes(sample_buffer_bytes(volume)));
+    if (in.crew) in.crew->use(volume, in.room);
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
     in.watch.lap("verify");
     for (;;) {
@@ -283,107 +290,18 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   }
 }
 
-// The volume of these base samples within the tolerance.
+// The volume of these base samples within the tolerance; of a share, what it classifies, and no volume.
 Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
-                         double tolerance, const Accept& accept) {
+                         double tolerance, const Accept& accept, const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
   std::optional<ClassifyBricks> test;
-  test.emplace(in.state, in.gold, bricks, tiles, in.progress,
+  test.emplace(in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
-  classify(in, *test, bricks, tolerance);
+  classify(in, *test, bricks, tolerance, share.value_or(BuildShare{}));
+  if (share) return {};
   return close_and_measure(in, *test, bricks, tolerance, accept);
-}
-
-// The node at which the largest measure lies, on the gold that decided its brick. A brick's border can be
-// tested for its neighbours' sake alone, which computed by itself it does not show: then the brick's first
-// node.
-Vec3 position_of(const Inputs& in, const MixedVolume& volume, const BrickMeasure& worst) {
-  GoldStream& fine = in.gold.fine.gold();
-  GoldStream& gold = in.gold.coarse && worst.rate != fine.settings().rate ? in.gold.coarse->gold() : fine;
-  std::vector<std::uint8_t> one(in.selected.size(), 0);
-  one[at(worst.brick)] = 1;
-  std::optional<Vec3> where;
-  gold.run(
-      one, [&](GoldStream::Batch& batch) { where = worst_node(batch, volume, worst.brick, worst.rate); }, {},
-      "worst");
-  if (where) return *where;
-  const Bricks bricks(volume.grid, volume.granularity);
-  return volume.grid.position(bricks.first_cell(bricks.position(worst.brick)));
-}
-
-Certificate certify(const Inputs& in, const Device& device, const ProjectionSet& scan,
-                    const FilteredScan& filtered, const BuildOptions& options, const Measured& measured,
-                    const SamplerTerms& sampler) {
-  const Plan& plan = in.plan;
-  Certificate c;
-  c.epsilon = plan.epsilon;
-  c.epsilon_abs = plan.epsilon_abs;
-  c.reference_range = plan.reference_range;
-  const BrickMeasure* worst = nullptr;
-  c.brick_totals.reserve(measured.bricks.size());
-  for (const BrickMeasure& m : measured.bricks) {
-    // Two sums in fp32, and this product.
-    c.brick_totals.push_back(m.total < 0 ? -1.0f : m.total * (1 + 0x1p-21f));
-    if (m.total < 0) continue;
-    c.measured_max = std::max(c.measured_max, static_cast<double>(m.error));
-    if (!worst || m.total > worst->total) worst = &m;
-  }
-  if (worst) {
-    c.measured_total = static_cast<double>(worst->total) * (1 + 0x1p-22);  // two sums in fp32
-    c.worst_at = position_of(in, measured.volume, *worst);
-  }
-  c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
-  c.budget.gold = {measured.slack.gold, "curvature: signed second differences of gold, with remainder"};
-  c.budget.projection = {measured.slack.projection,
-                         scan.cone ? "sups of |q|: six taps in u and v, 20 taps from kept gold"
-                         : plan.rates.interpolation == Interpolation::six_taps
-                             ? "sups of |q|: six taps in u, 16 taps from kept gold"
-                             : "sups of |q_uu| and of |q|: interpolation in u, 16 taps from kept gold"};
-  c.budget.arithmetic = {in.arithmetic, "rounding in fp32 from the ramp filter to back-projection"};
-  c.budget.sampler = sampler;
-  c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
-  c.comparison = plan.settings.comparison.is_never_certified();
-  // Of a volume without a tested node nothing is certified.
-  const bool certified = !c.comparison && worst;
-  c.holds_buffer = certified && c.total_buffer <= c.epsilon_abs;
-  if (sampler.image3d) {
-    c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
-    c.holds_image3d = certified && *c.total_image3d <= c.epsilon_abs;
-  }
-  c.rates = plan.rates;
-  c.bounds = plan.bounds;
-  c.field = plan.field;
-  c.field.center = plan.field.center.value_or(scan.geometry.center);
-  c.field.preparation = scan.report.preparation;
-  c.padding = filtered.fft_length;
-  c.window = options.window;
-  c.roi = options.roi;
-  c.not_covered_count = plan.not_covered_count;
-  c.not_covered_fraction = plan.not_covered_fraction;
-  c.not_covered_rule = kNotCoveredRule;
-  c.input_name = scan.report.name;
-  c.input_sha256 = scan.report.sha256;
-  c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};
-  c.input_angles = scan.geometry.views();
-  c.device = device.info().name;
-  c.driver = device.info().driver;
-  c.version = VDVR_VERSION;
-  c.notes = plan.notes;
-  for (const std::string& note : scan.report.notes)
-    if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
-  if (c.comparison)
-    c.notes.push_back(fmt::format("built for comparison with {}: nothing is certified",
-                                  plan.settings.comparison.terms == Terms::grid
-                                      ? "terms grid, which test |V - gold| alone"
-                                      : "closing none, whose field is not continuous"));
-  c.notes.push_back(
-      "covers interpolation, not physics: noise, too few views, the filter window and truncation shape F "
-      "itself");
-  if (measured.repaired > 0)
-    c.notes.push_back(fmt::format("closing raised {} bricks by one level", measured.repaired));
-  return c;
 }
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
@@ -401,10 +319,24 @@ SamplerTerms with_reserve(SamplerTerms terms) {
   return terms;
 }
 
+// What a sampler may add on the worst of these devices.
+SamplerTerms worst_terms(const std::vector<Crew::Kind>& kinds,
+                         const std::function<SamplerTerms(const Crew::Kind&)>& terms_of) {
+  SamplerTerms worst = terms_of(kinds.front());
+  for (std::size_t i = 1; i < kinds.size(); ++i) {
+    const SamplerTerms other = terms_of(kinds[i]);
+    if (other.buffer.value > worst.buffer.value) worst.buffer = other.buffer;
+    if (other.image3d && (!worst.image3d || other.image3d->value > worst.image3d->value))
+      worst.image3d = other.image3d;
+  }
+  return worst;
+}
+
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
 // much. All but the scan, and what is thrown, in `units`.
 BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
-                           const BuildOptions& options, const Progress& progress) {
+                           const BuildOptions& options, const std::optional<BuildShare>& share,
+                           const Progress& progress) {
   opencl::State& state = device.state();
   BuildResult result;
   Stopwatch watch(result.seconds);
@@ -426,46 +358,81 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
   GoldSettings settings = gold_settings(plan, options, {}, scan.cone.has_value());
+  std::optional<Crew> crew;
+  if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew);
+  Crew* const others = crew ? &*crew : nullptr;
+  watch.lap("crew");
   const FieldSlopes slopes = field_slopes(as_mixed(plan.base));
   const std::string digest = options.journal ? plan_digest(scan, plan) : "";
-  const std::vector<float> base = fitted_base(state, *from, plan, settings, selected, progress);
+  const std::vector<float> base = fitted_base(state, *from, plan, settings, selected, others, progress);
   watch.lap("fit");
   settings.lattice = lattice_of(base, plan, units, options.storage);
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
-  JournalledRates journalled(gold, options.journal);
+  BlockRecords records(options.journal, options.parts);
+  JournalledRates journalled(gold, &records, others);
   watch.lap("bounds");
-  const SamplerProbe probe = probe_filters(device);
+  const std::vector<Crew::Kind> kinds =
+      crew ? crew->kinds() : std::vector<Crew::Kind>{{device.info(), probe_filters(device), 0}};
   watch.lap("probe");
 
   const Room room = room_for(state, scan, options);
-  const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), room, progress, watch};
-  const double underflow = from_world(sampler_underflow(device.info()), units);
-  const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
-    return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold, underflow);
+  double arithmetic = gold.arithmetic();
+  for (const Crew::Kind& kind : kinds) arithmetic = std::max(arithmetic, kind.arithmetic);
+  const Inputs in{state, units, plan, selected, journalled, gold, others, arithmetic, room, progress, watch};
+  const auto sampler_of = [&](const FieldSlopes& of, const auto& atlas) {
+    return worst_terms(kinds, [&](const Crew::Kind& kind) {
+      return sampler_terms(of, plan.grid, kind.probe, atlas(kind.info), plan.epsilon_abs, plan.rates.gold,
+                           from_world(sampler_underflow(kind.info), units));
+    });
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
   // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
-  const double tolerance = node_tolerance(in, with_reserve(sampler_of(slopes, longest_atlas(device.info()))));
-  if (options.journal)
-    options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
+  const double tolerance = node_tolerance(in, with_reserve(sampler_of(slopes, longest_atlas)));
+  records.begin(journal_head(kinds, scan, plan, digest, options, gold.fine(), tolerance));
   int times = 0;
   const Accept accept = [&](const Measured& measured) -> std::optional<double> {
-    const SamplerTerms sampler =
-        sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
-    result.certificate = certify(in, device, scan, filtered, options, measured, sampler);
+    const SamplerTerms sampler = sampler_of(field_slopes(measured.volume), [&](const DeviceInfo& info) {
+      return atlas_length(info, measured.volume);
+    });
+    result.certificate = fill_certificate(in, device, scan, filtered, options, measured, sampler);
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
     return node_tolerance(in, with_reserve(sampler));
   };
   try {
-    result.volume = measured_volume(in, base, settings.lattice, tolerance, accept).volume;
+    result.volume = measured_volume(in, base, settings.lattice, tolerance, accept, share).volume;
   } catch (const ToleranceError&) {
     // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-    if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic) throw;
+    if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
     times = 0;
     const Lattice floats = lattice_of(base, plan, units, StorageChoice::f32);
-    result.volume = measured_volume(in, base, floats, tolerance, accept).volume;
+    result.volume = measured_volume(in, base, floats, tolerance, accept, share).volume;
   }
+  if (crew) {
+    result.message_bytes = crew->bytes();
+    result.message_seconds = crew->message_seconds();
+  }
+  return result;
+}
+
+BuildResult build_all_or_share(Device& device, const ProjectionSet& scan, Plan plan,
+                               const BuildOptions& options, const std::optional<BuildShare>& share,
+                               const Progress& progress) {
+  check_line_integrals(scan);
+  if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
+  const Units units = units_of(scan);
+  if (units.are_world()) return build_in_units(device, scan, units, std::move(plan), options, share, progress);
+  const Grid grid = plan.grid;
+  BuildOptions wanted = options;
+  if (options.roi) wanted.roi = from_world(*options.roi, units);
+  if (options.window)
+    wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
+  BuildResult result =
+      build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, share, progress);
+  if (share) return result;
+  scale(result.volume, units.density());
+  result.volume.grid = grid;
+  result.certificate = to_world(std::move(result.certificate), units);
   return result;
 }
 
@@ -473,21 +440,15 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 
 BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                   const Progress& progress) {
-  check_line_integrals(scan);
-  if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
-  const Units units = units_of(scan);
-  if (units.are_world()) return build_in_units(device, scan, units, std::move(plan), options, progress);
-  const Grid grid = plan.grid;
-  BuildOptions wanted = options;
-  if (options.roi) wanted.roi = from_world(*options.roi, units);
-  if (options.window)
-    wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
-  BuildResult result =
-      build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, progress);
-  scale(result.volume, units.density());
-  result.volume.grid = grid;
-  result.certificate = to_world(std::move(result.certificate), units);
-  return result;
+  return build_all_or_share(device, scan, std::move(plan), options, std::nullopt, progress);
+}
+
+void build_share(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
+                 const BuildShare& share, const Progress& progress) {
+  if (!options.journal) throw InputError("a share is written into a journal, and none was given");
+  if (share.parts < 1 || share.part < 1 || share.part > share.parts)
+    throw InputError(fmt::format("share {} of {}: there is no such part", share.part, share.parts));
+  build_all_or_share(device, scan, std::move(plan), options, share, progress);
 }
 
 }  // namespace vdvr

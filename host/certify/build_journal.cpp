@@ -50,18 +50,24 @@ const char* name(StorageChoice storage) {
   }
 }
 
+std::string joined(const std::vector<Crew::Kind>& devices, std::string DeviceInfo::*what) {
+  std::string text;
+  for (const Crew::Kind& kind : devices) text += (text.empty() ? "" : " + ") + kind.info.*what;
+  return text;
+}
+
 }  // namespace
 
-JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& plan,
+JournalHead journal_head(const std::vector<Crew::Kind>& devices, const ProjectionSet& scan, const Plan& plan,
                          const std::string& digest, const BuildOptions& options, const GoldStream& stream,
                          double tolerance) {
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "4"},
+      {"record format", "5"},
       {"version", VDVR_VERSION},
-      {"device", device.info().name},
-      {"driver", device.info().driver},
+      {"device", joined(devices, &DeviceInfo::name)},
+      {"driver", joined(devices, &DeviceInfo::driver)},
       {"input sha256", scan.report.sha256},
       {"scan",
        fmt::format("{} views of {} x {}, pitch {},{}", g.views(), g.columns, g.rows, g.pitch_u, g.pitch_v)},
@@ -88,26 +94,6 @@ JournalHead journal_head(Device& device, const ProjectionSet& scan, const Plan& 
       {"tolerance of a node", exact(tolerance)},
       {"plan", digest}};
   return head;
-}
-
-void put(ByteWriter& out, const BrickMeasure& m) {
-  out.put(m.brick);
-  out.put(m.total);
-  out.put(m.error);
-  out.put(m.slack);
-  out.put(m.violated);
-  out.put(m.rate);
-}
-
-BrickMeasure get_measure(ByteReader& in) {
-  BrickMeasure m;
-  m.brick = in.get<std::int64_t>();
-  m.total = in.get<float>();
-  m.error = in.get<float>();
-  m.slack = in.get<float>();
-  m.violated = in.get<std::uint32_t>();
-  m.rate = in.get<int>();
-  return m;
 }
 
 }  // namespace vdvr

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "host/certify/build_journal.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
@@ -16,12 +15,6 @@ constexpr double easy_share = 0.48;
 // Of the bricks: how many at most the search for the largest error measures again at once.
 constexpr std::size_t sharpened_share = 32;
 
-bool is_above_base(const LevelTriple& level) { return level != LevelTriple{0, 0, 0}; }
-
-bool any(const std::vector<std::uint8_t>& flags) {
-  return std::find(flags.begin(), flags.end(), 1) != flags.end();
-}
-
 // Whether a field of that level is trilinear in every cell of this gold.
 bool resolves(const GoldStream& gold, const LevelTriple& level) {
   const LevelTriple finest = gold.settings().finest();
@@ -32,35 +25,7 @@ bool passes(const BrickMeasure& m, double tolerance) {
   return m.total < 0 || static_cast<double>(m.total) <= tolerance;
 }
 
-void put(ByteWriter& out, const AxisErrors& along) {
-  for (const auto& axis : along.of)
-    for (const auto& level : axis)
-      for (const float error : level) out.put(error);
-}
-
-AxisErrors get_along(ByteReader& in) {
-  AxisErrors along;
-  for (auto& axis : along.of)
-    for (auto& level : axis)
-      for (float& error : level) error = in.get<float>();
-  return along;
-}
-
-GoldSettings with_coarse(GoldSettings settings) {
-  if (settings.rate >= 4 && !settings.grid_only && !settings.window) settings.coarse_rate = settings.rate / 2;
-  return settings;
-}
-
 }  // namespace
-
-GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                     GoldSettings settings, std::shared_ptr<GoldSource> source) {
-  settings = with_coarse(settings);
-  fine_.emplace(state, scan, sups, settings, std::move(source));
-  if (settings.coarse_rate == 0) return;
-  settings.finer_rate = std::exchange(settings.rate, std::exchange(settings.coarse_rate, 0));
-  coarse_.emplace(state, scan, sups, settings, fine_->source());
-}
 
 Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   // Each rate's total bounds |V - F|: what passes here has passed.
@@ -68,10 +33,9 @@ Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
 }
 
-ClassifyBricks::ClassifyBricks(opencl::State& state, JournalledRates& gold, OpenBricks& bricks,
-                               HostMemory& host, Progress progress, Refuse refuse)
-    : state_(state),
-      bricks_(bricks),
+ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
+                               Progress progress, Refuse refuse)
+    : bricks_(bricks),
       host_(host),
       fine_(gold.fine),
       coarse_(gold.coarse),
@@ -127,7 +91,7 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
   std::vector<std::uint8_t> refined = near;
   if (coarse_) {
     std::vector<std::uint8_t> undecided(near.size(), 0);
-    test(*coarse_, base, tolerance, near, "screen", [&](const Levels& l) {
+    test(*coarse_, base, tolerance, near, "screen", [&](const BrickLevels& l) {
       const std::size_t id = at(l.base.brick);
       coarse_slack_[id] = l.base.slack;
       const Verdict verdict = coarse_verdict(l.base, tolerance);
@@ -135,7 +99,7 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
       if (verdict == Verdict::undecided) undecided[id] = 1;
       if (verdict == Verdict::within) take(l, true);
     });
-    test(fine_, base, tolerance, undecided, "screen", [&](const Levels& l) {
+    test(fine_, base, tolerance, undecided, "screen", [&](const BrickLevels& l) {
       if (passes(l.base, tolerance)) take(l, true);
       else refined[at(l.base.brick)] = 1;
     });
@@ -155,59 +119,41 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
 // Level 0 only.
 void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double tolerance,
                           const std::vector<std::uint8_t>& selected, const std::string& stage,
-                          const std::function<void(const Levels&)>& visit) {
-  if (!any(selected)) return;
-  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
-                                                    "bricks to test");
-  gold.run(selected,
-           {[&](GoldStream::Batch& batch) {
-              std::vector<Levels> levels;
-              for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
-                levels.push_back({m, {}, false, {}});
-              return record(levels, {}, {});
-            },
-            [&](ByteReader in) { read(in, visit); }},
-           progress_, stage);
+                          const std::function<void(const BrickLevels&)>& visit) {
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::test;
+  pass.tolerance = static_cast<float>(tolerance);
+  pass.selected = selected;
+  gold.run(
+      std::move(pass), &base, [&](ByteReader in) { read_levels(in, visit); }, progress_, stage);
 }
 
 // Levels above 0, with their tiles. On coarse gold only levels that it can test are taken. What is proposed
 // is measured on fine gold later, as every refined brick that coarse gold does not pass.
 void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, double tolerance,
                             const std::vector<std::uint8_t>& selected, GoldStream::For purpose) {
-  if (!any(selected)) return;
-  const bool fine = &gold == &fine_;
-  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
-                                                    "bricks to classify");
-  const auto taken = [&](const Levels& l) {
-    return fine || (l.base.total >= 0 && l.passes && is_above_base(l.level));
-  };
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::classify;
+  pass.fine = &gold == &fine_;
+  pass.purpose = purpose;
+  pass.tolerance = static_cast<float>(tolerance);
+  pass.selected = selected;
+  const BlockPass asked = pass;
   gold.run(
-      selected,
-      {[&](GoldStream::Batch& batch) {
-         std::vector<Levels> levels;
-         Tiles tiles;
-         std::vector<float> samples;
-         for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device, fine)) {
-           levels.push_back({c.base, c.level, c.passes, c.along});
-           if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
-           tiles.emplace_back(c.base.brick, c.level);
-           samples.insert(samples.end(), c.tile.begin(), c.tile.end());
-         }
-         return record(levels, tiles, samples);
-       },
-       [&](ByteReader in) {
-         read(in, [&](const Levels& l) {
-           if (!taken(l)) return;
-           if (fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
-             refuse_(l.base.slack, tolerance);
-           take(l, purpose != GoldStream::For::proposing);
-         });
-         take_tiles(in);
-       }},
-      progress_, "classify", purpose);
+      std::move(pass), &base,
+      [&](ByteReader in) {
+        read_levels(in, [&](const BrickLevels& l) {
+          if (!is_taken(asked, l)) return;
+          if (asked.fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
+            refuse_(l.base.slack, tolerance);
+          take(l, purpose != GoldStream::For::proposing);
+        });
+        take_tiles(in);
+      },
+      progress_, "classify");
 }
 
-void ClassifyBricks::take(const Levels& l, bool is_bound) {
+void ClassifyBricks::take(const BrickLevels& l, bool is_bound) {
   const BrickMeasure& m = l.base;
   const std::size_t id = at(m.brick);
   bricks_.involved.at(id) = m.total >= 0;
@@ -224,44 +170,6 @@ void ClassifyBricks::take_slack(const BrickMeasure& m) {
   bounds_.total = std::max(bounds_.total, slack);
   bounds_.projection = fine_.gold().projection();
   bounds_.gold = std::max(bounds_.gold, slack - bounds_.projection);
-}
-
-Bytes ClassifyBricks::record(const std::vector<Levels>& levels, const Tiles& tiles,
-                             const std::vector<float>& samples) {
-  ByteWriter out;
-  out.put(static_cast<std::uint64_t>(levels.size()));
-  for (std::size_t i = 0; i < levels.size(); ++i) {
-    put(out, levels[i].base);
-    out.put(levels[i].level);
-    out.put(static_cast<std::uint8_t>(levels[i].passes));
-    if (is_above_base(levels[i].level)) put(out, levels[i].along);
-  }
-  put_tiles(out, tiles, samples);
-  return out.take();
-}
-
-void ClassifyBricks::read(ByteReader& in, const std::function<void(const Levels&)>& visit) {
-  const auto n = in.get<std::uint64_t>();
-  for (std::uint64_t i = 0; i < n; ++i) {
-    Levels l;
-    l.base = get_measure(in);
-    l.level = in.get<LevelTriple>();
-    l.passes = in.get<std::uint8_t>() != 0;
-    if (is_above_base(l.level)) l.along = get_along(in);
-    visit(l);
-  }
-}
-
-void ClassifyBricks::put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples) {
-  std::vector<std::int64_t> bricks;
-  std::vector<LevelTriple> levels;
-  for (const auto& [brick, level] : tiles) {
-    bricks.push_back(brick);
-    levels.push_back(level);
-  }
-  out.put(bricks);
-  out.put(levels);
-  out.put(samples);
 }
 
 std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
@@ -284,38 +192,31 @@ std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
 }
 
 void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
-  fine_.run(raised,
-            {[&](GoldStream::Batch& batch) {
-               Tiles tiles;
-               for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, bricks_.level[at(id)]);
-               ByteWriter out;
-               put_tiles(out, tiles, batch.extract(tiles));
-               for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
-               return out.take();
-             },
-             [&](ByteReader in) {
-               for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
-             }},
-            progress_, "repair", GoldStream::For::samples);
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::extract;
+  pass.purpose = GoldStream::For::samples;
+  pass.selected = raised;
+  pass.level = bricks_.level;
+  fine_.run(
+      std::move(pass), nullptr,
+      [&](ByteReader in) {
+        for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
+      },
+      progress_, "repair");
 }
 
 void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                                 const std::vector<std::uint8_t>& selected, const std::string& stage,
                                 const std::function<void(const BrickMeasure&)>& visit) {
-  if (!any(selected)) return;
-  const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
-                                                    "bricks to measure");
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::measure;
+  pass.tolerance = static_cast<float>(tolerance);
+  pass.selected = selected;
   gold.run(
-      selected,
-      {[&](GoldStream::Batch& batch) {
-         ByteWriter out;
-         for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), on_device, true))
-           put(out, m);
-         return out.take();
-       },
-       [&](ByteReader in) {
-         while (!in.empty()) visit(get_measure(in));
-       }},
+      std::move(pass), &field,
+      [&](ByteReader in) {
+        while (!in.empty()) visit(get_measure(in));
+      },
       progress_, stage);
 }
 

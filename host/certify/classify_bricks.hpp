@@ -10,46 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/journalled_gold.hpp"
 #include "host/certify/open_bricks.hpp"
+#include "host/crew/journalled_gold.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
 
 namespace vdvr {
-
-/// Gold at the rate that certifies, and at half of it where that can decide something: a stored field that is
-/// within the tolerance by the coarse test is so by the theorem of that rate, for an eighth of the work.
-class GoldRates {
- public:
-  GoldRates(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, GoldSettings settings,
-            std::shared_ptr<GoldSource> source = nullptr);
-  [[nodiscard]] GoldStream& fine() { return *fine_; }
-  [[nodiscard]] const GoldStream& fine() const { return *fine_; }
-  /// None where rate < 4, where slack does not count or where a window is given.
-  [[nodiscard]] GoldStream* coarse() { return coarse_ ? &*coarse_ : nullptr; }
-
-  /// fp32 error bound of any gold sample of either rate: positions in blocks of coarse gold reach farther.
-  [[nodiscard]] double arithmetic() const {
-    return std::max(fine_->arithmetic(), coarse_ ? coarse_->arithmetic() : 0.0);
-  }
-  /// P of either rate.
-  [[nodiscard]] double projection() const {
-    return std::max(fine_->projection(), coarse_ ? coarse_->projection() : 0.0);
-  }
-
- private:
-  std::optional<GoldStream> fine_, coarse_;
-};
-
-/// The same with the journal of a build, in which passes of one rate are numbered through all attempts.
-struct JournalledRates {
-  /// Both are referred to; no journal: nullptr.
-  JournalledRates(GoldRates& gold, Journal* journal) : fine(gold.fine(), journal) {
-    if (GoldStream* stream = gold.coarse()) coarse.emplace(*stream, journal);
-  }
-  JournalledGold fine;
-  std::optional<JournalledGold> coarse;
-};
 
 enum class Verdict { within, beyond, undecided };
 /// Of a field measured on coarse gold. Beyond: at one of its nodes, which are nodes of the fine gold too.
@@ -68,7 +34,7 @@ class ClassifyBricks {
   using Refuse = std::function<void(float slack, double tolerance)>;
 
   /// All but `progress` is referred to. `bricks`: levels, involved and tiles are written.
-  ClassifyBricks(opencl::State& state, JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
+  ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
                  Progress progress, Refuse refuse);
 
   /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
@@ -94,13 +60,6 @@ class ClassifyBricks {
   [[nodiscard]] bool is_easy(std::size_t brick, double tolerance) const;
 
  private:
-  using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
-  struct Levels {
-    BrickMeasure base;
-    LevelTriple level{};
-    bool passes = false;
-    AxisErrors along{};
-  };
   /// Bricks along z that share heights of kept gold, and calls `work` for each run of them with those of
   /// `selected` that lie in it.
   using Work = std::function<void(const std::vector<std::uint8_t>& selected)>;
@@ -110,21 +69,16 @@ class ClassifyBricks {
                     const std::vector<std::uint8_t>& pending, const std::string& stage);
   void test(JournalledGold& gold, const DeviceField& base, double tolerance,
             const std::vector<std::uint8_t>& selected, const std::string& stage,
-            const std::function<void(const Levels&)>& visit);
+            const std::function<void(const BrickLevels&)>& visit);
   void refine(JournalledGold& gold, const DeviceField& base, double tolerance,
               const std::vector<std::uint8_t>& selected, GoldStream::For purpose);
   void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
-  static Bytes record(const std::vector<Levels>& levels, const Tiles& tiles,
-                      const std::vector<float>& samples);
-  static void read(ByteReader& in, const std::function<void(const Levels&)>& visit);
-  void take(const Levels& levels, bool is_bound);
+  void take(const BrickLevels& levels, bool is_bound);
   void take_slack(const BrickMeasure& measure);
-  static void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& samples);
   std::vector<std::int64_t> take_tiles(ByteReader& in);  // of which bricks
 
-  opencl::State& state_;
   OpenBricks& bricks_;
   HostMemory& host_;
   JournalledGold& fine_;

@@ -220,8 +220,8 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
     bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
     bricks.involved.assign(near.size(), 0);
     bricks.samples.resize(near.size());
-    JournalledRates unrecorded(gold, nullptr);
-    ClassifyBricks test(state, unrecorded, bricks, host, {}, [](float, double) {});
+    JournalledRates unrecorded(gold);
+    ClassifyBricks test(unrecorded, bricks, host, {}, [](float, double) {});
     test.classify(field, tolerance, selected);
     std::vector<Classified> out;
     const MixedVolume shape = bricks.shape();

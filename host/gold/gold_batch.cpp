@@ -393,7 +393,7 @@ std::vector<float> GoldBatch::extract(const std::vector<std::pair<std::int64_t, 
   return out;
 }
 
-void GoldBatch::fit_base(std::vector<float>& base) {
+void GoldBatch::fit_base(const std::function<void(std::size_t, float)>& put) {
   const Grid& grid = settings_.grid;
   const Index3 n = grid.samples();
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
@@ -417,8 +417,8 @@ void GoldBatch::fit_base(std::vector<float>& base) {
           if (!(margins[at(column)] >= kept)) continue;
           const std::int64_t from =
               ((b * l.cy + y + l.reach_y) * l.cx + x + l.reach_x) * l.cz + z + l.reach_z;
-          base[at(((first[2] * g + z) * n[1] + first[1] * g + y) * n[0] + first[0] * g + x)] =
-              samples[at(from)];
+          put(at(((first[2] * g + z) * n[1] + first[1] * g + y) * n[0] + first[0] * g + x),
+              samples[at(from)]);
         }
   }
 }

@@ -64,9 +64,9 @@ class GoldBatch {
   /// What linear interpolation along single axes errs by in these bricks.
   std::vector<AxisErrors> axis_errors(const std::vector<std::int64_t>& bricks);
 
-  /// Writes the fitted base samples of the blocks into `base` [z][y][x] of the whole grid, where they may be
-  /// kept.
-  void fit_base(std::vector<float>& base);
+  /// Calls put(index, sample) for the fitted base samples of the blocks, where they may be kept: the index is
+  /// that of [z][y][x] of the whole grid. Some come twice, the last one counts.
+  void fit_base(const std::function<void(std::size_t, float)>& put);
 
   /// The largest |gold| at a covered node of the blocks.
   float largest_value() const;

@@ -99,7 +99,7 @@ GoldBox GoldStream::box(const Work& work, const std::array<std::int64_t, 2>& fir
            slab.cells_z * settings_.rate + 1 + 2 * halo_}};
 }
 
-std::vector<GoldBox> GoldStream::boxes(const std::vector<Work>& works) const {
+std::vector<GoldBox> GoldStream::boxes(std::span<const Work> works) const {
   std::vector<GoldBox> out;
   for (const Work& w : works)
     for (const auto& first : w.first) out.push_back(box(w, first));
@@ -151,34 +151,50 @@ void GoldStream::prepare(const std::vector<std::uint8_t>& selected, For purpose,
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
-  run_unknown(
-      selected, on_batch, [](const Work&, std::size_t) { return 0; }, progress, stage, purpose);
+  run_works(works(selected, purpose), selected, on_batch, progress, stage, purpose);
 }
 
-void GoldStream::run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
-                             const Known& known, const Progress& progress, const std::string& stage,
-                             For purpose) {
+std::vector<GoldStream::Work> GoldStream::works(const std::vector<std::uint8_t>& selected, For purpose) {
   begin(purpose);
-  const std::vector<Work> all = partition(selected);
-  source_->kept.prepare(lattice_, boxes(all), progress);
-  if (!settings_.base_only) source_->remainder->require(selected, progress);
-  const auto cost = [&](const Work& w) { return samples(w.width_x, w.width_y, w.height); };
+  return partition(selected);
+}
+
+double GoldStream::cost(const Work& w) const {
+  return static_cast<double>(w.first.size()) * samples(w.width_x, w.width_y, w.height);
+}
+
+std::vector<std::uint8_t> GoldStream::bricks_of(std::span<const Work> works,
+                                                const std::vector<std::uint8_t>& selected) const {
+  const Bricks bricks(settings_.grid, settings_.granularity);
+  const Index3 along = bricks.along();
+  std::vector<std::uint8_t> out(selected.size(), 0);
+  for (const Work& w : works)
+    for (const auto& [x0, y0] : w.first)
+      for (std::int64_t z = w.z; z < std::min(along[2], w.z + w.height); ++z)
+        for (std::int64_t y = y0; y < std::min(along[1], y0 + w.width_y); ++y)
+          for (std::int64_t x = x0; x < std::min(along[0], x0 + w.width_x); ++x) {
+            const std::size_t i = at(bricks.number({x, y, z}));
+            out[i] = selected[i];
+          }
+  return out;
+}
+
+void GoldStream::run_works(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
+                           const OnBatch& on_batch, const Progress& progress, const std::string& stage,
+                           For purpose) {
+  begin(purpose);
+  source_->kept.prepare(lattice_, boxes(works), progress);
+  if (!settings_.base_only) source_->remainder->require(bricks_of(works, selected), progress);
   double total = 0, done = 0;
   Batch batch(state_, settings_);  // its arrays serve all works
-  for (const Work& w : all) total += static_cast<double>(w.first.size()) * cost(w);
-  for (const Work& w : all) {
+  for (const Work& w : works) total += cost(w);
+  for (const Work& w : works) {
+    const double a_block = samples(w.width_x, w.width_y, w.height);
     const auto tick = [&](double blocks) {
-      done += blocks * cost(w);
+      done += blocks * a_block;
       report(progress, stage, std::min(1.0, done / total));
     };
-    std::size_t from = 0;
-    while (from < w.first.size()) {
-      const std::size_t n = known(w, from);
-      if (n == 0) break;
-      from += n;
-      tick(static_cast<double>(n));
-    }
-    if (from < w.first.size()) run_blocks(batch, w, from, selected, on_batch, tick);
+    run_blocks(batch, w, selected, on_batch, tick);
   }
 }
 
@@ -297,15 +313,15 @@ void GoldStream::take_addends(Batch& batch) {
                      of.errors, of.of_curvature);
 }
 
-void GoldStream::run_blocks(Batch& batch, const Work& work, std::size_t from,
-                            const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
+void GoldStream::run_blocks(Batch& batch, const Work& work, const std::vector<std::uint8_t>& selected,
+                            const OnBatch& on_batch,
                             const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
   const std::int64_t together = begin_batch(batch, work, slab_of(work));
   const std::int64_t nx = batch.shape_.nx + 2 * halo_, ny = batch.shape_.ny + 2 * halo_;
   const std::uint64_t block = count(nx * ny * batch.shape_.gold_stride);
-  for (std::size_t begin = from; begin < work.first.size(); begin += at(together)) {
+  for (std::size_t begin = 0; begin < work.first.size(); begin += at(together)) {
     const std::size_t n = std::min(at(together), work.first.size() - begin);
     batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
                   work.first.begin() + static_cast<std::ptrdiff_t>(begin + n)},
@@ -351,12 +367,7 @@ std::vector<std::uint8_t> meeting(const Bricks& coarse, const Bricks& fine, cons
 
 }  // namespace
 
-void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                      GoldSettings settings, const std::vector<std::uint8_t>& selected,
-                      std::vector<float>& base, const Progress& progress,
-                      std::shared_ptr<GoldSource> source) {
-  const Bricks fine(settings.grid, settings.granularity);
-  const LevelTriple coarsening = settings.coarsening;
+GoldSettings fitting_settings(GoldSettings settings) {
   // Second differences at 2x are (rate / 2)^2 those of the gold that will be tested.
   settings.curvature *= 4.0f / static_cast<float>(settings.rate * settings.rate);
   settings.rate = 2;
@@ -364,13 +375,29 @@ void fit_base_samples(opencl::State& state, const FilteredScan& scan, const Fiel
   settings.granularity = fitting_granularity(settings.granularity, settings.grid);
   settings.coarsening = {};
   settings.midrange = settings.base_only = true;
-  GoldStream stream(state, scan, sups, settings, std::move(source));
-  std::vector<std::uint8_t> wanted = stream.bricks_near_coverage();
-  const auto read = meeting(Bricks(settings.grid, settings.granularity), fine, coarsening, selected);
+  return settings;
+}
+
+std::vector<std::uint8_t> bricks_to_fit(const GoldStream& fitting, const GoldSettings& settings,
+                                        const std::vector<std::uint8_t>& selected) {
+  std::vector<std::uint8_t> wanted = fitting.bricks_near_coverage();
+  const auto read = meeting(Bricks(fitting.settings().grid, fitting.settings().granularity),
+                            Bricks(settings.grid, settings.granularity), settings.coarsening, selected);
   for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && read[i];
+  return wanted;
+}
+
+void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
+                      const GoldSettings& settings, const std::vector<std::uint8_t>& selected,
+                      std::vector<float>& base, const Progress& progress,
+                      std::shared_ptr<GoldSource> source) {
+  GoldStream stream(state, scan, sups, fitting_settings(settings), std::move(source));
   stream.run(
-      wanted, [&](GoldStream::Batch& batch) { batch.fit_base(base); }, progress, "fit",
-      GoldStream::For::samples);
+      bricks_to_fit(stream, settings, selected),
+      [&](GoldStream::Batch& batch) {
+        batch.fit_base([&](std::size_t i, float sample) { base[i] = sample; });
+      },
+      progress, "fit", GoldStream::For::samples);
 }
 
 }  // namespace vdvr

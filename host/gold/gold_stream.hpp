@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -70,11 +71,13 @@ class GoldStream {
     std::vector<std::array<std::int64_t, 2>> first;
     [[nodiscard]] Index3 size() const { return {width_x, width_y, height}; }
   };
-  /// How many blocks of a work, from the given one on, somebody has the results of already.
-  using Known = std::function<std::size_t(const Work&, std::size_t)>;
-  /// The same without the blocks that are known.
-  void run_unknown(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch, const Known& known,
-                   const Progress& progress, const std::string& stage, For purpose);
+  /// The blocks that `run` computes for these bricks, in its order.
+  [[nodiscard]] std::vector<Work> works(const std::vector<std::uint8_t>& selected, For purpose);
+  /// Some of them, `selected` and `purpose` as there: a block is the same whoever else is computed.
+  void run_works(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
+                 const OnBatch& on_batch, const Progress& progress, const std::string& stage, For purpose);
+  /// Samples of all blocks of a work of works(), which was called last.
+  [[nodiscard]] double cost(const Work& work) const;
   [[nodiscard]] SlabShape slab_of(const Work& work) const;
 
   /// Bricks that may hold a tested node; the others need not be streamed.
@@ -93,6 +96,7 @@ class GoldStream {
   [[nodiscard]] double rounding_in_slack() const { return settings_.grid_only ? 0 : errors_.curved_rounding; }
   [[nodiscard]] const std::shared_ptr<GoldSource>& source() const { return source_; }
   [[nodiscard]] const GoldSettings& settings() const { return settings_; }
+  [[nodiscard]] opencl::State& state() const { return state_; }
   /// Bricks of a large block, x, y, z.
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
   /// Keeps what `run` would need to keep for these bricks.
@@ -119,11 +123,13 @@ class GoldStream {
   std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] GoldBox box(const Work& work, const std::array<std::int64_t, 2>& first) const;
-  [[nodiscard]] std::vector<GoldBox> boxes(const std::vector<Work>& works) const;
+  [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Work> works) const;
+  [[nodiscard]] std::vector<std::uint8_t> bricks_of(std::span<const Work> works,
+                                                    const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
   void take_addends(Batch& batch);
-  void run_blocks(Batch& batch, const Work& work, std::size_t from, const std::vector<std::uint8_t>& selected,
+  void run_blocks(Batch& batch, const Work& work, const std::vector<std::uint8_t>& selected,
                   const OnBatch& on_batch, const std::function<void(double)>& tick);
 
   opencl::State& state_;
@@ -139,12 +145,17 @@ class GoldStream {
   std::shared_ptr<GoldSource> source_;
 };
 
+/// Of the gold that base samples are fitted to, of a build with these settings.
+GoldSettings fitting_settings(GoldSettings settings);
+/// Which bricks of its grid hold base samples that `selected` bricks of the build's read.
+std::vector<std::uint8_t> bricks_to_fit(const GoldStream& fitting, const GoldSettings& settings,
+                                        const std::vector<std::uint8_t>& selected);
 /// Base samples fitted to the trilinear filter where they are kept and these bricks read them; elsewhere
 /// `base` stays. Gold at 2x their own rate serves: the error between base samples peaks near the middles of
 /// edges, faces and cells, and a fit to those alone stored less than one to denser gold. Cost: a fiftieth of
 /// a pass of gold at 8x.
 void fit_base_samples(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
-                      GoldSettings settings, const std::vector<std::uint8_t>& selected,
+                      const GoldSettings& settings, const std::vector<std::uint8_t>& selected,
                       std::vector<float>& base, const Progress& progress,
                       std::shared_ptr<GoldSource> source = nullptr);
 

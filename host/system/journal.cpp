@@ -221,8 +221,10 @@ std::optional<std::vector<std::byte>> Journal::read_record() {
 
 std::optional<std::vector<std::byte>> Journal::next() {
   if (!reading_) return std::nullopt;
+  const std::uint64_t start = end_;
   auto record = read_record();
   if (record) {
+    starts_.push_back(start);
     ++replayed_;
     ++records_;
     return record;
@@ -232,6 +234,17 @@ std::optional<std::vector<std::byte>> Journal::next() {
     throw ResourceError(
         fmt::format("{}: its torn end cannot be cut off: {}", path_.string(), std::strerror(errno)));
   return std::nullopt;
+}
+
+std::vector<std::byte> Journal::at(std::size_t number) const {
+  const std::uint64_t start = starts_.at(number), bytes = size_of(file_);
+  std::uint64_t length = 0;
+  if (start + prefix_bytes <= bytes && read_at(file_, start + sizeof(std::uint32_t), &length, sizeof length) &&
+      length <= bytes - start - prefix_bytes) {
+    std::vector<std::byte> payload(length);
+    if (read_at(file_, start + prefix_bytes, payload.data(), payload.size())) return payload;
+  }
+  throw FileError(fmt::format("{}: record {} cannot be read again", path_.string(), number));
 }
 
 void Journal::write_record(const std::vector<std::byte>& record) {

@@ -45,13 +45,14 @@ template <class T>
 void Samples<T>::swap(Samples& other) noexcept {
   memory_.swap(other.memory_);  // keeps the places of both
   scratch_.swap(other.scratch_);
+  owner_.swap(other.owner_);
   std::swap(data_, other.data_);
   std::swap(size_, other.size_);
 }
 
 template <class T>
 void Samples<T>::resize(std::size_t n) {
-  if (scratch_) {
+  if (scratch_ || owner_) {
     *this = Samples(std::vector<T>(begin(), begin() + std::min(n, size_)));
   }
   memory_.resize(n);

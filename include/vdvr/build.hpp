@@ -3,17 +3,25 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "vdvr/crew.hpp"
 #include "vdvr/export.hpp"
 #include "vdvr/journal.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/plan.hpp"
 
 namespace vdvr {
+
+/// Part `part` of `parts`, counted from 1, of the blocks that a build classifies.
+struct BuildShare {
+  int part = 1, parts = 1;
+};
 
 struct BuildOptions {
   std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box
@@ -27,6 +35,9 @@ struct BuildOptions {
   /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()
   /// calls begin() and leaves it to the caller to remove() it once the result is stored.
   Journal* journal = nullptr;
+  /// Of shares, to be joined: what they hold is not computed again. Not owned.
+  std::vector<Journal*> parts{};
+  CrewOptions crew{};  ///< who else computes
 };
 
 struct BuildResult {
@@ -34,6 +45,8 @@ struct BuildResult {
   /// Of a plan whose comparison is never certified: the record of one, which promises nothing.
   Certificate certificate;
   std::map<std::string, double> seconds;  ///< per stage
+  std::uint64_t message_bytes = 0;        ///< to and from other processes
+  double message_seconds = 0;             ///< the leader's, for them
 };
 
 /// Throws ToleranceError when the tolerance is out of reach at the plan's rates, InputError when a journal to
@@ -42,5 +55,11 @@ struct BuildResult {
 /// back.
 VDVR_API BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                            const Progress& progress = {});
+
+/// Computes a share's blocks into `options.journal`, which a later build() takes as one of its `parts`: of the
+/// same scan, plan and options. Blocks differ by what their bricks need alone, so that the parts together are
+/// all that a build classifies. Throws what build() throws.
+VDVR_API void build_share(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
+                          const BuildShare& share, const Progress& progress = {});
 
 }  // namespace vdvr

@@ -40,6 +40,9 @@ class VDVR_API Journal {
   /// The next record of the earlier work, in the order they were appended; none: the rest is still to be
   /// done. A torn or altered record ends the journal: it and what follows is cut off.
   std::optional<std::vector<std::byte>> next();
+  /// The record that next() gave as the `number`th, from 0 on, once more. Throws FileError where it cannot be
+  /// read.
+  [[nodiscard]] std::vector<std::byte> at(std::size_t number) const;
   /// Adds a record, after next() gave none. Survives the end of the process at once, of the machine after at
   /// most a second or so. Throws ResourceError naming the file when the disk is full; what was whole stays.
   void append(const std::vector<std::byte>& record);
@@ -63,6 +66,7 @@ class VDVR_API Journal {
   std::uint64_t end_ = 0;    // of the last whole record read or written
   std::uint32_t chain_ = 0;  // its checksum, on which the next one builds
   std::int64_t replayed_ = 0, records_ = 0;
+  std::vector<std::uint64_t> starts_;  // of the records that next() gave
   std::int64_t synced_at_ns_ = 0;
 };
 

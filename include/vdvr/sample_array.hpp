@@ -10,6 +10,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "vdvr/export.hpp"
@@ -29,6 +30,9 @@ class VDVR_API Samples {
   /// n zeros; in memory without `scratch`. Throws ResourceError naming `what`.
   Samples(std::size_t n, std::shared_ptr<Scratch> scratch, const std::string& what);
   Samples(std::vector<T> values);  // NOLINT(google-explicit-constructor): the same in memory
+  /// Somebody else's, who keeps them as long as `owner` is held. A copy lies in memory of its own.
+  Samples(std::span<T> values, std::shared_ptr<const void> owner)
+      : owner_(std::move(owner)), data_(values.data()), size_(values.size()) {}
   Samples(std::initializer_list<T> values) : Samples(std::vector<T>(values)) {}
   Samples(const Samples& other);
   Samples(Samples&& other) noexcept;
@@ -82,6 +86,7 @@ class VDVR_API Samples {
 
   std::vector<T> memory_;
   std::shared_ptr<Scratch> scratch_;
+  std::shared_ptr<const void> owner_;
   T* data_ = nullptr;
   std::size_t size_ = 0;
 };

@@ -37,8 +37,8 @@ struct Case {
         base(reconstruct_field(state, chain.filtered, chain.upsampler, grid, 8, Interpolation::six_taps, {})),
         host(state),
         gold(state, chain.filtered, chain.sups, settings_of(grid, rate, anisotropic, heights_bytes)),
-        unrecorded(gold, nullptr),
-        classify(state, unrecorded, bricks, host, {},
+        unrecorded(gold),
+        classify(unrecorded, bricks, host, {},
                  [](float, double) { throw std::runtime_error("even gold is too far from F"); }) {
     const auto [low, high] = std::minmax_element(base.samples.begin(), base.samples.end());
     tolerance = tolerance_of_range * static_cast<double>(*high - *low);

@@ -1,0 +1,65 @@
+#include "host/crew/crew_member.hpp"
+
+#include <utility>
+
+namespace vdvr {
+
+void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* field,
+                    const opencl::DeviceArray<std::uint8_t>& selected, std::span<const GoldStream::Work> works,
+                    const std::function<void(Bytes)>& on_record, const Progress& progress,
+                    const std::string& stage) {
+  gold.run_works(
+      works, pass.selected,
+      [&](GoldBatch& batch) {
+        on_record(compute_record(batch, pass, field, selected, gold.settings().rate));
+      },
+      progress, stage, pass.purpose);
+}
+
+std::shared_ptr<GoldSource> CrewMember::source() {
+  if (!source_) source_ = std::make_shared<GoldSource>(state_, scan_, sups_, settings_);
+  return source_;
+}
+
+// Passes of one build bring one lattice.
+GoldRates& CrewMember::rates(const Lattice& lattice) {
+  if (!rates_) {
+    fitting_.reset();
+    settings_.lattice = lattice;
+    rates_.emplace(state_, scan_, sups_, settings_, source());
+  }
+  return *rates_;
+}
+
+GoldStream& CrewMember::stream() {
+  if (pass_->ask == BlockPass::Ask::fit) {
+    if (!fitting_) fitting_.emplace(state_, scan_, sups_, fitting_settings(settings_), source());
+    return *fitting_;
+  }
+  GoldRates& both = rates(pass_->lattice);
+  return pass_->fine ? both.fine() : *both.coarse();
+}
+
+double CrewMember::arithmetic() {
+  return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic();
+}
+
+void CrewMember::use(const MixedVolume& volume, const Room& room) {
+  field_.reset();
+  field_.emplace(state_, volume, room.for_bytes(sample_buffer_bytes(volume)));
+}
+
+void CrewMember::begin(std::shared_ptr<const BlockPass> pass, const Progress& progress) {
+  selected_.reset();
+  pass_ = std::move(pass);
+  selected_.emplace(state_, std::span<const std::uint8_t>(pass_->selected), "bricks of a pass");
+  stream().prepare(pass_->selected, pass_->purpose, progress);
+}
+
+void CrewMember::compute(std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,
+                         const Progress& progress) {
+  compute_blocks(stream(), *pass_, field_ ? &*field_ : nullptr, *selected_, works, on_record, progress,
+                 "blocks");
+}
+
+}  // namespace vdvr
