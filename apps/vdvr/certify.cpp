@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
@@ -34,6 +35,7 @@ void add_certify_options(Arguments& args) {
   add_plan_options(args);
   add_build(args);
   add_compression(args);
+  add_crew(args);
   add_common(args);
 }
 
@@ -62,21 +64,58 @@ std::filesystem::path journal_path(const std::filesystem::path& output) {
 bool continues(const Arguments& args, const std::filesystem::path& output) {
   std::error_code error;
   const auto bytes = std::filesystem::file_size(journal_path(output), error);
-  return args.has("resume") && !error && bytes > 0;
+  return args.has("resume") && ((!error && bytes > 0) || !shares_of(output).empty());
 }
 
 std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions& common,
-                                      const std::filesystem::path& output,
-                                      const std::vector<std::filesystem::path>& outputs) {
+                                      const std::filesystem::path& path) {
   const bool resume = args.has("resume");
-  auto journal = std::make_unique<Journal>(journal_path(output), resume);
-  for (const auto& file : outputs) io::remove_leftovers(file);
-  if (!common.quiet && resume != journal->found())
-    say(fmt::format(
-        "{}: {} {}\n", args.who(), journal->path().string(),
-        resume ? "does not exist: nothing to resume, starting afresh"
-               : "is of an unfinished build, which --resume would have continued: it will be replaced"));
+  auto journal = std::make_unique<Journal>(path, resume);
+  if (!common.quiet && !resume && journal->found())
+    say(
+        fmt::format("{}: {} is of an unfinished build, which --resume would have continued: it will be "
+                    "replaced\n",
+                    args.who(), path.string()));
   return journal;
+}
+
+Journals open_journals(const Arguments& args, const CommonOptions& common,
+                       const std::filesystem::path& output,
+                       const std::vector<std::filesystem::path>& outputs) {
+  Journals out;
+  out.own = open_journal(args, common, journal_path(output));
+  for (const auto& file : outputs) io::remove_leftovers(file);
+  const auto shares = shares_of(output);
+  const bool resume = args.has("resume");
+  for (const auto& path : shares)
+    if (resume) out.parts.push_back(std::make_unique<Journal>(path, true));
+  if (common.quiet) return out;
+  if (resume && !shares.empty()) say(fmt::format("{}: joins {} shares\n", args.who(), shares.size()));
+  else if (resume && !out.own->found())
+    say(fmt::format("{}: {} does not exist: nothing to resume, starting afresh\n", args.who(),
+                    out.own->path().string()));
+  else if (!shares.empty())
+    say(
+        fmt::format("{}: {} and {} more are shares of a build, which --resume would have joined: they stay\n",
+                    args.who(), shares.front().string(), shares.size() - 1));
+  return out;
+}
+
+void Journals::name_in(BuildOptions& build) const {
+  build.journal = own.get();
+  build.parts.clear();
+  for (const auto& part : parts) build.parts.push_back(part.get());
+}
+
+void Journals::remove() {
+  for (const auto& part : parts) part->remove();
+  own->remove();
+}
+
+std::int64_t Journals::replayed() const {
+  std::int64_t records = own->replayed();
+  for (const auto& part : parts) records += part->replayed();
+  return records;
 }
 
 int resumable(const Journal& journal, const std::function<int()>& work) {

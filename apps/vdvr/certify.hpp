@@ -40,14 +40,27 @@ BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted
 
 /// The journal of an output file: beside it, with this name.
 std::filesystem::path journal_path(const std::filesystem::path& output);
-/// Whether --resume was given and an earlier process left something to continue: its own outputs are then no
-/// reason to refuse.
+/// Whether --resume was given and earlier processes left something to continue or to join: its own outputs are
+/// then no reason to refuse.
 bool continues(const Arguments& args, const std::filesystem::path& output);
-/// Opens it for `build` and `run`, clears away what killed writers of `outputs` left, and says on stderr when
+/// The journals of a build: its own, and those of shares that it joins.
+struct Journals {
+  std::unique_ptr<Journal> own;
+  std::vector<std::unique_ptr<Journal>> parts;
+
+  void name_in(BuildOptions& build) const;
+  /// The result is in place.
+  void remove();
+  [[nodiscard]] std::int64_t replayed() const;
+};
+/// Opens them for `build` and `run`, clears away what killed writers of `outputs` left, and says on stderr when
 /// there is nothing to resume or a journal is about to be replaced.
+Journals open_journals(const Arguments& args, const CommonOptions& common,
+                       const std::filesystem::path& output,
+                       const std::vector<std::filesystem::path>& outputs);
+/// The same of a share, which joins nothing.
 std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions& common,
-                                      const std::filesystem::path& output,
-                                      const std::vector<std::filesystem::path>& outputs);
+                                      const std::filesystem::path& path);
 /// Calls `work`; an interruption in it says that --resume continues, once there is anything to continue.
 int resumable(const Journal& journal, const std::function<int()>& work);
 

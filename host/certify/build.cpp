@@ -45,11 +45,11 @@ std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, Plan& p
   pass.selected = bricks_to_fit(gold, settings, selected);
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));
   // Where blocks meet, the later one in the order of a single device counts.
-  std::map<std::array<std::int64_t, 8>, Bytes> records;
+  std::map<BlockPlace, Bytes> records;
   run_blocks(crew, gold, shared, nullptr, gold.works(shared->selected, shared->purpose),
              [&](const Bytes& record) {
                ByteReader in(record);
-               records[get_key(in).place()] = record;
+               records[get_key(in).place(0)] = record;
              },
              progress, "fit");
   for (const auto& [place, record] : records) {

@@ -2,20 +2,21 @@
 #include "host/crew/block_pass.hpp"
 
 #include "host/system/casts.hpp"
+#include "vdvr/error.hpp"
 
 namespace vdvr {
 
 void put(ByteWriter& out, const BlockKey& key) {
-  for (const std::int64_t n : {key.rate, key.pass, key.z, key.size[0], key.size[1], key.size[2], key.first[0],
-                               key.first[1], key.blocks})
-    out.put(n);
+  for (const std::int64_t n : {key.rate, key.pass, key.z, key.size[0], key.size[1], key.size[2]}) out.put(n);
+  out.put(key.first);
 }
 
 BlockKey get_key(ByteReader& in) {
   BlockKey key;
-  for (std::int64_t* n : {&key.rate, &key.pass, &key.z, key.size.data(), &key.size[1], &key.size[2],
-                          key.first.data(), &key.first[1], &key.blocks})
+  for (std::int64_t* n : {&key.rate, &key.pass, &key.z, key.size.data(), &key.size[1], &key.size[2]})
     *n = in.get<std::int64_t>();
+  key.first = in.get_vector<std::array<std::int64_t, 2>>();
+  if (key.first.empty()) throw FileError("a journal record is of no block; start again without `resume`");
   return key;
 }
 
@@ -147,9 +148,9 @@ void read_fit(ByteReader& in, const std::function<void(std::size_t, float)>& vis
 Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField* field,
                      const opencl::DeviceArray<std::uint8_t>& selected, int rate) {
   ByteWriter out;
-  const auto& first = batch.first_brick();
-  put(out, BlockKey{rate, pass.number, first.front()[2], batch.block_bricks(),
-                    {first.front()[0], first.front()[1]}, static_cast<std::int64_t>(first.size())});
+  BlockKey key{rate, pass.number, batch.first_brick().front()[2], batch.block_bricks(), {}};
+  for (const auto& first : batch.first_brick()) key.first.push_back({first[0], first[1]});
+  put(out, key);
   switch (pass.ask) {
     case BlockPass::Ask::fit:
       put_fit(out, batch);

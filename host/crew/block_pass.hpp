@@ -33,16 +33,17 @@ struct BlockPass {
   std::vector<LevelTriple> level;      ///< by brick, for `extract`
 };
 
-/// Which blocks a record is of: those of one batch, one after another in the order of GoldStream::works.
+/// A block among those of all passes, in their order.
+using BlockPlace = std::array<std::int64_t, 8>;
+
+/// Which blocks a record is of: those of one batch.
 struct BlockKey {
   std::int64_t rate = 0, pass = 0, z = 0;
-  Index3 size{};                       ///< bricks of a block
-  std::array<std::int64_t, 2> first{}; ///< brick of the first block, x, y
-  std::int64_t blocks = 0;
+  Index3 size{};                                   ///< bricks of a block
+  std::vector<std::array<std::int64_t, 2>> first;  ///< brick of each block, x, y
 
-  /// Where a block stands in the order of a pass.
-  [[nodiscard]] std::array<std::int64_t, 8> place() const {
-    return {rate, pass, z, size[2], size[0], size[1], first[1], first[0]};
+  [[nodiscard]] BlockPlace place(std::size_t block) const {
+    return {rate, pass, z, size[2], size[0], size[1], first[block][1], first[block][0]};
   }
 };
 void put(ByteWriter& out, const BlockKey& key);

@@ -60,13 +60,11 @@ std::vector<Works> cut(const GoldStream& gold, const Works& works, std::size_t w
 void take_away(Works& works, const Bytes& record) {
   ByteReader in(record);
   const BlockKey key = get_key(in);
-  for (GoldStream::Work& w : works) {
-    if (w.z != key.z || w.size() != key.size) continue;
-    const auto first = std::find(w.first.begin(), w.first.end(), key.first);
-    if (first == w.first.end() || key.blocks > w.first.end() - first) continue;
-    w.first.erase(first, first + key.blocks);
-    break;
-  }
+  for (GoldStream::Work& w : works)
+    if (w.z == key.z && w.size() == key.size)
+      std::erase_if(w.first, [&](const auto& block) {
+        return std::find(key.first.begin(), key.first.end(), block) != key.first.end();
+      });
   std::erase_if(works, [](const GoldStream::Work& w) { return w.first.empty(); });
 }
 
@@ -338,7 +336,7 @@ void Crew::run(GoldStream& gold, const SharedPass& pass, const DeviceField* fiel
       if (report->pass != number || given == m.given.end()) continue;
       if (report->kind == CrewReport::Kind::record) {
         ByteReader in(report->record);
-        const auto n = static_cast<std::size_t>(get_key(in).blocks);
+        const std::size_t n = get_key(in).first.size();
         take_away(given->second, report->record);
         on_record(report->record);
         left -= std::min(left, n);

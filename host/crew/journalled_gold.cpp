@@ -3,9 +3,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 #include <utility>
-
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 
@@ -22,14 +21,15 @@ void BlockRecords::begin(const JournalHead& head) {
 void BlockRecords::read(Journal& journal) {
   for (std::size_t number = 0; const auto record = journal.next(); ++number) {
     ByteReader in(*record);
-    places_[get_key(in).place()] = {&journal, number};
+    const BlockKey key = get_key(in);
+    for (std::size_t i = 0; i < key.first.size(); ++i) places_[key.place(i)] = {&journal, number};
   }
 }
 
-std::optional<Bytes> BlockRecords::find(const BlockKey& key) const {
-  const auto found = places_.find(key.place());
+std::optional<BlockRecords::Place> BlockRecords::find(const BlockPlace& block) const {
+  const auto found = places_.find(block);
   if (found == places_.end()) return std::nullopt;
-  return found->second.journal->at(found->second.number);
+  return found->second;
 }
 
 void BlockRecords::add(const Bytes& record) {
@@ -41,22 +41,19 @@ std::vector<GoldStream::Work> JournalledGold::unknown(const BlockPass& pass,
   std::vector<GoldStream::Work> works = gold_.works(pass.selected, pass.purpose);
   if (!records_ || !records_->kept()) return works;
   std::vector<GoldStream::Work> out;
+  std::set<BlockRecords::Place> applied;
   for (GoldStream::Work& w : works) {
-    const auto all = std::exchange(w.first, {});
-    for (std::size_t i = 0; i < all.size();) {
-      const auto record = records_->find({gold_.settings().rate, pass.number, w.z, w.size(), all[i], 0});
-      if (!record) {
-        w.first.push_back(all[i++]);
-        continue;
+    const BlockKey key{gold_.settings().rate, pass.number, w.z, w.size(), std::exchange(w.first, {})};
+    for (std::size_t i = 0; i < key.first.size(); ++i) {
+      const auto place = records_->find(key.place(i));
+      if (!place) {
+        w.first.push_back(key.first[i]);
+      } else if (applied.insert(*place).second) {
+        const Bytes record = BlockRecords::at(*place);
+        ByteReader in(record);
+        get_key(in);
+        apply(in);
       }
-      ByteReader in(*record);
-      const std::int64_t n = get_key(in).blocks;
-      if (n < 1 || static_cast<std::uint64_t>(n) > all.size() - i)
-        throw InputError(
-            "a record of the journal is of other blocks than this build asks for; start again without "
-            "`resume`");
-      apply(in);
-      i += static_cast<std::size_t>(n);
     }
     if (!w.first.empty()) out.push_back(std::move(w));
   }

@@ -26,20 +26,22 @@ class BlockRecords {
       : journal_(journal), parts_(std::move(parts)) {}
   void begin(const JournalHead& head);
   [[nodiscard]] bool kept() const { return journal_ != nullptr; }
-  /// Of this block and those after it.
-  [[nodiscard]] std::optional<Bytes> find(const BlockKey& key) const;
-  void add(const Bytes& record);
-
- private:
+  /// Where the record of a block is.
   struct Place {
     Journal* journal = nullptr;
     std::size_t number = 0;
+    auto operator<=>(const Place&) const = default;
   };
+  [[nodiscard]] std::optional<Place> find(const BlockPlace& block) const;
+  [[nodiscard]] static Bytes at(const Place& place) { return place.journal->at(place.number); }
+  void add(const Bytes& record);
+
+ private:
   void read(Journal& journal);
 
   Journal* journal_;
   std::vector<Journal*> parts_;
-  std::map<std::array<std::int64_t, 8>, Place> places_;
+  std::map<BlockPlace, Place> places_;
 };
 
 class JournalledGold {

@@ -5,21 +5,24 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/output.hpp"
 
 namespace vdvr::cli {
 
 namespace {
 
-int build_file(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
-               const std::filesystem::path& output) {
-  Device device = open_device(common);
+int build_file(const Arguments& args, const CommonOptions& common, Wanted wanted,
+               const std::filesystem::path& output, Journals& journals) {
+  Devices devices(args, common);
+  Device& device = devices.first();
+  wanted.options.build.crew = devices.crew();
   ProgressLine progress(args.who(), common.quiet);
   Planned planned = read_and_plan(device, args, wanted, progress.callback());
   const BuildResult result = build_planned(device, planned, wanted, progress.callback());
   throw_if_stopped();
   write_vdvr(output, result.volume, result.certificate, wanted.compression);
-  wanted.options.build.journal->remove();
+  journals.remove();
   progress.clear();
 
   const std::uint64_t bytes = std::filesystem::file_size(output);
@@ -27,8 +30,9 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
                      {"grid", grid_json(result.volume.grid)},
                      {"bricks", levels_json(result.volume)},
                      {"storage", storage_json(result.volume, bytes)},
-                     {"resumed", {{"records", wanted.options.build.journal->replayed()}}},
-                     {"peak_bytes", device.peak_memory()},
+                     {"resumed", {{"records", journals.replayed()}, {"shares", journals.parts.size()}}},
+                     {"peak_bytes", devices.peak_memory()},
+                     {"messages", {{"bytes", result.message_bytes}, {"seconds", result.message_seconds}}},
                      {record_name(result.certificate), certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
@@ -42,19 +46,51 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
   return certificate_exit_code(args.who(), result.certificate);
 }
 
+// A part of the blocks, into a journal that --resume of the whole joins.
+int build_part(const Arguments& args, const CommonOptions& common, Wanted wanted,
+               const std::filesystem::path& output, const BuildShare& share, Journal& journal) {
+  Devices devices(args, common);
+  wanted.options.build.journal = &journal;
+  wanted.options.build.crew = devices.crew();
+  ProgressLine progress(args.who(), common.quiet);
+  Planned planned = read_and_plan(devices.first(), args, wanted, progress.callback());
+  build_share(devices.first(), planned.scan, std::move(planned.plan), wanted.options.build, share,
+              progress.callback());
+  progress.clear();
+  const Json json = {{"journal", journal.path().string()},
+                     {"share", {{"part", share.part}, {"parts", share.parts}}},
+                     {"records", journal.records()},
+                     {"resumed", {{"records", journal.replayed()}}},
+                     {"peak_bytes", devices.peak_memory()}};
+  print_result(common, json, [&] {
+    fmt::print("share          {} of {}: {} records\n", share.part, share.parts, journal.records());
+    fmt::print("written        {}\n", journal.path().string());
+    fmt::print("join           the same command with --resume and without --share writes {}\n",
+               output.string());
+  });
+  return 0;
+}
+
 }  // namespace
 
 int build_command(Arguments& args) {
   args.positional("IN", "projections").value("output,o", "OUT.vdvr", "the certified volume to write");
+  args.value("share", "K/N",
+             "classify part K of N into a journal beside the output; once all are there, --resume without "
+             "--share joins them");
   add_certify_options(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   Wanted wanted = wanted_to_certify(args);
   const auto output = args.path("output");
   check_output(output, common.force || continues(args, output), {args.path("IN")});
-  const auto journal = open_journal(args, common, output, {output});
-  wanted.options.build.journal = journal.get();
-  return resumable(*journal, [&] { return build_file(args, common, wanted, output); });
+  if (const auto share = share_option(args)) {
+    const auto journal = open_journal(args, common, share_path(output, *share));
+    return resumable(*journal, [&] { return build_part(args, common, wanted, output, *share, *journal); });
+  }
+  Journals journals = open_journals(args, common, output, {output});
+  journals.name_in(wanted.options.build);
+  return resumable(*journals.own, [&] { return build_file(args, common, wanted, output, journals); });
 }
 
 }  // namespace vdvr::cli

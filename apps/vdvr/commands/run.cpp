@@ -8,6 +8,7 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
@@ -120,8 +121,11 @@ std::string bytes_of(const std::filesystem::path& path) {
 std::vector<std::string> verify_words(const Arguments& args, const OutputFolder& folder) {
   std::vector<std::string> words{"vdvr",          "verify",        folder.file("volume.vdvr").string(),
                                  "--projections", args.text("IN"), "--exhaustive"};
-  for (const std::string option : {"angles-file", "beam", "device"})
+  for (const std::string option : {"angles-file", "beam"})
     if (args.has(option)) words.insert(words.end(), {"--" + option, args.text(option)});
+  // verify measures on one.
+  if (const std::string one = first_device(args); !one.empty())
+    words.insert(words.end(), {"--device", one});
   return words;
 }
 
@@ -193,9 +197,11 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
   fmt::print("{}\n", dvr == out.outside.end() ? "" : dvr->second);
 }
 
-int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& wanted,
-              const std::filesystem::path& output, OutputFolder& folder) {
-  Device device = open_device(common);
+int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
+              const std::filesystem::path& output, OutputFolder& folder, Journals& journals) {
+  Devices devices(args, common);
+  Device& device = devices.first();
+  wanted.options.build.crew = devices.crew();
   ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
@@ -223,7 +229,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, const Wanted& 
   throw_if_stopped();
   write_report(device, args, folder, out);
   folder.finish(to_json(certificate));
-  wanted.options.build.journal->remove();
+  journals.remove();
   out.files.emplace_back("certificate.json", "what is promised, and by which argument");
   line.clear();
 
@@ -248,9 +254,9 @@ int run_command(Arguments& args) {
   OutputFolder folder(output, file_names(), common.force || continues(args, volume));
   std::vector<std::filesystem::path> outputs;
   for (const auto& name : file_names()) outputs.push_back(folder.file(name));
-  const auto journal = open_journal(args, common, volume, outputs);
-  wanted.options.build.journal = journal.get();
-  return resumable(*journal, [&] { return run_steps(args, common, wanted, output, folder); });
+  Journals journals = open_journals(args, common, volume, outputs);
+  journals.name_in(wanted.options.build);
+  return resumable(*journals.own, [&] { return run_steps(args, common, wanted, output, folder, journals); });
 }
 
 }  // namespace vdvr::cli

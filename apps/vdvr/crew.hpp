@@ -1,0 +1,46 @@
+// The devices and processes that a build is spread over, and its shares.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/common/common_options.hpp"
+#include "vdvr/build.hpp"
+#include "vdvr/crew.hpp"
+
+namespace vdvr::cli {
+
+/// --mixed-devices and --give-up.
+void add_crew(Arguments& args);
+
+/// To the other processes of this program; none: it is alone. Set before a command runs.
+void set_messenger(Messenger* messenger);
+
+/// Of --device, what a command that takes one device would be given; empty: the default.
+std::string first_device(const Arguments& args);
+
+/// What --device names: one, or several as "0,1" or "all".
+class Devices {
+ public:
+  /// --max-memory is shared among those of this machine.
+  Devices(const Arguments& args, const CommonOptions& common);
+  [[nodiscard]] Device& first() { return *devices_.front(); }
+  /// The others, of this process and of others.
+  [[nodiscard]] CrewOptions crew() const;
+  [[nodiscard]] std::uint64_t peak_memory() const;
+
+ private:
+  CrewOptions options_;
+  std::vector<std::unique_ptr<Device>> devices_;
+};
+
+/// Of --share k/N.
+std::optional<BuildShare> share_option(const Arguments& args);
+/// The journal of a share of an output.
+std::filesystem::path share_path(const std::filesystem::path& output, const BuildShare& share);
+/// Those that are there.
+std::vector<std::filesystem::path> shares_of(const std::filesystem::path& output);
+
+}  // namespace vdvr::cli
