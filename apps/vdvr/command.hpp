@@ -1,4 +1,4 @@
-// The table of commands. main.cpp looks a command up, and hands it its arguments; each command lives in the
+// The table of commands, in command_table.cpp. main.cpp looks a command up, and hands it its arguments; each command lives in the
 // file of its name.
 #pragma once
 

@@ -214,7 +214,8 @@ void Crew::wait_for_kinds() {
     bool missing = false;
     for (std::size_t i = 0; i < known.size(); ++i) {
       if (!is_missing(i)) continue;
-      if (Clock::now() - std::max(begin, s.members[i].heard) > s.options.give_up)
+      if (s.options.messenger->is_gone(s.members[i].process)) s.lose(s.members[i], "ended");
+      else if (Clock::now() - std::max(begin, s.members[i].heard) > s.options.give_up)
         s.lose(s.members[i], "did not answer in time");
       else missing = true;
     }
@@ -324,9 +325,11 @@ void Crew::run(GoldStream& gold, const SharedPass& pass, const DeviceField* fiel
       throw_if_stopped();
       const auto report = s.take();
       for (State::Member& m : s.members) {
-        if (m.worker->is_remote() && !m.lost && !m.given.empty() &&
-            Clock::now() - m.heard > s.options.give_up)
-          s.lose(m, fmt::format("gave no sign for {} s", s.options.give_up.count()));
+        if (m.worker->is_remote() && !m.lost) {
+          if (s.options.messenger->is_gone(m.process)) s.lose(m, "ended");
+          else if (!m.given.empty() && Clock::now() - m.heard > s.options.give_up)
+            s.lose(m, fmt::format("gave no sign for {} s", s.options.give_up.count()));
+        }
         if (m.lost && !m.given.empty()) take_back(m);
       }
       if (!report) continue;

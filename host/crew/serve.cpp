@@ -58,9 +58,14 @@ class Server {
   }
 
  private:
-  // All that has arrived, so that what is no longer wanted is not begun.
+  // What has arrived, so that what is no longer wanted is not begun; of a field's samples a few at a time.
   void gather(std::chrono::milliseconds wait) {
-    while (auto message = messenger_.receive(wait)) {
+    std::uint64_t bytes = 0;
+    for (const Bytes& message : queue_) bytes += message.size();
+    while (bytes < 2 * part_bytes) {
+      auto message = messenger_.receive(wait);
+      if (!message) return;
+      bytes += message->second.size();
       queue_.push_back(std::move(message->second));
       wait = std::chrono::milliseconds(0);
     }

@@ -42,6 +42,8 @@ class VDVR_API Messenger {
   virtual std::uint64_t share(std::span<const std::byte> bytes) = 0;
   /// Of the others: those bytes, and what keeps them. Waits for them.
   virtual std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared(std::uint64_t number) = 0;
+  /// Whether it is known to have ended.
+  [[nodiscard]] virtual bool is_gone(int process) const = 0;
   /// Nothing more is sent to it and nothing awaited from it.
   virtual void give_up(int process) = 0;
 };

@@ -1,0 +1,248 @@
+#!/usr/bin/env python3
+"""One build by several devices, shares and MPI ranks, some of which are killed: always the same bytes.
+
+usage: crew.py devices|shares|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
+
+`kills` kills N ranks that work and N times the one that leads (3 and 2 by default; scripts/crew-kills is the
+long form), at moments that a seed chooses. Without a launcher `mpi` and `kills` are skipped by name.
+"""
+import argparse
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+               "OMPI_MCA_btl": "self,vader,tcp", "OMPI_MCA_mpi_yield_when_idle": "1"}
+
+
+class Failure(Exception):
+    pass
+
+
+def check(holds, what):
+    if not holds:
+        raise Failure(what)
+
+
+class Work:
+    def __init__(self, folder, vdvr):
+        self.folder, self.vdvr = pathlib.Path(folder), vdvr
+        self.scan, self.out = self.folder / "scan.h5", self.folder / "o.vdvr"
+        self.run(["simulate", "--phantom", "shepp-logan", "--detector", "25x13", "--pitch", "5.5", "--angles", "24",
+                  "-o", self.scan])
+
+    def build(self, *more):
+        return ["build", self.scan, "--epsilon", "15%", "--granularity", "2", "-o", self.out, "--json", *more]
+
+    def call(self, command, **environment):
+        return subprocess.run([str(w) for w in command], env={**ENVIRONMENT, **environment}, text=True,
+                              capture_output=True, timeout=280, check=False)
+
+    def run(self, words, expected=0, before=None, **environment):
+        done = self.call([*(before or [self.vdvr]), *words], **environment)
+        check(done.returncode == expected, f"{words} ended with {done.returncode}:\n{done.stderr}")
+        return done
+
+    def built(self, *more, before=None, **environment):
+        """The certificate, without what says when and how long; the file is taken away."""
+        result = json.loads(self.run(self.build(*more), before=before, **environment).stdout)
+        self.out.unlink()
+        check(list(self.folder.glob("o.vdvr*")) == [], "a journal was left behind")
+        return result["certificate"], result
+
+    def same(self, expected, *more, before=None, **environment):
+        found, result = self.built(*more, before=before, **environment)
+        check(found["content_sha256"] == expected["content_sha256"], f"{more}: other content")
+        check(found == expected, f"{more}: another certificate")
+        return result
+
+
+def devices(work, _):
+    two = {"POCL_DEVICES": "pthread pthread"}
+    listed = work.call([work.vdvr, "devices"], **two).stdout
+    expected, _ = work.built("--device", "0")
+    work.same(expected, "--device", "0,0")
+    if "\n1: " in listed:  # PoCL, which shows the same device twice when it is asked to
+        for given in ("0,1", "1,0", "all"):
+            work.same(expected, "--device", given, **two)
+    refused = work.run(work.build("--device", "0,,1"), expected=2)
+    check("--device" in refused.stderr and "empty" in refused.stderr, refused.stderr)
+    check(not work.out.exists(), "something was written")
+    unlike = {"POCL_DEVICES": "pthread basic"}
+    if "basic" in work.call([work.vdvr, "devices"], **unlike).stdout:
+        refused = work.run(work.build("--device", "0,1"), expected=2, **unlike)
+        check("--mixed-devices" in refused.stderr, refused.stderr)
+
+
+def shares(work, _):
+    expected, _ = work.built()
+    for part in (1, 2, 3):
+        work.run(work.build("--share", f"{part}/3"))
+    check(not work.out.exists() and len(list(work.folder.glob("o.vdvr.share-*"))) == 3, "three journals")
+    result = work.same(expected, "--resume")
+    check(result["resumed"]["shares"] == 3 and result["resumed"]["records"] > 3, f"{result['resumed']}")
+    # One is missing, one was torn: what they lack is computed.
+    for part in (1, 3):
+        work.run(work.build("--share", f"{part}/3"))
+    torn = work.folder / "o.vdvr.share-3-of-3.journal"
+    os.truncate(torn, torn.stat().st_size // 2)
+    work.same(expected, "--resume")
+    # Of another tolerance.
+    work.run(work.build("--share", "1/2"))
+    other = work.build("--resume")
+    other[3] = "16%"
+    refused = work.run(other, expected=2)
+    check("epsilon was" in refused.stderr, refused.stderr)
+    check(not work.out.exists(), "something was written")
+    work.same(expected, "--resume")
+    for bad in ("0/3", "4/3", "1", "x/2", "1/2/3"):
+        refused = work.run(work.build("--share", bad), expected=2)
+        check("--share" in refused.stderr, refused.stderr)
+
+
+def launch(mpi, ranks):
+    launcher, program = mpi
+    more = ["--oversubscribe"] if "ompi" in pathlib.Path(launcher).resolve().name or "orte" in str(
+        pathlib.Path(launcher).resolve()) else []
+    return [launcher, *more, "-n", str(ranks), program]
+
+
+def mpi(work, launchers):
+    expected, _ = work.built()
+    for number, launcher in enumerate(launchers):
+        for ranks in (1, 2, 3, 4) if number == 0 else (1, 3):
+            result = work.same(expected, before=launch(launcher, ranks))
+            check((result["messages"]["bytes"] > 0) == (ranks > 1), f"{ranks} ranks: {result['messages']}")
+    # Ranks on two machines, as far as the program knows.
+    work.same(expected, before=launch(launchers[0], 4), VDVR_MPI_PRETEND_MACHINES="2")
+    refused = work.run(["build", work.scan, "-o", work.out], expected=2, before=launch(launchers[0], 2))
+    check("give a tolerance" in refused.stderr, refused.stderr)
+
+
+def ranks_of(launcher, program):
+    """Processes of the program below a launcher, the one that leads first: it is started first."""
+    parents, found = {}, []
+    for entry in pathlib.Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            text = (entry / "stat").read_text()
+            command = (entry / "cmdline").read_bytes().split(b"\0")[0].decode()
+        except OSError:
+            continue
+        parents[int(entry.name)] = int(text.rpartition(")")[2].split()[1])
+        if command == program:
+            found.append(int(entry.name))
+
+    def below(process):
+        while process > 1 and process != launcher:
+            process = parents.get(process, 0)
+        return process == launcher
+
+    return sorted(p for p in found if below(p))
+
+
+def start(work, launcher, ranks, *more):
+    command = [str(w) for w in [*launch(launcher, ranks), *work.build(*more)]]
+    with open(work.folder / "messages", "w", encoding="utf-8") as messages:
+        return subprocess.Popen(command, env=ENVIRONMENT, stdout=messages, stderr=messages)
+
+
+def end(process):
+    try:
+        return process.wait(timeout=120)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        raise Failure("the job did not end") from None
+
+
+def is_done(work):
+    return work.out.exists() and not (work.folder / "o.vdvr.journal").exists()
+
+
+def finish(work, expected, launcher, ranks):
+    """After a death: whether or not the job went on, --resume with another number of ranks ends in the same."""
+    if is_done(work):
+        found = json.loads(work.run(["info", work.out, "--json"]).stdout)
+        check(expected["content_sha256"] in json.dumps(found), "the job went on to other content")
+        work.out.unlink()
+        return False
+    work.same(expected, "--resume", "--force", before=launch(launcher, ranks))
+    return True
+
+
+def kills(work, launchers, workers, leaders):
+    launcher = launchers[0]
+    expected, _ = work.built()
+    begin = time.monotonic()
+    work.same(expected, before=launch(launcher, 3))
+    whole = time.monotonic() - begin
+    chance = random.Random(25)
+    resumed = 0
+    for kill in range(workers + leaders):
+        job = start(work, launcher, 3)
+        time.sleep(chance.uniform(0.1, 0.95) * whole)
+        ranks = ranks_of(job.pid, launcher[1])
+        if ranks:
+            victim = ranks[0] if kill >= workers else chance.choice(ranks[1:] or ranks)
+            try:
+                os.kill(victim, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        end(job)
+        resumed += finish(work, expected, launcher, 1 + kill % 4)
+    # A rank that hangs is given up, and its blocks are computed elsewhere.
+    job = start(work, launcher, 3, "--give-up", "2")
+    time.sleep(0.7 * whole)
+    ranks = ranks_of(job.pid, launcher[1])
+    if len(ranks) == 3:
+        os.kill(ranks[2], signal.SIGSTOP)
+    try:
+        end(job)
+    finally:
+        for rank in ranks:
+            try:
+                os.kill(rank, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+    finish(work, expected, launcher, 2)
+    print(f"{workers} ranks that work and {leaders} that lead were killed: {resumed} jobs were resumed; "
+          f"a whole one takes {whole:.1f} s")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", choices=["devices", "shares", "mpi", "kills"])
+    parser.add_argument("vdvr")
+    parser.add_argument("--mpi", nargs=2, action="append", default=[])
+    parser.add_argument("--workers", type=int, default=3)
+    parser.add_argument("--leaders", type=int, default=2)
+    args = parser.parse_args()
+    if args.what in ("mpi", "kills") and not args.mpi:
+        print(f"crew_{args.what}_test skipped: vdvr-mpi is not built, no MPI was found")
+        return 0
+    with tempfile.TemporaryDirectory(prefix="vdvr-crew-") as folder:
+        try:
+            work = Work(folder, args.vdvr)
+            if args.what == "kills":
+                kills(work, args.mpi, args.workers, args.leaders)
+            else:
+                {"devices": devices, "shares": shares, "mpi": mpi}[args.what](work, args.mpi)
+        except Failure as failure:
+            print(f"crew.py {args.what}: {failure}", file=sys.stderr)
+            messages = pathlib.Path(folder) / "messages"
+            if messages.exists():
+                print(messages.read_text(encoding="utf-8"), file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
