@@ -33,9 +33,9 @@ struct Header {
 };
 
 std::vector<std::byte> with_header(const Header& header, std::span<const std::byte> rest) {
-  std::vector<std::byte> out(sizeof header + rest.size());
-  std::memcpy(out.data(), &header, sizeof header);
-  if (!rest.empty()) std::memcpy(out.data() + sizeof header, rest.data(), rest.size());
+  const auto head = std::as_bytes(std::span(&header, 1));
+  std::vector<std::byte> out(head.begin(), head.end());
+  out.insert(out.end(), rest.begin(), rest.end());
   return out;
 }
 
