@@ -33,9 +33,10 @@ struct Header {
 };
 
 std::vector<std::byte> with_header(const Header& header, std::span<const std::byte> rest) {
-  const auto head = std::as_bytes(std::span(&header, 1));
-  std::vector<std::byte> out(head.begin(), head.end());
-  out.insert(out.end(), rest.begin(), rest.end());
+  std::vector<std::byte> out;
+  out.reserve(sizeof header + rest.size());
+  for (const std::byte b : std::as_bytes(std::span(&header, 1))) out.push_back(b);
+  for (const std::byte b : rest) out.push_back(b);
   return out;
 }
 

@@ -31,10 +31,10 @@ def check(holds, what):
 
 
 class Work:
-    def __init__(self, folder, vdvr):
+    def __init__(self, folder, vdvr, detector="25x13"):
         self.folder, self.vdvr = pathlib.Path(folder), vdvr
         self.scan, self.out = self.folder / "scan.h5", self.folder / "o.vdvr"
-        self.run(["simulate", "--phantom", "shepp-logan", "--detector", "25x13", "--pitch", "5.5", "--angles", "24",
+        self.run(["simulate", "--phantom", "shepp-logan", "--detector", detector, "--pitch", "5.5", "--angles", "24",
                   "-o", self.scan])
 
     def build(self, *more):
@@ -230,7 +230,8 @@ def main():
         return 0
     with tempfile.TemporaryDirectory(prefix="vdvr-crew-") as folder:
         try:
-            work = Work(folder, args.vdvr)
+            # Blocks are at most 32 cells wide: shares need some.
+            work = Work(folder, args.vdvr, "57x41" if args.what == "shares" else "25x13")
             if args.what == "kills":
                 kills(work, args.mpi, args.workers, args.leaders)
             else:
