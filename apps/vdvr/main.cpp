@@ -25,6 +25,8 @@ const std::vector<Command>& commands() {
       {"verify", "OUT.vdvr --projections IN", "measures a certificate again from scratch", verify_command},
       {"probe", "FILE --points P.csv -o V.csv", "values at points of a volume or of the exact field",
        probe_command},
+      {"residual", "SCAN FILE -o OUT", "where no interpolation can explain the measured rays",
+       residual_command},
       {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
       {"export", "OUT.vdvr -o VOL", "a certified volume in the format of other programs", export_command},
       {"convert-geometry", "IN -o geometry.xml", "RTK's geometry file of a cone-beam scan",

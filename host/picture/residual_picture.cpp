@@ -1,0 +1,164 @@
+// A row's residuals as a sinogram between a scale, the rms of each view and that of each column. Called by
+// the command residual.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "host/picture/bitmap_font.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/residual.hpp"
+
+namespace vdvr {
+namespace {
+
+using Colour = std::array<std::uint8_t, 3>;
+
+constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kAside{150, 150, 150}, kGrid{215, 215, 215},
+    kCurve{0, 90, 180};
+constexpr std::int64_t kEdge = 14, kLine = kFontHeight * 2 + 8, kBar = 14, kCurves = 90, kTicks = 74;
+
+/// Blue below, white at 0, red above; -1 to 1.
+Colour signed_colour(double x) {
+  constexpr std::array<double, 3> below{5, 48, 155}, above{170, 12, 30};
+  const double part = std::min(std::abs(x), 1.0);
+  const auto& end = x < 0 ? below : above;
+  Colour c{};
+  // A root, so that small residuals are told from none.
+  for (std::size_t i = 0; i < 3; ++i)
+    c[i] = static_cast<std::uint8_t>(std::lround(255 + std::sqrt(part) * (end[i] - 255)));
+  return c;
+}
+
+void fill(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c) {
+  for (std::int64_t j = std::max<std::int64_t>(0, y); j < std::min(image.height, y + h); ++j)
+    for (std::int64_t i = std::max<std::int64_t>(0, x); i < std::min(image.width, x + w); ++i)
+      std::copy(c.begin(), c.end(), image.rgb.begin() + (j * image.width + i) * 3);
+}
+
+struct Layout {
+  std::int64_t columns, views, zoom_x, zoom_y;
+  std::int64_t left = kEdge + kTicks, top = kEdge + 2 * kLine;
+  [[nodiscard]] std::int64_t width() const { return columns * zoom_x; }
+  [[nodiscard]] std::int64_t height() const { return views * zoom_y; }
+};
+
+/// Pixels of a ray: the sinogram is some 700 wide and 500 high where it can be.
+Layout layout_of(const ParallelGeometry& g) {
+  return {g.columns, g.views(), std::max<std::int64_t>(1, 700 / g.columns),
+          std::max<std::int64_t>(1, 500 / g.views())};
+}
+
+/// The 99th percentile of magnitudes: one spoilt view must not make all others white.
+double scale_of(const Residual& r, std::int64_t row) {
+  std::vector<double> magnitude;
+  for (std::int64_t k = 0; k < r.geometry.views(); ++k)
+    for (std::int64_t i = 0; i < r.geometry.columns; ++i)
+      if (const std::size_t at = r.index(k, row, i); !std::isnan(r.lo[at]))
+        magnitude.push_back(std::abs(r.middle(at)));
+  if (magnitude.empty()) return 1;
+  const auto place = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() * 99 / 100);
+  std::nth_element(magnitude.begin(), place, magnitude.end());
+  return *place > 0 ? *place : 1;
+}
+
+void draw_rays(Image& image, const Layout& l, const Residual& r, std::int64_t row, double scale) {
+  for (std::int64_t k = 0; k < l.views; ++k)
+    for (std::int64_t i = 0; i < l.columns; ++i) {
+      const std::size_t at = r.index(k, row, i);
+      fill(image, l.left + i * l.zoom_x, l.top + k * l.zoom_y, l.zoom_x, l.zoom_y,
+           std::isnan(r.lo[at]) ? kAside : signed_colour(r.middle(at) / scale));
+    }
+  // Every fourth pixel of a lattice: what lies below can still be seen.
+  constexpr std::int64_t lattice = 4;
+  for (std::int64_t y = 0; y < l.height(); y += lattice)
+    for (std::int64_t x = 0; x < l.width(); x += lattice)
+      if (r.beyond_interpolation(r.index(y / l.zoom_y, row, x / l.zoom_x)))
+        fill(image, l.left + x, l.top + y, 2, 2, kInk);
+}
+
+void draw_scale(Image& image, const Layout& l, double scale, const std::string& unit) {
+  const std::int64_t x = l.left + l.width() + kEdge + kCurves + 2 * kEdge;
+  for (std::int64_t y = 0; y < l.height(); ++y)
+    fill(image, x, l.top + y, kBar, 1,
+         signed_colour(1 - 2 * static_cast<double>(y) / static_cast<double>(l.height() - 1)));
+  const auto label = [&](std::int64_t y, double value) {
+    draw_text(image, x + kBar + 6, y, fmt::format("{:+.3g}", value), 2, kInk);
+  };
+  label(l.top, scale);
+  draw_text(image, x + kBar + 6, l.top + l.height() / 2 - kFontHeight, "0", 2, kInk);
+  label(l.top + l.height() - 2 * kFontHeight, -scale);
+  draw_text(image, x, l.top + l.height() + kEdge, "density", 2, kInk);
+  draw_text(image, x, l.top + l.height() + kEdge + kLine, "x " + unit, 2, kInk);
+}
+
+/// Curves of rms from 0: by view to the right of the rays, by column below.
+void draw_curves(Image& image, const Layout& l, const ResidualSummary& s) {
+  const auto length = [](double rms, double largest) {
+    return largest > 0 ? std::lround(rms / largest * static_cast<double>(kCurves)) : 0;
+  };
+  const std::int64_t right = l.left + l.width() + kEdge, below = l.top + l.height() + kEdge;
+  fill(image, right, l.top, 1, l.height(), kGrid);
+  for (std::int64_t k = 0; k < l.views; ++k)
+    fill(image, right, l.top + k * l.zoom_y,
+         length(s.views[static_cast<std::size_t>(k)].rms, s.worst_view.rms), l.zoom_y, kCurve);
+  fill(image, l.left, below, l.width(), 1, kGrid);
+  for (std::int64_t i = 0; i < l.columns; ++i)
+    fill(image, l.left + i * l.zoom_x, below, l.zoom_x,
+         length(s.columns[static_cast<std::size_t>(i)].rms, s.worst_column.rms), kCurve);
+  draw_text(image, right, l.top - kLine, fmt::format("rms, {:.2g}", s.worst_view.rms), 2, kInk);
+  draw_text(image, kEdge, below, "rms", 2, kInk);
+  draw_text(image, kEdge, below + kLine, fmt::format("{:.2g}", s.worst_column.rms), 2, kInk);
+}
+
+void draw_ticks(Image& image, const Layout& l) {
+  draw_text(image, kEdge, l.top, "view 0", 2, kInk);
+  draw_text(image, kEdge, l.top + l.height() - 2 * kFontHeight, fmt::format("{}", l.views - 1), 2, kInk);
+  draw_text(image, l.left, l.top - kLine, "column 0", 2, kInk);
+  const std::string last = fmt::format("{}", l.columns - 1);
+  draw_text(image, l.left + l.width() - static_cast<std::int64_t>(last.size()) * 2 * kFontAdvance,
+            l.top - kLine, last, 2, kInk);
+}
+
+}  // namespace
+
+Image residual_picture(const Residual& r, const ResidualSummary& s, std::int64_t row,
+                       const std::string& title) {
+  if (row < r.first_row || row >= r.first_row + r.rows)
+    throw InputError(fmt::format("`row` {} is none of {} to {}", row, r.first_row, r.first_row + r.rows - 1));
+  const Layout l = layout_of(r.geometry);
+  const double scale = scale_of(r, row);
+  constexpr std::int64_t numbers = 130;
+  const std::array<std::string, 3> caption{
+      fmt::format("{:.2f} % of {} rays: no interpolation within the certificate explains them (dots)",
+                  s.compared > 0
+                      ? 100.0 * static_cast<double>(s.beyond_interpolation) / static_cast<double>(s.compared)
+                      : 0.0,
+                  s.compared),
+      "red: measured more than F has along the ray; blue: less; grey: not compared",
+      fmt::format("worst view {} ({:.1f} times the median rms), worst column {} ({:.1f} times)",
+                  s.worst_view.index, s.median_view_rms > 0 ? s.worst_view.rms / s.median_view_rms : 0,
+                  s.worst_column.index,
+                  s.median_column_rms > 0 ? s.worst_column.rms / s.median_column_rms : 0)};
+  std::size_t longest = title.size();
+  for (const std::string& line : caption) longest = std::max(longest, line.size());
+  Image image{std::max(l.left + l.width() + 4 * kEdge + kCurves + kBar + numbers,
+                       static_cast<std::int64_t>(longest) * 2 * kFontAdvance + 2 * kEdge),
+              l.top + l.height() + 3 * kEdge + kCurves + 3 * kLine,
+              {}};
+  image.rgb.assign(static_cast<std::size_t>(image.width * image.height * 3), kPaper[0]);
+  draw_text(image, kEdge, kEdge, title, 2, kInk);
+  draw_rays(image, l, r, row, scale);
+  draw_curves(image, l, s);
+  draw_scale(image, l, scale, r.geometry.unit);
+  draw_ticks(image, l);
+  std::int64_t y = l.top + l.height() + 2 * kEdge + kCurves;
+  for (const std::string& line : caption) {
+    draw_text(image, kEdge, y, line, 2, kInk);
+    y += kLine;
+  }
+  return image;
+}
+
+}  // namespace vdvr
