@@ -74,8 +74,8 @@ SliceFrame frame_of(const Grid& volume, const ErrorSliceOptions& o, double epsil
   f.colours = error_colours(epsilon);
   f.quantity = "|V − F|";
   f.unit = per_unit(volume.unit);
-  // Room for two lines, whatever they will say.
-  f.caption = {"one", "two"};
+  // What the caption says is known only when the slice is done.
+  f.caption_lines = o.width < 400 ? 4 : 2;
   return f;
 }
 
@@ -146,7 +146,6 @@ ErrorSlice empty_slice(const SlicePlace& place) {
 void put_in_frame(ErrorSlice& slice, SliceFrame frame, const SlicePlace& place, const ErrorSliceOptions& o,
                   const std::string& line) {
   if (!place.framed) return;
-  // As many lines as the place was made for.
   frame.caption = {line, "Grey: not compared. Cyan: above epsilon, the end of the scale."};
   slice.image = framed_slice(frame, slice.image, o.width, o.height);
 }

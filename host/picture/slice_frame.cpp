@@ -104,6 +104,7 @@ Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
   l.unit = unit.name;
   l.bar_width = std::llround(0.9 * size);
   l.caption = wrapped(f.caption, w - 2 * size, 0.85 * size);
+  if (f.caption_lines > 0) l.caption.resize(static_cast<std::size_t>(f.caption_lines));
   const double caption = static_cast<double>(l.caption.size()) * line_height(0.85 * size);
   const double top = size + line, bottom = l.tick + l.gap + 2 * line + caption + 0.6 * size;
   const double room_y = h - top - bottom;

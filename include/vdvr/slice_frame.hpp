@@ -22,6 +22,7 @@ struct SliceFrame {
   std::string quantity = "density";
   std::string unit;                  ///< of the values, "" where unknown
   std::vector<std::string> caption;  ///< paragraphs below
+  int caption_lines = 0;             ///< kept free for them, more are left out; 0: as many as they take
 };
 
 /// Where the slice itself lies in a picture of a given size: square pixels, the grid's extent from edge to
