@@ -227,7 +227,7 @@ void draw_bar(Image& image, const SliceFrame& f, const Layout& l, std::int64_t w
   const double room = static_cast<double>(width - l.place.left) - text_width(title(f, l), size) - 2 * size;
   const std::string label = fitted(bar_label(f, l), room, size);
   draw_text(image, static_cast<double>(width) - 0.6 * size - text_width(label, size),
-            std::max(0.4 * size, static_cast<double>(top) - line_height(size)), label, size, kInk);
+            std::max(0.4 * size, static_cast<double>(top) - line_height(size) - l.gap), label, size, kInk);
 }
 
 }  // namespace
@@ -247,8 +247,8 @@ Image framed_slice(const SliceFrame& f, const Image& slice, std::int64_t width, 
   draw_scale_bar(image, l);
   draw_bar(image, f, l, width);
   draw_text(image, static_cast<double>(l.place.left),
-            std::max(0.4 * l.size, static_cast<double>(l.place.top) - line_height(l.size)), title(f, l),
-            l.size, kInk);
+            std::max(0.4 * l.size, static_cast<double>(l.place.top) - line_height(l.size) - l.gap),
+            title(f, l), l.size, kInk);
   for (std::size_t i = 0; i < l.caption.size(); ++i)
     draw_text(image, l.size, l.caption_top + static_cast<double>(i) * line_height(0.85 * l.size),
               l.caption[i], 0.85 * l.size, kInk);
