@@ -58,7 +58,7 @@ STATES = [
 
 def check_still_frames(vdvr, volume, served, folder):
     for i, members in enumerate(STATES):
-        line, image = served.frame({"state": {"width": 187, "height": 150, **members}})
+        line, image = served.frame({"state": {"width": 487, "height": 350, **members}})
         words = list(line["command"])
         if "transfer" in members:
             curve = folder / f"{i}.json"
