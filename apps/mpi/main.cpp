@@ -1,5 +1,5 @@
-// vdvr-mpi: plan, build, verify and run as ranks of an MPI job (docs/scaling.md). Rank 0 is the program `vdvr`
-// with the other ranks at hand; these compute blocks until it is done.
+// vdvr-mpi: plan, build, verify and run as ranks of an MPI job (docs/scaling.md). Rank 0 is the program
+// `vdvr` with the other ranks at hand; these compute blocks until it is done.
 #include <fmt/format.h>
 #include <mpi.h>
 
@@ -36,8 +36,8 @@ std::vector<Command> commands_of_ranks() {
 int lead(const std::vector<std::string>& words) {
   static const std::vector<Command> known = commands_of_ranks();
   if (words.empty() || words[0] == "--help" || words[0] == "-h") {
-    fmt::print("vdvr-mpi {}: {}\n\nusage: mpirun -n N vdvr-mpi COMMAND [options]\n\ncommands:\n", VDVR_VERSION,
-               purpose);
+    fmt::print("vdvr-mpi {}: {}\n\nusage: mpirun -n N vdvr-mpi COMMAND [options]\n\ncommands:\n",
+               VDVR_VERSION, purpose);
     for (const Command& c : known) fmt::print("  {:<16} {}\n", c.name, c.purpose);
     fmt::print("\nbuild and run spread their blocks over all ranks; plan and verify are rank 0's alone.\n");
     return words.empty() ? 2 : 0;

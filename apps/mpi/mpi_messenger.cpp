@@ -68,9 +68,10 @@ void write_all(const std::filesystem::path& path, std::uint64_t offset, std::spa
   }
   if (file >= 0) ::close(file);
   if (error != 0)
-    throw ResourceError(fmt::format("{}: the projections for ranks of this machine cannot be written: {}; set "
-                                    "TMPDIR to a folder with room",
-                                    path.string(), std::strerror(error)));
+    throw ResourceError(
+        fmt::format("{}: the projections for ranks of this machine cannot be written: {}; set "
+                    "TMPDIR to a folder with room",
+                    path.string(), std::strerror(error)));
 }
 
 }  // namespace
@@ -244,8 +245,8 @@ void MpiMessenger::hear_of_files() {
   }
   while (take(file_part, from, bytes)) {
     const Header header = header_of(bytes);
-    File& file = files_.contains(header.number) ? files_.at(header.number)
-                                                : new_file(header.number, header.bytes);
+    File& file =
+        files_.contains(header.number) ? files_.at(header.number) : new_file(header.number, header.bytes);
     const auto part = std::span<const std::byte>(bytes).subspan(sizeof header);
     write_all(file.path, file.written, part);
     file.written += part.size();
@@ -285,7 +286,8 @@ std::uint64_t MpiMessenger::share(std::span<const std::byte> bytes) {
   return number;
 }
 
-std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger::shared(std::uint64_t number) {
+std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger::shared(
+    std::uint64_t number) {
   while (!files_.contains(number) || !files_.at(number).whole) {
     throw_if_stopped();
     progress();
@@ -307,8 +309,9 @@ std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger:
     std::error_code ignored;
     std::filesystem::remove(file.path, ignored);
   }
-  return {{static_cast<const std::byte*>(first), bytes},
-          std::shared_ptr<const void>(first, [bytes](const void* p) { ::munmap(const_cast<void*>(p), bytes); })};
+  return {
+      {static_cast<const std::byte*>(first), bytes},
+      std::shared_ptr<const void>(first, [bytes](const void* p) { ::munmap(const_cast<void*>(p), bytes); })};
 }
 
 void MpiMessenger::flush() {
@@ -319,9 +322,8 @@ void MpiMessenger::flush() {
     std::erase_if(sending_, [&](const Sending& s) {
       return states_[static_cast<std::size_t>(s.to)] != State::here && s.request == MPI_REQUEST_NULL;
     });
-    if (std::all_of(sending_.begin(), sending_.end(), [&](const Sending& s) {
-          return states_[static_cast<std::size_t>(s.to)] != State::here;
-        }))
+    if (std::all_of(sending_.begin(), sending_.end(),
+                    [&](const Sending& s) { return states_[static_cast<std::size_t>(s.to)] != State::here; }))
       return;
     std::this_thread::sleep_for(pause);
   }

@@ -95,8 +95,7 @@ Journals open_journals(const Arguments& args, const CommonOptions& common,
     say(fmt::format("{}: {} does not exist: nothing to resume, starting afresh\n", args.who(),
                     out.own->path().string()));
   else if (!shares.empty())
-    say(
-        fmt::format("{}: {} and {} more are shares of a build, which --resume would have joined: they stay\n",
+    say(fmt::format("{}: {} and {} more are shares of a build, which --resume would have joined: they stay\n",
                     args.who(), shares.front().string(), shares.size() - 1));
   return out;
 }

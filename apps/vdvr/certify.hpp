@@ -40,8 +40,8 @@ BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted
 
 /// The journal of an output file: beside it, with this name.
 std::filesystem::path journal_path(const std::filesystem::path& output);
-/// Whether --resume was given and earlier processes left something to continue or to join: its own outputs are
-/// then no reason to refuse.
+/// Whether --resume was given and earlier processes left something to continue or to join: its own outputs
+/// are then no reason to refuse.
 bool continues(const Arguments& args, const std::filesystem::path& output);
 /// The journals of a build: its own, and those of shares that it joins.
 struct Journals {
@@ -53,8 +53,8 @@ struct Journals {
   void remove();
   [[nodiscard]] std::int64_t replayed() const;
 };
-/// Opens them for `build` and `run`, clears away what killed writers of `outputs` left, and says on stderr when
-/// there is nothing to resume or a journal is about to be replaced.
+/// Opens them for `build` and `run`, clears away what killed writers of `outputs` left, and says on stderr
+/// when there is nothing to resume or a journal is about to be replaced.
 Journals open_journals(const Arguments& args, const CommonOptions& common,
                        const std::filesystem::path& output,
                        const std::vector<std::filesystem::path>& outputs);

@@ -1,5 +1,5 @@
-// The table of commands, in command_table.cpp. main.cpp looks a command up, and hands it its arguments; each command lives in the
-// file of its name.
+// The table of commands, in command_table.cpp. main.cpp looks a command up, and hands it its arguments; each
+// command lives in the file of its name.
 #pragma once
 
 #include <vector>

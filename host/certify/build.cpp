@@ -46,12 +46,13 @@ std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, Plan& p
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));
   // Where blocks meet, the later one in the order of a single device counts.
   std::map<BlockPlace, Bytes> records;
-  run_blocks(crew, gold, shared, nullptr, gold.works(shared->selected, shared->purpose),
-             [&](const Bytes& record) {
-               ByteReader in(record);
-               records[get_key(in).place(0)] = record;
-             },
-             progress, "fit");
+  run_blocks(
+      crew, gold, shared, nullptr, gold.works(shared->selected, shared->purpose),
+      [&](const Bytes& record) {
+        ByteReader in(record);
+        records[get_key(in).place(0)] = record;
+      },
+      progress, "fit");
   for (const auto& [place, record] : records) {
     ByteReader in(record);
     get_key(in);
@@ -156,8 +157,8 @@ double node_tolerance(const Inputs& in, const SamplerTerms& sampler) {
                                    to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 
-// Of blocks of either rate, which lie on one lattice: whole cells of it, in order, that hold as many bricks to
-// test as those of the other shares.
+// Of blocks of either rate, which lie on one lattice: whole cells of it, in order, that hold as many bricks
+// to test as those of the other shares.
 void keep_share(const Inputs& in, const BuildShare& share, std::vector<std::uint8_t>& near) {
   const Bricks bricks(in.plan.grid, in.plan.layout.granularity);
   const Index3 n = bricks.along(), block = in.rates.block_bricks();
@@ -421,7 +422,8 @@ BuildResult build_all_or_share(Device& device, const ProjectionSet& scan, Plan p
   check_line_integrals(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
   const Units units = units_of(scan);
-  if (units.are_world()) return build_in_units(device, scan, units, std::move(plan), options, share, progress);
+  if (units.are_world())
+    return build_in_units(device, scan, units, std::move(plan), options, share, progress);
   const Grid grid = plan.grid;
   BuildOptions wanted = options;
   if (options.roi) wanted.roi = from_world(*options.roi, units);

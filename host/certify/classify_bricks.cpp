@@ -33,8 +33,8 @@ Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
   return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
 }
 
-ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
-                               Progress progress, Refuse refuse)
+ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host, Progress progress,
+                               Refuse refuse)
     : bricks_(bricks),
       host_(host),
       fine_(gold.fine),

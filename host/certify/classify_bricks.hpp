@@ -34,8 +34,8 @@ class ClassifyBricks {
   using Refuse = std::function<void(float slack, double tolerance)>;
 
   /// All but `progress` is referred to. `bricks`: levels, involved and tiles are written.
-  ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host,
-                 Progress progress, Refuse refuse);
+  ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMemory& host, Progress progress,
+                 Refuse refuse);
 
   /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
   /// that stay at level 0 are measured on the stored base samples, which closing does not change.

@@ -36,7 +36,7 @@ struct Inputs {
   const std::vector<std::uint8_t>& selected;  // by brick: in the region of interest
   JournalledRates& gold;
   GoldRates& rates;
-  Crew* crew;  // none: the device alone
+  Crew* crew;             // none: the device alone
   double arithmetic = 0;  // fp32 error bound of any gold sample
   const Room& room;       // for what is made of the bricks
   const Progress& progress;

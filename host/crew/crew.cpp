@@ -43,8 +43,8 @@ std::vector<Works> cut(const GoldStream& gold, const Works& works, std::size_t w
         pieces.emplace_back();
         room = wanted;
       }
-      const auto n = std::min(w.first.size() - from,
-                              static_cast<std::size_t>(std::max(1.0, std::round(room / block))));
+      const auto n =
+          std::min(w.first.size() - from, static_cast<std::size_t>(std::max(1.0, std::round(room / block))));
       GoldStream::Work part = w;
       part.first.assign(w.first.begin() + static_cast<std::ptrdiff_t>(from),
                         w.first.begin() + static_cast<std::ptrdiff_t>(from + n));

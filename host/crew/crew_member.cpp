@@ -5,9 +5,9 @@
 namespace vdvr {
 
 void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* field,
-                    const opencl::DeviceArray<std::uint8_t>& selected, std::span<const GoldStream::Work> works,
-                    const std::function<void(Bytes)>& on_record, const Progress& progress,
-                    const std::string& stage) {
+                    const opencl::DeviceArray<std::uint8_t>& selected,
+                    std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,
+                    const Progress& progress, const std::string& stage) {
   gold.run_works(
       works, pass.selected,
       [&](GoldBatch& batch) {
@@ -40,9 +40,7 @@ GoldStream& CrewMember::stream() {
   return pass_->fine ? both.fine() : *both.coarse();
 }
 
-double CrewMember::arithmetic() {
-  return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic();
-}
+double CrewMember::arithmetic() { return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic(); }
 
 void CrewMember::use(const MixedVolume& volume, const Room& room) {
   field_.reset();

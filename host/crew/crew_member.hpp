@@ -14,7 +14,8 @@ namespace vdvr {
 
 class CrewMember {
  public:
-  /// The scan and its sups are referred to. `settings`: of the build, without the lattice, which passes bring.
+  /// The scan and its sups are referred to. `settings`: of the build, without the lattice, which passes
+  /// bring.
   CrewMember(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
              const GoldSettings& settings)
       : state_(state), scan_(scan), sups_(sups), settings_(settings) {}
@@ -46,8 +47,8 @@ class CrewMember {
 
 /// Works of a pass on a stream, record by record.
 void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* field,
-                    const opencl::DeviceArray<std::uint8_t>& selected, std::span<const GoldStream::Work> works,
-                    const std::function<void(Bytes)>& on_record, const Progress& progress,
-                    const std::string& stage);
+                    const opencl::DeviceArray<std::uint8_t>& selected,
+                    std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,
+                    const Progress& progress, const std::string& stage);
 
 }  // namespace vdvr

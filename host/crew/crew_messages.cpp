@@ -156,7 +156,8 @@ std::string get_text(ByteReader& in) {
 }
 void put(ByteWriter& out, CrewWord word) { out.put(static_cast<std::uint8_t>(word)); }
 
-void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups, const GoldSettings& settings) {
+void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups,
+              const GoldSettings& settings) {
   put(out, scan.geometry);
   put_struct(out, scan.views);
   out.put(scan.fft_length);

@@ -68,14 +68,15 @@ void JournalledGold::run(BlockPass pass, const DeviceField* field,
   pass.lattice = gold_.settings().lattice;
   if (std::find(pass.selected.begin(), pass.selected.end(), 1) == pass.selected.end()) return;
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));
-  run_blocks(crew_, gold_, shared, field, unknown(*shared, apply),
-             [&](const Bytes& record) {
-               if (records_) records_->add(record);
-               ByteReader in(record);
-               get_key(in);
-               apply(in);
-             },
-             progress, stage);
+  run_blocks(
+      crew_, gold_, shared, field, unknown(*shared, apply),
+      [&](const Bytes& record) {
+        if (records_) records_->add(record);
+        ByteReader in(record);
+        get_key(in);
+        apply(in);
+      },
+      progress, stage);
 }
 
 }  // namespace vdvr

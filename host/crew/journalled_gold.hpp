@@ -17,8 +17,8 @@
 
 namespace vdvr {
 
-/// The records of a build: those of its own journal, and of the journals of its parts, by their blocks. Blocks
-/// end in any order, so records are found wherever they lie.
+/// The records of a build: those of its own journal, and of the journals of its parts, by their blocks.
+/// Blocks end in any order, so records are found wherever they lie.
 class BlockRecords {
  public:
   /// All are referred to; no journal: nullptr.
@@ -59,8 +59,7 @@ class JournalledGold {
   [[nodiscard]] GoldStream& gold() { return gold_; }
 
  private:
-  std::vector<GoldStream::Work> unknown(const BlockPass& pass,
-                                        const std::function<void(ByteReader)>& apply);
+  std::vector<GoldStream::Work> unknown(const BlockPass& pass, const std::function<void(ByteReader)>& apply);
 
   GoldStream& gold_;
   bool fine_;

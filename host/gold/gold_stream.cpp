@@ -314,8 +314,7 @@ void GoldStream::take_addends(Batch& batch) {
 }
 
 void GoldStream::run_blocks(Batch& batch, const Work& work, const std::vector<std::uint8_t>& selected,
-                            const OnBatch& on_batch,
-                            const std::function<void(double)>& tick) {
+                            const OnBatch& on_batch, const std::function<void(double)>& tick) {
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
   const std::int64_t together = begin_batch(batch, work, slab_of(work));

@@ -239,7 +239,8 @@ std::optional<std::vector<std::byte>> Journal::next() {
 std::vector<std::byte> Journal::at(std::size_t number) const {
   const std::uint64_t start = starts_.at(number), bytes = size_of(file_);
   std::uint64_t length = 0;
-  if (start + prefix_bytes <= bytes && read_at(file_, start + sizeof(std::uint32_t), &length, sizeof length) &&
+  if (start + prefix_bytes <= bytes &&
+      read_at(file_, start + sizeof(std::uint32_t), &length, sizeof length) &&
       length <= bytes - start - prefix_bytes) {
     std::vector<std::byte> payload(length);
     if (read_at(file_, start + prefix_bytes, payload.data(), payload.size())) return payload;

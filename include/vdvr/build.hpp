@@ -56,9 +56,9 @@ struct BuildResult {
 VDVR_API BuildResult build(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                            const Progress& progress = {});
 
-/// Computes a share's blocks into `options.journal`, which a later build() takes as one of its `parts`: of the
-/// same scan, plan and options. Blocks differ by what their bricks need alone, so that the parts together are
-/// all that a build classifies. Throws what build() throws.
+/// Computes a share's blocks into `options.journal`, which a later build() takes as one of its `parts`: of
+/// the same scan, plan and options. Blocks differ by what their bricks need alone, so that the parts together
+/// are all that a build classifies. Throws what build() throws.
 VDVR_API void build_share(Device& device, const ProjectionSet& scan, Plan plan, const BuildOptions& options,
                           const BuildShare& share, const Progress& progress = {});
 

@@ -50,9 +50,9 @@ class VDVR_API Messenger {
 
 /// Beside the device that build() is given.
 struct CrewOptions {
-  std::vector<Device*> devices;    ///< of this process; not owned
-  Messenger* messenger = nullptr;  ///< to other processes; not owned
-  std::string device_of_others;    ///< what their Device is opened with; of "0,1" each takes one, in turn
+  std::vector<Device*> devices;        ///< of this process; not owned
+  Messenger* messenger = nullptr;      ///< to other processes; not owned
+  std::string device_of_others;        ///< what their Device is opened with; of "0,1" each takes one, in turn
   std::uint64_t memory_of_others = 0;  ///< for all of a machine; 0: half of what is free there
   std::string scratch_of_others;
   /// Devices may differ: the certificate names all, charges the worst, and which device computes what decides

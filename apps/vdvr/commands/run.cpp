@@ -133,8 +133,7 @@ std::vector<std::string> verify_words(const Arguments& args, const OutputFolder&
   for (const std::string option : {"angles-file", "beam"})
     if (args.has(option)) words.insert(words.end(), {"--" + option, args.text(option)});
   // verify measures on one.
-  if (const std::string one = first_device(args); !one.empty())
-    words.insert(words.end(), {"--device", one});
+  if (const std::string one = first_device(args); !one.empty()) words.insert(words.end(), {"--device", one});
   return words;
 }
 
