@@ -48,7 +48,10 @@ void add_options(Arguments& args) {
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
       .value("step", "S", "of dvr and mip, in base cells (default 1); iso goes from cell to cell")
-      .value("step-mode", "fixed|level", "of dvr; level: step / 2^l in bricks of level l (default fixed)")
+      .value(
+          "step-mode", "adaptive|fixed|level",
+          "of dvr; adaptive: finer steps where the transfer function changes much along one; level: step / "
+          "2^l in bricks of level l (default adaptive; of preintegrated and d2vr fixed)")
       .value("classification", "post|preintegrated",
              "of dvr; post: colour of each sample; preintegrated: of the path between two (default post)")
       .value(
@@ -136,6 +139,15 @@ std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
   return surfaces;
 }
 
+/// Steps adapt where they can.
+StepMode step_mode_option(const Arguments& args, const RenderOptions& o) {
+  const bool can =
+      o.mode == RenderMode::dvr && o.classification == Classification::post && method_option(args) != "d2vr";
+  const std::string asked =
+      args.choice("step-mode", {"adaptive", "fixed", "level"}, can ? "adaptive" : "fixed");
+  return asked == "adaptive" ? StepMode::adaptive : asked == "level" ? StepMode::level : StepMode::fixed;
+}
+
 /// Everything that the words alone decide; what depends on the volume is filled in by `complete`.
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
@@ -151,11 +163,10 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
-  o.step_mode =
-      args.choice("step-mode", {"fixed", "level"}, "fixed") == "level" ? StepMode::level : StepMode::fixed;
   o.classification = args.choice("classification", {"post", "preintegrated"}, "post") == "preintegrated"
                          ? Classification::preintegrated
                          : Classification::post;
+  o.step_mode = step_mode_option(args, o);
   const std::string output = args.choice("show", kOutputs, "colour");
   o.output = output == "depth"    ? RenderOutput::depth
              : output == "normal" ? RenderOutput::normal
@@ -205,9 +216,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (o.mode == RenderMode::mip)
     refuse(args, {"no-shading", "gradient", "light"}, "does not apply to --mode mip, which has no light");
   if (o.mode != RenderMode::dvr) refuse(args, {"step-mode", "classification"}, "applies to --mode dvr");
-  if (o.step_mode == StepMode::level && o.classification == Classification::preintegrated)
+  if (o.step_mode != StepMode::fixed && o.classification == Classification::preintegrated)
     throw InputError(
-        "--step-mode level does not apply to --classification preintegrated, whose table is of one step");
+        fmt::format("--step-mode {} does not apply to --classification preintegrated, whose table is of one "
+                    "step",
+                    args.text("step-mode")));
   if (o.mode != RenderMode::iso) refuse(args, {"iso", "iso-opacity"}, "applies to --mode iso");
   if (o.output != RenderOutput::colour)
     refuse(args, {"axes", "box", "colorbar", "background", "no-shading", "light"},
