@@ -68,7 +68,8 @@ void add_options(Arguments& args) {
   add_scan(args);
   add_projection_options(args);
   args.group("Camera");
-  add_orbit(args, kOrbit);
+  add_orbit(args, kOrbit, "what is shown");
+  add_frame(args);
   add_free_camera(args);
   add_overlay(args);
 }
@@ -207,7 +208,7 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
     refuse(args,
-           {"azimuth", "elevation", "zoom", "turntable", "tf", "iso", "step", "no-shading", "show",
+           {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading", "show",
             "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
   // What a slice takes of it is the window; an error picture's colours always run to epsilon.
@@ -313,6 +314,7 @@ struct Stage {
   Source& source;
   const Overlay& overlay;
   bool certified;
+  OrbitFrame frame;
 
   [[nodiscard]] RenderResult draw(const RenderOptions& o) const {
     return render_with_overlay(source, o, overlay, certified);
@@ -328,7 +330,7 @@ RenderResult turn(const Arguments& args, const Stage& stage, RenderOptions o, st
     report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
     Orbit orbit = orbit_options(args, kOrbit);
     orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
-    o.camera = camera_for(args, stage.source.scene().volume.grid, orbit);
+    o.camera = camera_for(args, stage.frame, orbit);
     last = stage.draw(o);
     take(f, last.image);
   }
@@ -432,12 +434,14 @@ int render_command(Arguments& args) {
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.slice_range = given_range(args).value_or(std::pair{bright.grey_lo, bright.grey_hi});
   o.sampler = safe_sampler(o.sampler, scene.certificate);
-  o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
+  const Orbit orbit = orbit_options(args, kOrbit);
+  const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
+  o.camera = camera_for(args, frame, orbit);
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr";
   o.skip_empty = !args.has("no-skip");
 
-  const Stage stage{source, overlay, certified};
+  const Stage stage{source, overlay, certified, frame};
   const RenderResult result =
       kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
       : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
