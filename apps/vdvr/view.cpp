@@ -115,10 +115,13 @@ void add_frame(Arguments& args) {
              "shown; with --box grid)");
 }
 
+bool frames_grid(const Arguments& args) {
+  return args.choice("frame", {"shown", "grid"}, args.has("box") ? "grid" : "shown") == "grid";
+}
+
 OrbitFrame frame_for(const Arguments& args, const MixedVolume& volume, const RenderOptions& o,
                      const Orbit& orbit) {
-  const bool whole = args.choice("frame", {"shown", "grid"}, args.has("box") ? "grid" : "shown") == "grid";
-  if (whole || o.mode == RenderMode::slice) return frame_grid(volume.grid);
+  if (frames_grid(args) || o.mode == RenderMode::slice) return frame_grid(volume.grid);
   return args.has("turntable") ? frame_turn(volume, o, orbit.elevation)
                                : frame_view(volume, o, orbit.azimuth, orbit.elevation);
 }

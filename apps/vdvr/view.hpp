@@ -38,6 +38,8 @@ const std::vector<std::string>& free_camera_options();
 bool has_free_camera(const Arguments& args);
 /// --frame.
 void add_frame(Arguments& args);
+/// Throws InputError for another word than its two.
+bool frames_grid(const Arguments& args);
 /// What zoom 1 fits, by --frame: of one picture what `options` show from there, of a turntable what they show
 /// all around; the grid where that is nothing, and where its edges are drawn.
 OrbitFrame frame_for(const Arguments& args, const MixedVolume& volume, const RenderOptions& options,

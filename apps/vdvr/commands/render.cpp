@@ -203,6 +203,7 @@ void check_d2vr(const Arguments& args, const RenderOptions& o) {
 void check_combination(const Arguments& args, const RenderOptions& o) {
   if (method_option(args) == "d2vr") check_d2vr(args, o);
   const bool flat = o.mode == RenderMode::slice || o.mode == RenderMode::error;
+  frames_grid(args);
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
