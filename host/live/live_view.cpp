@@ -139,6 +139,8 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
     words.push_back(value);
   };
   if (v.mode == RenderMode::slice || v.mode == RenderMode::error) {
+    // A viewer's controls stand around its slices.
+    if (v.mode == RenderMode::slice) words.emplace_back("--plain");
     add("--slice-axis", std::string(1, "xyz"[v.slice_axis]));
     add("--slice-position", fmt::format("{}", v.slice_position));
     if (v.mode == RenderMode::slice && v.slice_range.first < v.slice_range.second)
