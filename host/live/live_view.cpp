@@ -126,6 +126,7 @@ RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int6
   o.slice_range = view.slice_range;
   o.shading = view.shading;
   o.gradient = GradientKind::automatic;
+  o.step_mode = StepMode::adaptive;
   o.sampler = scene.sampler;
   return o;
 }
@@ -153,6 +154,8 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
     add("--azimuth", fmt::format("{}", v.azimuth_deg));
     add("--elevation", fmt::format("{}", v.elevation_deg));
     add("--zoom", fmt::format("{}", v.zoom));
+    // A hand turns about the grid's middle, whatever the transfer function shows.
+    add("--frame", "grid");
     return words;
   }
   const Camera c = camera_of(v, scene.grid);
