@@ -247,6 +247,9 @@ double Crew::message_seconds() const { return state_->traffic.seconds; }
 void Crew::use(const MixedVolume& volume, const Room& room) {
   for (State::Member& m : state_->members)
     if (!m.lost) m.worker->use(volume, room);
+  // No pass need follow before the caller changes it.
+  for (State::Member& m : state_->members)
+    if (!m.worker->is_remote()) m.worker->halt();
 }
 
 namespace {
