@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/bounds/covered_range.hpp"
+#include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/classify_bricks.hpp"
@@ -135,15 +136,19 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const L
   return bricks;
 }
 
-// The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
-double node_tolerance(const Inputs& in, const SamplerTerms& sampler) {
-  if (in.plan.settings.comparison.terms == Terms::grid) return in.plan.epsilon_abs;
-  const double tolerance = in.plan.epsilon_abs - in.arithmetic -
-                           std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+// What a bound holds beside what is measured at nodes: arithmetic and the device's samplers.
+double beside_nodes(const Inputs& in, const SamplerTerms& sampler) {
+  if (in.plan.settings.comparison.terms == Terms::grid) return 0;
+  return in.arithmetic + std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+}
+
+// The largest |V - gold| + T + P that leaves room for these.
+double node_tolerance(const Inputs& in, double epsilon_abs, const SamplerTerms& sampler) {
+  const double tolerance = epsilon_abs - beside_nodes(in, sampler);
   if (tolerance > 0) return tolerance;
   throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
-                                   to_world(in.plan.epsilon_abs, in.units),
-                                   to_world(in.plan.epsilon_abs - tolerance, in.units)));
+                                   to_world(epsilon_abs, in.units),
+                                   to_world(epsilon_abs - tolerance, in.units)));
 }
 
 [[noreturn]] void refuse_slack(const Inputs& in, const ClassifyBricks::Bounds& bounds, float slack,
@@ -193,13 +198,14 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
 // Levels only rise. A brick that was found over the tolerance stays so until it changes: what was raised
 // for it can have been a neighbour whose samples round to what they were.
 std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks& test, OpenBricks& bricks,
-                                          double tolerance) {
+                                          const NodeTolerance& tolerances) {
   const std::vector<BrickMeasure>& measures = test.measures();
   const bool anisotropic = in.gold.fine.gold().settings().anisotropic;
   std::vector<LevelTriple> to = bricks.level;
   for (std::size_t i = 0; i < to.size(); ++i) {
     const BrickMeasure& m = measures[i];
     if (!bricks.involved[i] || m.violated == 0) continue;
+    const double tolerance = tolerances.of(i);
     // Of a brick that coarse gold proposed a level for.
     if (!(static_cast<double>(m.slack) <= tolerance)) refuse_slack(in, test.bounds(), m.slack, tolerance);
     if (!raise_levels(bricks, static_cast<std::int64_t>(i), m.violated,
@@ -224,19 +230,20 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
 }
 
 // Whether a measured volume will do; else the smaller tolerance that it is brought within.
-using Accept = std::function<std::optional<double>(const Measured&)>;
+using Accept = std::function<std::optional<NodeTolerance>(const Measured&)>;
 
 // Those that a smaller tolerance may ask more of than the one they were measured with.
-std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures, double tolerance) {
+std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures,
+                                       const NodeTolerance& tolerance) {
   std::vector<std::uint8_t> above(measures.size(), 0);
   for (std::size_t i = 0; i < above.size(); ++i)
-    above[i] = !(static_cast<double>(measures[i].total) <= tolerance);
+    above[i] = !(static_cast<double>(measures[i].total) <= tolerance.of(i));
   return above;
 }
 
 // Closes, packs, measures; raises bricks until every node is within the tolerance, and the volume accepted.
-Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, double tolerance,
-                           const Accept& accept) {
+Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks,
+                           NodeTolerance tolerance, const Accept& accept) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
   // change those.
   std::vector<std::uint8_t> pending(bricks.level.size());
@@ -270,10 +277,10 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      const std::optional<double> smaller = accept(out);
+      std::optional<NodeTolerance> smaller = accept(out);
       if (!smaller) return out;
       volume = std::move(out.volume);
-      tolerance = *smaller;
+      tolerance = std::move(*smaller);
       test.measure(field, volume.level, tolerance, bricks_above(test.measures(), tolerance), "repair");
       in.watch.lap("verify");
     }
@@ -315,11 +322,12 @@ Vec3 position_of(const Inputs& in, const MixedVolume& volume, const BrickMeasure
 
 Certificate certify(const Inputs& in, const Device& device, const ProjectionSet& scan,
                     const FilteredScan& filtered, const BuildOptions& options, const Measured& measured,
-                    const SamplerTerms& sampler) {
+                    const SamplerTerms& sampler, double epsilon_abs) {
   const Plan& plan = in.plan;
   Certificate c;
-  c.epsilon = plan.epsilon;
-  c.epsilon_abs = plan.epsilon_abs;
+  c.epsilon =
+      epsilon_abs == plan.epsilon_abs ? plan.epsilon : plan.epsilon * (epsilon_abs / plan.epsilon_abs);
+  c.epsilon_abs = epsilon_abs;
   c.reference_range = plan.reference_range;
   const BrickMeasure* worst = nullptr;
   c.brick_totals.reserve(measured.bricks.size());
@@ -445,17 +453,26 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
   // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
-  const double tolerance = node_tolerance(in, with_reserve(sampler_of(slopes, longest_atlas(device.info()))));
+  const SamplerTerms reserved = with_reserve(sampler_of(slopes, longest_atlas(device.info())));
+  std::optional<BrickRefinement> refinement;
+  if (options.refinement) refinement.emplace(*options.refinement, units);
+  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
+  const double tolerance = node_tolerance(in, epsilon_abs, reserved);
   if (options.journal)
     options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
   int times = 0;
-  const Accept accept = [&](const Measured& measured) -> std::optional<double> {
+  const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
     const SamplerTerms sampler =
         sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
-    result.certificate = certify(in, device, scan, filtered, options, measured, sampler);
+    result.certificate = certify(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
+    if (refinement)
+      if (auto smaller = refinement->next(measured.volume, result.certificate, beside_nodes(in, sampler),
+                                          node_tolerance(in, plan.epsilon_abs, reserved)))
+        return smaller;
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
-    return node_tolerance(in, with_reserve(sampler));
+    const double less = node_tolerance(in, epsilon_abs, with_reserve(sampler));
+    return refinement ? refinement->with_bricks(less) : NodeTolerance(less);
   };
   try {
     result.volume = measured_volume(in, base, settings.lattice, tolerance, accept).volume;

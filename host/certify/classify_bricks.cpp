@@ -299,28 +299,27 @@ void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
             progress_, "repair", GoldStream::For::samples);
 }
 
-void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
-                                const std::vector<std::uint8_t>& selected, const std::string& stage,
+void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field,
+                                const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected,
+                                const std::string& stage,
                                 const std::function<void(const BrickMeasure&)>& visit) {
   if (!any(selected)) return;
   const opencl::DeviceArray<std::uint8_t> on_device(state_, std::span<const std::uint8_t>(selected),
                                                     "bricks to measure");
-  gold.run(
-      selected,
-      {[&](GoldStream::Batch& batch) {
-         ByteWriter out;
-         for (const BrickMeasure& m : batch.measure(field, static_cast<float>(tolerance), on_device, true))
-           put(out, m);
-         return out.take();
-       },
-       [&](ByteReader in) {
-         while (!in.empty()) visit(get_measure(in));
-       }},
-      progress_, stage);
+  gold.run(selected,
+           {[&](GoldStream::Batch& batch) {
+              ByteWriter out;
+              for (const BrickMeasure& m : batch.measure(field, tolerance, on_device, true)) put(out, m);
+              return out.take();
+            },
+            [&](ByteReader in) {
+              while (!in.empty()) visit(get_measure(in));
+            }},
+           progress_, stage);
 }
 
 void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
-                             double tolerance, const std::vector<std::uint8_t>& pending,
+                             const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                              const std::string& stage) {
   for_each_band(pending, [&](const std::vector<std::uint8_t>& of_band) {
     measure_band(field, stored, tolerance, of_band, stage);
@@ -328,16 +327,16 @@ void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTr
 }
 
 void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored,
-                                  double tolerance, const std::vector<std::uint8_t>& pending,
+                                  const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                                   const std::string& stage) {
   std::vector<std::uint8_t> rest = pending;
   if (coarse_) {
     // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance);
+      easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance.of(i));
     measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
-      if (coarse_verdict(m, tolerance) != Verdict::within) return;
+      if (coarse_verdict(m, tolerance.of(at(m.brick))) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
       take_slack(m);
       rest[at(m.brick)] = 0;
@@ -349,7 +348,7 @@ void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<Le
   });
 }
 
-void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {
+void ClassifyBricks::sharpen(const DeviceField& field, const NodeTolerance& tolerance) {
   if (!coarse_) return;
   const int rate = fine_.gold().settings().rate;
   for (;;) {

@@ -161,11 +161,16 @@ void GoldBatch::require_slack() {
              first_brick_, gold_, margin_, addend_, above_, below_);
 }
 
-std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tolerance,
+std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const NodeTolerance& tolerance,
                                              const opencl::DeviceArray<std::uint8_t>& selected, bool parts) {
   std::vector<cl_int4> firsts;
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
   const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  std::vector<float> tolerances(addend_.size(), static_cast<float>(tolerance.of_all));
+  for (const std::int64_t brick : bricks_)
+    tolerances[slot(brick)] = static_cast<float>(tolerance.of(at(brick)));
+  const opencl::DeviceArray<float> on_device(state_, std::span<const float>(tolerances),
+                                             "tolerances of bricks");
   const auto window = widened_window(errors_, settings_);
   const VdvrCellTest test{.z_first = to_int(shape_.z_first),
                           .z_last = to_int(shape_.z_last),
@@ -174,10 +179,9 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tol
                           .window_low = static_cast<float>(window.first),
                           .window_high = static_cast<float>(window.second),
                           .parts = parts ? 1 : 0,
-                          .tolerance = tolerance,
                           .curvature = eighth * of_curvature_};
   const CellTestResults found =
-      cell_test(state_, field, {gold_, margin_, addend_, first, shape_on_device()}, test, selected,
+      cell_test(state_, field, {gold_, margin_, addend_, on_device, first, shape_on_device()}, test, selected,
                 std::int64_t{settings_.granularity} * settings_.rate);
   std::vector<BrickMeasure> out;
   for (const std::int64_t brick : bricks_) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host/gold/gold_stream.hpp"
+#include "host/gold/node_tolerance.hpp"
 
 namespace vdvr {
 
@@ -96,7 +97,7 @@ class GoldBatch {
 
   /// Measures a stored field on every selected brick. `parts`: also which parts of it violate the tolerance,
   /// at the cost of that brick once more.
-  std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance,
+  std::vector<BrickMeasure> measure(const DeviceField& field, const NodeTolerance& tolerance,
                                     const opencl::DeviceArray<std::uint8_t>& selected, bool parts = false);
 
  private:
