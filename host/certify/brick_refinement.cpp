@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -13,8 +13,8 @@ namespace vdvr {
 BrickRefinement::BrickRefinement(const Refinement& wanted, const Units& units)
     : wanted_(wanted), units_(units), everywhere_(from_world(wanted.everywhere_abs, units)) {}
 
-std::optional<NodeTolerance> BrickRefinement::next(const MixedVolume& volume, const Certificate& certificate,
-                                                   double rest, double least) {
+bool BrickRefinement::asks(const MixedVolume& volume, const Certificate& certificate, double rest,
+                           double least) {
   const std::vector<float> asked = [&] {
     if (units_.are_world()) return wanted_.ask(volume, certificate);
     MixedVolume in_world = volume;
@@ -22,7 +22,7 @@ std::optional<NodeTolerance> BrickRefinement::next(const MixedVolume& volume, co
     in_world.grid = to_world(volume.grid, units_);
     return wanted_.ask(in_world, to_world(certificate, units_));
   }();
-  if (asked.empty()) return std::nullopt;
+  if (asked.empty()) return false;
   if (asked.size() != volume.level.size())
     throw InputError(fmt::format("refinement asks for {} bricks of {}", asked.size(), volume.level.size()));
   if (by_brick_.empty()) by_brick_.assign(asked.size(), std::numeric_limits<float>::infinity());
@@ -35,8 +35,7 @@ std::optional<NodeTolerance> BrickRefinement::next(const MixedVolume& volume, co
     const float total = certificate.brick_totals[i];
     more = more || (total >= 0 && total > tolerance);
   }
-  if (!more) return std::nullopt;
-  return with_bricks(everywhere_);
+  return more;
 }
 
 }  // namespace vdvr

@@ -2,7 +2,6 @@
 // Called by build.cpp.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "host/gold/node_tolerance.hpp"
@@ -18,10 +17,9 @@ class BrickRefinement {
   /// What |V - F| may be everywhere.
   [[nodiscard]] double everywhere() const { return everywhere_; }
   /// Asks. `rest` is what a brick's bound holds beside what is measured at nodes, `least` the least tolerance
-  /// of a node. Tolerances only fall: nothing where `ask` is content, or asks for nothing that bricks do not
+  /// of a node. Tolerances only fall: false where `ask` is content, or asks for nothing that bricks do not
   /// have.
-  std::optional<NodeTolerance> next(const MixedVolume& volume, const Certificate& certificate, double rest,
-                                    double least);
+  bool asks(const MixedVolume& volume, const Certificate& certificate, double rest, double least);
   /// With those asked for so far.
   [[nodiscard]] NodeTolerance with_bricks(double all) const { return {all, by_brick_}; }
 

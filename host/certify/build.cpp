@@ -17,7 +17,7 @@
 #include "host/certify/close_boundaries.hpp"
 #include "host/gold/prepared_scan.hpp"
 #include "host/certify/raise_levels.hpp"
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/gold/worst_node.hpp"
@@ -181,17 +181,19 @@ double node_tolerance(const Inputs& in, double epsilon_abs, const SamplerTerms& 
                                    to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 
-void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, double tolerance) {
+void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, NodeTolerance tolerance) {
   // Gold computed in two blocks differs by rounding; a brick at the gold rate must pass all the same. The
   // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
   double largest = 0;
   for (const float v : bricks.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
-  const double strict = tolerance - std::min(2 * in.arithmetic, 0x1p-15 * largest);
+  const double less = std::min(2 * in.arithmetic, 0x1p-15 * largest);
+  tolerance.of_all -= less;
+  for (float& one : tolerance.by_brick) one -= static_cast<float>(less);
   // Those that may hold a tested node.
   std::vector<std::uint8_t> near = in.gold.fine.gold().bricks_near_coverage();
   for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && in.selected[i];
   const DeviceField base(in.state, as_mixed(bricks.base, in.gold.fine.gold().settings()));
-  test.classify(base, strict, near);
+  test.classify(base, tolerance, near);
   in.watch.lap("classify");
 }
 
@@ -292,7 +294,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 
 // The volume of these base samples within the tolerance.
 Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
-                         double tolerance, const Accept& accept) {
+                         const NodeTolerance& tolerance, const Accept& accept) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
@@ -461,27 +463,36 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   if (options.journal)
     options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
   int times = 0;
+  bool refined = false;
   const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
     const SamplerTerms sampler =
         sampler_of(field_slopes(measured.volume), atlas_length(device.info(), measured.volume));
     result.certificate = certify(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
-    if (refinement)
-      if (auto smaller = refinement->next(measured.volume, result.certificate, beside_nodes(in, sampler),
-                                          node_tolerance(in, plan.epsilon_abs, reserved)))
-        return smaller;
+    refined = refinement && refinement->asks(measured.volume, result.certificate, beside_nodes(in, sampler),
+                                             node_tolerance(in, plan.epsilon_abs, reserved));
+    if (refined) return std::nullopt;
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
     const double less = node_tolerance(in, epsilon_abs, with_reserve(sampler));
     return refinement ? refinement->with_bricks(less) : NodeTolerance(less);
   };
+  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
+  const auto volume_on = [&](const Lattice& lattice) {
+    for (;;) {
+      times = 0;
+      MixedVolume volume =
+          measured_volume(in, base, lattice, refinement ? refinement->with_bricks(tolerance) : tolerance,
+                          accept)
+              .volume;
+      if (!refined) return volume;
+    }
+  };
   try {
-    result.volume = measured_volume(in, base, settings.lattice, tolerance, accept).volume;
+    result.volume = volume_on(settings.lattice);
   } catch (const ToleranceError&) {
     // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
     if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic) throw;
-    times = 0;
-    const Lattice floats = lattice_of(base, plan, units, StorageChoice::f32);
-    result.volume = measured_volume(in, base, floats, tolerance, accept).volume;
+    result.volume = volume_on(lattice_of(base, plan, units, StorageChoice::f32));
   }
   return result;
 }

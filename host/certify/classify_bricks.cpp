@@ -83,7 +83,7 @@ bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
   return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
 }
 
-void ClassifyBricks::classify(const DeviceField& base, double tolerance,
+void ClassifyBricks::classify(const DeviceField& base, const NodeTolerance& tolerance,
                               const std::vector<std::uint8_t>& near) {
   // Nothing of an earlier attempt stays: its levels are of another tolerance, or of another lattice.
   host_.uncount(tile_bytes_);
@@ -122,7 +122,7 @@ void ClassifyBricks::for_each_band(const std::vector<std::uint8_t>& selected, co
   progress_ = whole_progress_;
 }
 
-void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
+void ClassifyBricks::classify_band(const DeviceField& base, const NodeTolerance& tolerance,
                                    const std::vector<std::uint8_t>& near) {
   std::vector<std::uint8_t> refined = near;
   if (coarse_) {
@@ -130,18 +130,18 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
     test(*coarse_, base, tolerance, near, "screen", [&](const Levels& l) {
       const std::size_t id = at(l.base.brick);
       coarse_slack_[id] = l.base.slack;
-      const Verdict verdict = coarse_verdict(l.base, tolerance);
+      const Verdict verdict = coarse_verdict(l.base, tolerance.of(id));
       if (verdict != Verdict::beyond) refined[id] = 0;
       if (verdict == Verdict::undecided) undecided[id] = 1;
       if (verdict == Verdict::within) take(l, true);
     });
     test(fine_, base, tolerance, undecided, "screen", [&](const Levels& l) {
-      if (passes(l.base, tolerance)) take(l, true);
+      if (passes(l.base, tolerance.of(at(l.base.brick)))) take(l, true);
       else refined[at(l.base.brick)] = 1;
     });
     std::vector<std::uint8_t> easy = refined, hard = refined;
     for (std::size_t i = 0; i < easy.size(); ++i) {
-      easy[i] = refined[i] && is_easy(i, tolerance);
+      easy[i] = refined[i] && is_easy(i, tolerance.of(i));
       hard[i] = refined[i] && !easy[i];
     }
     refine(*coarse_, base, tolerance, easy, GoldStream::For::samples);
@@ -153,7 +153,7 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
 }
 
 // Level 0 only.
-void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
                           const std::vector<std::uint8_t>& selected, const std::string& stage,
                           const std::function<void(const Levels&)>& visit) {
   if (!any(selected)) return;
@@ -162,7 +162,7 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
   gold.run(selected,
            {[&](GoldStream::Batch& batch) {
               std::vector<Levels> levels;
-              for (const BrickMeasure& m : batch.measure(base, static_cast<float>(tolerance), on_device))
+              for (const BrickMeasure& m : batch.measure(base, tolerance, on_device))
                 levels.push_back({m, {}, false, {}});
               return record(levels, {}, {});
             },
@@ -172,7 +172,7 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
 
 // Levels above 0, with their tiles. On coarse gold only levels that it can test are taken. What is proposed
 // is measured on fine gold later, as every refined brick that coarse gold does not pass.
-void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
                             const std::vector<std::uint8_t>& selected, GoldStream::For purpose) {
   if (!any(selected)) return;
   const bool fine = &gold == &fine_;
@@ -181,30 +181,30 @@ void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, doubl
   const auto taken = [&](const Levels& l) {
     return fine || (l.base.total >= 0 && l.passes && is_above_base(l.level));
   };
-  gold.run(
-      selected,
-      {[&](GoldStream::Batch& batch) {
-         std::vector<Levels> levels;
-         Tiles tiles;
-         std::vector<float> samples;
-         for (const BrickClass& c : batch.classify(base, static_cast<float>(tolerance), on_device, fine)) {
-           levels.push_back({c.base, c.level, c.passes, c.along});
-           if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
-           tiles.emplace_back(c.base.brick, c.level);
-           samples.insert(samples.end(), c.tile.begin(), c.tile.end());
-         }
-         return record(levels, tiles, samples);
-       },
-       [&](ByteReader in) {
-         read(in, [&](const Levels& l) {
-           if (!taken(l)) return;
-           if (fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
-             refuse_(l.base.slack, tolerance);
-           take(l, purpose != GoldStream::For::proposing);
-         });
-         take_tiles(in);
-       }},
-      progress_, "classify", purpose);
+  gold.run(selected,
+           {[&](GoldStream::Batch& batch) {
+              std::vector<Levels> levels;
+              Tiles tiles;
+              std::vector<float> samples;
+              for (const BrickClass& c : batch.classify(base, tolerance, on_device, fine)) {
+                levels.push_back({c.base, c.level, c.passes, c.along});
+                if (!taken(levels.back()) || c.base.total < 0 || !is_above_base(c.level)) continue;
+                tiles.emplace_back(c.base.brick, c.level);
+                samples.insert(samples.end(), c.tile.begin(), c.tile.end());
+              }
+              return record(levels, tiles, samples);
+            },
+            [&](ByteReader in) {
+              read(in, [&](const Levels& l) {
+                if (!taken(l)) return;
+                if (fine && l.base.total >= 0 &&
+                    !(static_cast<double>(l.base.slack) <= tolerance.of(at(l.base.brick))))
+                  refuse_(l.base.slack, tolerance.of(at(l.base.brick)));
+                take(l, purpose != GoldStream::For::proposing);
+              });
+              take_tiles(in);
+            }},
+           progress_, "classify", purpose);
 }
 
 void ClassifyBricks::take(const Levels& l, bool is_bound) {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/output.hpp"
@@ -29,17 +31,20 @@ int build_file(const Arguments& args, const CommonOptions& common, const Wanted&
                      {"storage", storage_json(result.volume, bytes)},
                      {"resumed", {{"records", wanted.options.build.journal->replayed()}}},
                      {"peak_bytes", device.peak_memory()},
+                     {"pictures", pictures_json(planned)},
                      {record_name(result.certificate), certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
     print_scan(planned.scan);
     print_grid(result.volume.grid);
     print_certificate(result.certificate);
+    print_pictures(planned);
     print_storage(result.volume, bytes);
     print_seconds(result.seconds);
     fmt::print("written        {}\n", output.string());
   });
-  return certificate_exit_code(args.who(), result.certificate);
+  return std::max(pictures_exit_code(args.who(), planned),
+                  certificate_exit_code(args.who(), result.certificate));
 }
 
 }  // namespace
