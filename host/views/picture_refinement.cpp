@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -38,6 +39,25 @@ std::vector<float> bounds_of(const Certificate& certificate) {
   const std::vector<float> image = brick_bounds(certificate, true);
   for (std::size_t i = 0; i < bounds.size(); ++i) bounds[i] = std::max(bounds[i], image[i]);
   return bounds;
+}
+
+// A brick beside much coarser ones is raised, and raises them, beyond need: closing gives it their values on
+// all that they share, and repair finds out a level at a time. So bricks near one that must be fine are held
+// to what it is, and those behind them to twice that and so on.
+void grade_bounds(std::vector<float>& bounds, const Index3& n) {
+  constexpr std::array<float, 5> steps{1, 1, 2, 2, 2};
+  for (const float step : steps) {
+    const std::vector<float> before = bounds;
+    for (std::int64_t z = 0; z < n[2]; ++z)
+      for (std::int64_t y = 0; y < n[1]; ++y)
+        for (std::int64_t x = 0; x < n[0]; ++x) {
+          float& own = bounds[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)];
+          for (std::int64_t k = std::max<std::int64_t>(0, z - 1); k <= std::min(n[2] - 1, z + 1); ++k)
+            for (std::int64_t j = std::max<std::int64_t>(0, y - 1); j <= std::min(n[1] - 1, y + 1); ++j)
+              for (std::int64_t i = std::max<std::int64_t>(0, x - 1); i <= std::min(n[0] - 1, x + 1); ++i)
+                own = std::min(own, step * before[static_cast<std::size_t>((k * n[1] + j) * n[0] + i)]);
+        }
+  }
 }
 
 }  // namespace
@@ -130,6 +150,9 @@ std::vector<float> PictureRefinement::Impl::ask(const MixedVolume& volume, const
   if (round.worst > options.levels && static_cast<int>(rounds.size()) < options.most_rounds) {
     const double allowed = std::max(aim * options.levels, round_share * round.worst);
     asked = spend(bounds, demands_of(pixels, bounds, allowed));
+    for (std::size_t i = 0; i < asked.size(); ++i)
+      if (!(asked[i] < bounds[i])) asked[i] = std::numeric_limits<float>::infinity();
+    grade_bounds(asked, volume.bricks());
     for (std::size_t i = 0; i < asked.size(); ++i) {
       // What is asked already, and what closing and rounding make of it anyway.
       constexpr float same = 0.98f;
