@@ -5,16 +5,16 @@
 #define VDVR_RAYCAST_BASE_FIRST_H
 
 // Samples [*k, stop) of the bricks that are open, in the lanes `drawn`; BASE: all of them read the base.
-#define TAKE_STRETCH(BASE)                                                                   \
-  for (; k < stop; ++k) {                                                                    \
-    const I active = drawn & (k < ends) & (seen.alpha < p.termination);                      \
-    if (!ANY(active)) break;                                                                 \
-    const float t = ((float)k + 0.5f) * p.step;                                              \
-    const V3 c = position_at(&ray, grid, (V)(t));                                            \
-    const Sampled sampled = sample_base_first(THE_FIELD, &brick, BASE, grid, c);             \
-    samples += PICK(active, (I)(1), (I)(0));                                                 \
-    composite(THE_FIELD, bricks, grid, table, &p, &ray, &brick, &sampled, c, (V)(t), active, \
-              &seen THE_BOUNDS);                                                             \
+#define TAKE_STRETCH(BASE)                                                                 \
+  for (; k < stop; ++k) {                                                                  \
+    const I active = drawn & (k < ends) & (seen.alpha < p.termination);                    \
+    if (!ANY(active)) break;                                                               \
+    const V t = middle_of_step(&ray, (V)((float)k * p.step), (V)(p.step));                 \
+    const V3 c = position_at(&ray, grid, t);                                               \
+    const Sampled sampled = sample_base_first(THE_FIELD, &brick, BASE, grid, c);           \
+    samples += PICK(active, (I)(1), (I)(0));                                               \
+    composite(THE_FIELD, bricks, grid, table, &p, &ray, &brick, &sampled, c, k, t, active, \
+              &seen THE_BOUNDS);                                                           \
   }
 
 // As the other raycast_dvr. `distance` is the guide: which bricks read the base, and which show nothing.
@@ -23,13 +23,14 @@ __kernel VDVR_HINT void raycast_dvr(DVR_ARGUMENTS) {
   Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
-  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
+  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step);
   const int end = most_lane(ends);
   int k = 0;
   while (k < end) {
     const I wanted = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(wanted)) break;
-    const I3 at = brick_at(grid, position_at(&ray, grid, (V)(((float)k + 0.5f) * p.step)));
+    const V middle = middle_of_step(&ray, (V)((float)k * p.step), (V)(p.step));
+    const I3 at = brick_at(grid, position_at(&ray, grid, middle));
     const I guide = TO_I(GATHER(U8, distance, brick_index(grid, at)));
     // A tile is a brick of its own.
     const I radius = MOST((guide & (VDVR_GUIDE_EMPTY - 1)) - 1, (I)(0));

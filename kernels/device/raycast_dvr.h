@@ -184,10 +184,32 @@ RAY_INLINE void put(int width, int height, __global float4* restrict picture,
 #undef PUT
 }
 
-// Samples per ray, and 0 for rays that miss the box or the picture.
+// Samples per ray, one a step of which any part lies in the box, and 0 for rays that miss the box or the
+// picture.
 RAY_INLINE I ends_of(const VdvrRaycast* p, const Ray* ray, I px, I py, V samples) {
   const I hits = (ray->length > 0.0f) & (px < p->width) & (py < p->height);
   return PICK(hits, TO_I(ceil(samples)), (I)(0));
+}
+
+// A ray's last step ends where the ray leaves the box. Of the step that begins at `from`: the middle of what
+// the ray has of it, and what share of a whole step that is.
+RAY_INLINE V middle_of_step(const Ray* ray, V from, V step) {
+  const V whole = from + 0.5f * step, cut = 0.5f * (from + ray->length);
+  return LEAST(whole, cut);
+}
+RAY_INLINE V share_of_step(const Ray* ray, V from, V inverse_step) {
+  V share = (ray->length - from) * inverse_step;
+  share = LEAST(share, (V)(1.0f));
+  return MOST(share, (V)(0.0f));
+}
+// The opacity of a share of a step. Lane by lane, so that the number of lanes changes no bit.
+RAY_INLINE V opacity_of_share(V opacity, V share) {
+  if (!ANY(share < 1.0f)) return opacity;
+#define ONE(n) \
+  if (LANE(share, n) < 1.0f) LANE(opacity, n) = 1.0f - pow(1.0f - LANE(opacity, n), LANE(share, n));
+  EACH(ONE)
+#undef ONE
+  return opacity;
 }
 
 #define THE_PIXELS                                         \
@@ -256,18 +278,20 @@ RAY_INLINE void put_seen(const VdvrRaycast* p, __global float4* restrict picture
 }
 
 #if VDVR_KERNEL == VDVR_KERNEL_DVR
-// Composites what was sampled at c, parameter t, in the lanes `active`.
+// Composites step k, which was sampled at c, parameter t, in the lanes `active`.
 RAY_INLINE void composite(FIELD, BRICKS, VdvrGrid grid, __global const float4* restrict table,
                           const VdvrRaycast* p, const Ray* ray, const OpenBrick* brick,
-                          const Sampled* sampled, V3 c, V t, I active, Seen* seen BOUNDS) {
+                          const Sampled* sampled, V3 c, int k, V t, I active, Seen* seen BOUNDS) {
   const V at = place_in_table(p, sampled->value);
   // Most samples that show nothing lie where the transfer function's first or last entries are 0.
   if (!ANY(active & (at >= p->shown_from) & (at < p->shown_to))) return;
   const Row row = row_at(p, at);
-  const V weight = PICK(active, (1.0f - seen->alpha) * opacity_of(table, p, row), (V)(0.0f));
-  if (ANY(weight > 0.0f))
-    absorb(THE_FIELD, bricks, grid, p, ray, brick, sampled, c, t, colour_of(table, row), weight,
-           (V)(SHADED_WEIGHT * p->step), seen THE_BOUNDS);
+  const V none = (V)(0.0f), opacity = PICK(active, opacity_of(table, p, row), none);
+  if (!ANY(opacity > 0.0f)) return;
+  const V share = share_of_step(ray, (V)((float)k * p->step), (V)(p->inverse_step));
+  const V weight = (1.0f - seen->alpha) * opacity_of_share(opacity, share);
+  absorb(THE_FIELD, bricks, grid, p, ray, brick, sampled, c, t, colour_of(table, row), weight,
+         SHADED_WEIGHT * p->step * share, seen THE_BOUNDS);
 }
 
 #define DVR_ARGUMENTS                                                                          \
@@ -285,15 +309,15 @@ __kernel VDVR_HINT void raycast_dvr(DVR_ARGUMENTS) {
   Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
-  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step - 0.5f);
+  const I ends = ends_of(&p, &ray, px, py, ray.length * p.inverse_step);
   const int end = most_lane(ends);
   OpenBrick brick = no_brick();
   int k = 0;
   while (k < end) {
     const I active = (k < ends) & (seen.alpha < p.termination);
     if (!ANY(active)) break;
-    const float t = ((float)k + 0.5f) * p.step;
-    const V3 c = position_at(&ray, grid, (V)(t));
+    const V t = middle_of_step(&ray, (V)((float)k * p.step), (V)(p.step));
+    const V3 c = position_at(&ray, grid, t);
     if (ANY(active & NOT(is_inside(&brick, c)))) {
       const I3 at = brick_at(grid, c);
       if (p.skip) {
@@ -307,8 +331,7 @@ __kernel VDVR_HINT void raycast_dvr(DVR_ARGUMENTS) {
     }
     const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
     samples += PICK(active, (I)(1), (I)(0));
-    composite(THE_FIELD, bricks, grid, table, &p, &ray, &brick, &sampled, c, (V)(t), active,
-              &seen THE_BOUNDS);
+    composite(THE_FIELD, bricks, grid, table, &p, &ray, &brick, &sampled, c, k, t, active, &seen THE_BOUNDS);
     ++k;
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.alpha, samples);

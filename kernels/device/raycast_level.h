@@ -50,23 +50,25 @@ __kernel VDVR_HINT void raycast_level(FIELD, BRICKS, VdvrGrid grid, __global con
         }
       }
     }
-    const V middle = LEAST((V)(((float)k + 0.5f) * p.step), ray.length);
+    const V middle = middle_of_step(&ray, (V)((float)k * p.step), (V)(p.step));
     const I level = level_at(bricks, grid, position_at(&ray, grid, middle)), parts = (I)(1) << level;
     const V part = p.step / TO_V(parts);
     const int most = most_lane(PICK(wanted, parts, (I)(0)));
     for (int i = 0; i < most; ++i) {
-      const V t = (float)k * p.step + ((float)i + 0.5f) * part;
-      const I active = wanted & (i < parts) & (t < ray.length) & (seen.alpha < p.termination);
+      const V from = (float)k * p.step + (float)i * part, t = middle_of_step(&ray, from, part);
+      const I active = wanted & (i < parts) & (from < ray.length) & (seen.alpha < p.termination);
       if (!ANY(active)) continue;
       const V3 c = position_at(&ray, grid, t);
       if (ANY(active & NOT(is_inside(&brick, c)))) brick = open_brick(bricks, grid, brick_at(grid, c));
       const Sampled sampled = sample_open(THE_FIELD, &brick, grid, c);
       const Row row = row_of(&p, sampled.value);
       samples += PICK(active, (I)(1), (I)(0));
-      const V weight = PICK(active, (1.0f - seen.alpha) * opacity_of_level(table, &p, row, level), none);
-      if (ANY(weight > 0.0f))
-        absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, t, colour_of(table, row), weight,
-               SHADED_WEIGHT * part, &seen THE_BOUNDS);
+      const V opacity = PICK(active, opacity_of_level(table, &p, row, level), none);
+      if (!ANY(opacity > 0.0f)) continue;
+      const V share = share_of_step(&ray, from, p.inverse_step * TO_V(parts));
+      const V weight = (1.0f - seen.alpha) * opacity_of_share(opacity, share);
+      absorb(THE_FIELD, bricks, grid, &p, &ray, &brick, &sampled, c, t, colour_of(table, row), weight,
+             SHADED_WEIGHT * part * share, &seen THE_BOUNDS);
     }
     ++k;
   }

@@ -46,14 +46,6 @@ RAY_INLINE V3 colour_between(__global const float4* restrict table, const VdvrRa
   return rgb;
 }
 
-// Of a part of a step. Lane by lane, so that the number of lanes changes no bit.
-RAY_INLINE V opacity_of_part(V opacity, V part) {
-#define ONE(n) LANE(opacity, n) = 1.0f - pow(1.0f - LANE(opacity, n), LANE(part, n));
-  EACH(ONE)
-#undef ONE
-  return opacity;
-}
-
 // Steps lie between samples t_j = j step, the last ends where the ray leaves the grid. Bricks whose values
 // lie in one stretch of the transfer function without opacity are leapt over together: between two of their
 // samples nothing is absorbed. Geometry: of the middle of the step that brings the opacity to a half.
@@ -63,7 +55,7 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
                                               __global float4* restrict picture,
                                               __global uint* restrict row_samples BOUNDS) {
   THE_PIXELS;
-  const V none = (V)(0.0f), one = (V)(1.0f);
+  const V none = (V)(0.0f);
   Seen seen = nothing_seen((V)(VDVR_BOUNDS ? -1.0f : NAN));
   I samples = 0, away = 0;
   const Ray ray = cast_rays(&p, grid, px, py);
@@ -88,12 +80,8 @@ __kernel VDVR_HINT void raycast_preintegrated(FIELD, BRICKS, VdvrGrid grid,
 #if VDVR_BOUNDS
       const I3 before_at = brick_at(grid, position_at(&ray, grid, (V)(before)));
 #endif
-      V opacity = opacity_between(table, &p, front, back);
-      const I is_part = active & (j == ends) & (opacity > 0.0f);
-      if (ANY(is_part)) {
-        const V rest = (ray.length - before) * p.inverse_step, part = LEAST(rest, one);
-        opacity = PICK(is_part, opacity_of_part(opacity, MOST(part, none)), opacity);
-      }
+      const V whole = opacity_between(table, &p, front, back);
+      const V opacity = opacity_of_share(whole, share_of_step(&ray, (V)(before), (V)(p.inverse_step)));
       const V weight = PICK(active, (1.0f - seen.alpha) * opacity, none);
       if (ANY(weight > 0.0f)) {
         const V middle = 0.5f * (before + t);

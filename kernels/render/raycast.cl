@@ -1,8 +1,8 @@
 // Ray-casting of the mixed-resolution field: emission-absorption (dvr), iso-surfaces (iso), maximum (mip),
 // slice. One source for both samplers and for packets of 1 to 16 rays per work-item (device/packet.h).
 //
-// Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, and each belongs to the brick that
-// vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
+// Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, the last in the middle of the path
+// that is left. Each belongs to the brick that vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
 // rays of a packet share k; each counts from its own entry. So neither skipping nor packets change a bit.
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where

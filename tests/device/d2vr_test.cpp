@@ -238,6 +238,37 @@ BOOST_AUTO_TEST_CASE(picture_is_that_of_a_finely_sampled_volume) {
   BOOST_TEST(direct.samples > 0);
 }
 
+BOOST_AUTO_TEST_CASE(every_ray_counts_the_path_it_has) {
+  const ProjectionSet scan = soft_scan();
+  const D2vrField field(device(), scan, {});
+  const Grid grid = box(22, 1);
+  const D2vrScene scene(device(), field, grid);
+  constexpr double opacity = 0.05;
+  RenderOptions o = options_for(grid);
+  o.shading = false;
+  o.termination = 1;
+  o.transfer = {"constant", {{0, {1, 1, 1}, opacity}, {1, {1, 1, 1}, opacity}}};
+  for (const double step : {0.7, 5.0, 100.0}) {
+    o.step = step;
+    const FloatPicture picture = raycast_float(scene, o);
+    double worst = 0;
+    int shorter = 0;
+    for (std::int64_t i = 0; i < o.width * o.height; ++i) {
+      const auto [in, out] =
+          reference::clip(reference::pixel_ray(o.camera, o.width, o.height, i % o.width, i / o.width), grid);
+      const double path = std::max(0.0, out - in);
+      if (path > 0 && path < step / 2) ++shorter;
+      worst = std::max(worst, std::abs(static_cast<double>(picture.pixels[at(i)].s[3]) -
+                                       (1 - std::pow(1 - opacity, path))));
+    }
+    BOOST_TEST(shorter > 0);
+    // As in raycast_steps_test.
+    const double distance = std::sqrt(reference::dot(o.camera.position, o.camera.position));
+    const double ends = 2 * 16 * u * distance * -std::log(1 - opacity);
+    BOOST_TEST(!(worst > tolerance::fp32_sum(4 * static_cast<std::int64_t>(39 / step + 1) + 64, 1) + ends));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(normals_are_central_differences_of_the_field) {
   const ProjectionSet scan = soft_scan();
   const D2vrField field(device(), scan, {});

@@ -102,6 +102,51 @@ BOOST_AUTO_TEST_CASE(a_constant_slab_absorbs_by_the_closed_form_whatever_the_ste
   }
 }
 
+BOOST_AUTO_TEST_CASE(every_ray_counts_the_path_it_has_whatever_the_step) {
+  const Grid grid = centred_grid({24, 20, 16}, {1, 1.25, 2});
+  constexpr double opacity = 0.05;
+  constexpr std::int64_t kSize = 33;
+  const ResidentVolume v(
+      device(), fields::mixed(grid, 4, scattered_levels, [](double, double, double) { return 0.5; }));
+  RenderOptions o = along_y(grid, kSize);
+  o.transfer = {"constant", {{0, {1, 1, 1}, opacity}, {1, {1, 1, 1}, opacity}}};
+  struct Kernel {
+    Classification classification;
+    StepMode step_mode;
+    GradientKind gradient;
+  };
+  // The last is raycast_base_first.h.
+  for (const Kernel kernel : {Kernel{Classification::post, StepMode::fixed, GradientKind::central},
+                              Kernel{Classification::preintegrated, StepMode::fixed, GradientKind::central},
+                              Kernel{Classification::post, StepMode::level, GradientKind::central},
+                              Kernel{Classification::post, StepMode::fixed, GradientKind::stored}})
+    for (const double step : {0.7, 1.0, 5.0, 100.0}) {
+      o.camera = orbit_camera(grid, 37, 21, 1);
+      o.classification = kernel.classification;
+      o.step_mode = kernel.step_mode;
+      o.gradient = kernel.gradient;
+      o.step = step;
+      const auto alpha = raycast(device(), v, o).values.values;
+      double worst = 0;
+      int shorter = 0;
+      for (std::int64_t i = 0; i < kSize * kSize; ++i) {
+        const auto [in, out] =
+            reference::clip(reference::pixel_ray(o.camera, kSize, kSize, i % kSize, i / kSize), grid);
+        const double path = std::max(0.0, out - in);
+        if (path > 0 && path < step / 2) ++shorter;
+        worst = std::max(worst, std::abs(static_cast<double>(alpha[static_cast<std::size_t>(i)]) -
+                                         (1 - std::pow(1 - opacity, path))));
+      }
+      BOOST_TEST(shorter > 0);
+      // Steps of up to eight parts each round their opacity and weight, and 16 u of a power; both ends of a
+      // ray err by 16 u of the eye's distance, which the extinction turns into opacity.
+      const double distance = std::hypot(o.camera.position[0], o.camera.position[1], o.camera.position[2]);
+      const double ends = 2 * 16 * u * distance * -std::log(1 - opacity);
+      BOOST_TEST(
+          !(worst > tolerance::fp32_sum(4 * 8 * static_cast<std::int64_t>(45 / step + 1) + 64, 1) + ends));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(level_steps_are_fixed_steps_where_all_is_base) {
   const ResidentVolume v(device(), as_mixed(fields::uniform(centred_grid({30, 27, 33}), blob)));
   for (const double step : {1.0, 0.5, 4.0}) {

@@ -67,14 +67,17 @@ struct Emission {
   double alpha = 0;  ///< of one step
 };
 /// Front to back at entry + (k + 1/2) step, without background, shading or early end: rgb (premultiplied) and
-/// opacity.
+/// opacity. The last step ends at the exit: its sample is in the middle of what is left of it, its opacity
+/// that of so much of a step.
 inline std::array<double, 4> emission_absorption(const Ray& r, const Grid& g, double step,
                                                  const std::function<Emission(const Vec3&)>& f) {
   const auto [in, out] = clip(r, g);
   std::array<double, 4> sum{0, 0, 0, 0};
-  for (double t = in + step / 2; t < out; t += step) {
-    const Emission e = f(along(r, t));
-    const double weight = (1 - sum[3]) * e.alpha;
+  for (std::int64_t k = 0; in + static_cast<double>(k) * step < out; ++k) {
+    const double from = in + static_cast<double>(k) * step, to = std::min(from + step, out);
+    const Emission e = f(along(r, (from + to) / 2));
+    const double alpha = 1 - std::pow(1 - e.alpha, (to - from) / step);
+    const double weight = (1 - sum[3]) * alpha;
     for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * e.rgb[c];
     sum[3] += weight;
   }
