@@ -15,17 +15,55 @@ namespace vdvr::cli {
 void add_plan_options(Arguments& args) {
   add_scan(args);
   add_tolerance(args);
+  args.group("Pictures")
+      .value("picture-tolerance", "N",
+             "refine until every pixel of the views is certain to N levels of 255; --epsilon then holds "
+             "everywhere (default 25%)")
+      .value("views", "VIEWS.json", "the cameras, the size and the transfer function of these pictures")
+      .value("picture-finest", "0.002|0.2%",
+             "the least tolerance that a brick is asked for, of the range (default N / 4000)");
   add_field(args);
   add_grid(args);
   add_rates(args);
 }
+
+namespace {
+
+// Where no view looks, a volume is still one: a quarter of the range tells what is there.
+constexpr double everywhere_of_pictures = 0.25;
+// Levels to a fraction of the range: what a pixel of a sharp transfer function asks of the bricks that it
+// sees.
+constexpr double levels_to_finest = 4000;
+
+std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
+  if (!args.has("picture-tolerance")) {
+    refuse(args, {"views", "picture-finest"}, "goes with --picture-tolerance");
+    return std::nullopt;
+  }
+  if (!args.has("views"))
+    throw InputError("--picture-tolerance needs --views VIEWS.json: the pictures that it speaks of");
+  refuse(args, {"window"}, "excludes --picture-tolerance: bricks beside the window have no bound");
+  PictureWanted out;
+  out.levels = args.positive_or("picture-tolerance", out.levels);
+  if (out.levels > 255)
+    throw InputError(fmt::format("--picture-tolerance: {} levels, but a pixel has 255", out.levels));
+  out.views = read_views(args.path("views"));
+  out.finest =
+      args.has("picture-finest") ? fraction_option(args, "picture-finest") : out.levels / levels_to_finest;
+  return out;
+}
+
+}  // namespace
 
 Wanted wanted_of(const Arguments& args) {
   Wanted w;
   w.options.field = field_options(args);
   w.options.grid = grid_options(args);
   w.options.rates = rate_options(args);
-  w.tolerance = tolerance(args);
+  w.pictures = pictures_wanted(args);
+  w.tolerance = w.pictures && !args.has("epsilon") && !args.has("epsilon-abs")
+                    ? Tolerance{everywhere_of_pictures, {}}
+                    : tolerance(args);
   w.options.build = build_options(args);
   w.options.plan = plan_settings(args);
   return w;
@@ -49,12 +87,31 @@ Wanted wanted_to_certify(const Arguments& args) {
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress) {
   Planned planned;
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress);
-  planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
+  const Tolerance finest = wanted.pictures ? Tolerance{wanted.pictures->finest, {}} : wanted.tolerance;
+  planned.plan = make_plan(device, planned.scan, finest, wanted.options, progress);
+  if (!wanted.pictures) return planned;
+  PictureRefinementOptions options;
+  options.levels = wanted.pictures->levels;
+  planned.pictures = std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan,
+                                                         planned.plan.field, std::move(options), progress);
   return planned;
 }
 
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
-  return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
+  if (!planned.pictures)
+    return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
+  const Plan& plan = planned.plan;
+  const double everywhere = wanted.tolerance.absolute.value_or(wanted.tolerance.relative.value_or(1) *
+                                                               (plan.epsilon_abs / plan.epsilon));
+  if (!(everywhere >= plan.epsilon_abs))
+    throw InputError(
+        fmt::format("--epsilon {:.4g} lies below {:.4g}, the least that --picture-finest asks of a brick",
+                    everywhere, plan.epsilon_abs));
+  CertifyOptions options = wanted.options;
+  options.build.refinement = planned.pictures->refinement(everywhere);
+  BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
+  planned.pictures->note(result.certificate);
+  return result;
 }
 
 std::filesystem::path journal_path(const std::filesystem::path& output) {
@@ -134,6 +191,36 @@ int resumable(const Journal& journal, const std::function<int()>& work) {
     if (journal.records() == 0) throw;
     throw Interrupted(e.reason(), stays);
   }
+}
+
+Json pictures_json(const Planned& planned) {
+  if (!planned.pictures || planned.pictures->rounds().empty()) return nullptr;
+  Json rounds = Json::array();
+  for (const PictureRound& r : planned.pictures->rounds())
+    rounds.push_back(
+        {{"worst", r.worst}, {"mean", r.mean}, {"over", r.over}, {"samples", r.samples}, {"asked", r.asked}});
+  return {{"met", planned.pictures->met()},
+          {"worst", planned.pictures->rounds().back().worst},
+          {"rounds", rounds}};
+}
+
+void print_pictures(const Planned& planned) {
+  if (!planned.pictures || planned.pictures->rounds().empty()) return;
+  const auto& rounds = planned.pictures->rounds();
+  fmt::print(
+      "pictures       {} view(s): worst pixel {:.1f} levels, mean {:.2f}, {:.2f} % above; {} rounds from "
+      "{:.1f}\n",
+      planned.pictures->views().cameras.size(), rounds.back().worst, rounds.back().mean,
+      100 * rounds.back().over, rounds.size(), rounds.front().worst);
+}
+
+int pictures_exit_code(const std::string& who, const Planned& planned) {
+  if (!planned.pictures || planned.pictures->met()) return 0;
+  say(fmt::format(
+      "{}: pictures are not within the tolerance: the worst pixel is certain to {:.1f} levels; a smaller "
+      "--picture-finest lets bricks go further\n",
+      who, planned.pictures->rounds().empty() ? 255.0 : planned.pictures->rounds().back().worst));
+  return 1;
 }
 
 int certificate_exit_code(const std::string& who, const Certificate& certificate) {

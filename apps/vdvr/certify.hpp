@@ -6,8 +6,10 @@
 #include <memory>
 #include <vector>
 
+#include "apps/common/common_options.hpp"
 #include "apps/vdvr/options.hpp"
 #include "vdvr/certify.hpp"
+#include "vdvr/picture_refinement.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 
@@ -16,11 +18,20 @@ namespace vdvr::cli {
 /// Scan, tolerance, field, grid and rate options.
 void add_plan_options(Arguments& args);
 
+/// Pictures that decide how fine bricks are: `tolerance` of Wanted then holds everywhere, and `finest` is the
+/// least that a brick can be asked for.
+struct PictureWanted {
+  WantedViews views;
+  double levels = 8;
+  double finest = 0.002;  ///< fraction of the range
+};
+
 /// Everything that can be refused before a scan is read.
 struct Wanted {
   Tolerance tolerance;
   CertifyOptions options;
   Compression compression = Compression::deflate;  ///< of the file; `build` and `run` fill it in
+  std::optional<PictureWanted> pictures;           ///< refine for these
 };
 Wanted wanted_of(const Arguments& args);
 
@@ -32,7 +43,11 @@ Wanted wanted_to_certify(const Arguments& args);
 struct Planned {
   ProjectionSet scan;
   Plan plan;
+  std::shared_ptr<PictureRefinement> pictures;  ///< none, unless refined for some
 };
+/// How refinement went: what it was asked, each round, whether the tolerance is met. Null without pictures.
+Json pictures_json(const Planned& planned);
+void print_pictures(const Planned& planned);
 /// Reads IN and plans.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
 /// The second half of vdvr::certify. Takes the plan.
@@ -64,6 +79,8 @@ std::unique_ptr<Journal> open_journal(const Arguments& args, const CommonOptions
 /// Calls `work`; an interruption in it says that --resume continues, once there is anything to continue.
 int resumable(const Journal& journal, const std::function<int()>& work);
 
+/// 1, after a line on stderr, where pictures are not within what was asked.
+int pictures_exit_code(const std::string& who, const Planned& planned);
 /// 0 when the certificate holds for every sampler of the device it was built on, else 1 after a line on
 /// stderr.
 int certificate_exit_code(const std::string& who, const Certificate& certificate);

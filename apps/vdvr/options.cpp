@@ -234,6 +234,18 @@ void add_tolerance(Arguments& args) {
       .value("epsilon-abs", "E", "in density units");
 }
 
+double fraction_option(const Arguments& args, const std::string& name) {
+  std::string text = args.text(name);
+  const bool percent = text.back() == '%';
+  if (percent) text.pop_back();
+  const double fraction = parse_number("--" + name, text) / (percent ? 100 : 1);
+  if (!(fraction > 0)) throw InputError(fmt::format("--{}: {} is not above 0", name, args.text(name)));
+  if (fraction > 1)
+    throw InputError(
+        fmt::format("--{}: {} is more than the whole range; write 3% or 0.03", name, args.text(name)));
+  return fraction;
+}
+
 Tolerance tolerance(const Arguments& args) {
   if (args.has("epsilon") == args.has("epsilon-abs"))
     throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
@@ -242,15 +254,7 @@ Tolerance tolerance(const Arguments& args) {
     result.absolute = args.positive_or("epsilon-abs", 0);
     return result;
   }
-  std::string text = args.text("epsilon");
-  const bool percent = text.back() == '%';
-  if (percent) text.pop_back();
-  const double fraction = parse_number("--epsilon", text) / (percent ? 100 : 1);
-  if (!(fraction > 0)) throw InputError(fmt::format("--epsilon: {} is not above 0", args.text("epsilon")));
-  if (fraction > 1)
-    throw InputError(
-        fmt::format("--epsilon: {} is more than the whole range; write 3% or 0.03", args.text("epsilon")));
-  result.relative = fraction;
+  result.relative = fraction_option(args, "epsilon");
   return result;
 }
 

@@ -30,6 +30,8 @@ GridOptions grid_options(const Arguments& args, const std::string& size = "size"
 RateOptions rate_options(const Arguments& args);
 /// --upsampling alone: a power of two up to 64, default 1.
 int upsampling_option(const Arguments& args);
+/// 0.03 or 3%, above 0 and at most 1.
+double fraction_option(const Arguments& args, const std::string& name);
 /// Exactly one of --epsilon and --epsilon-abs.
 Tolerance tolerance(const Arguments& args);
 /// Includes --roi of the grid group.

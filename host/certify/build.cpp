@@ -8,12 +8,12 @@
 #include <cmath>
 #include <utility>
 
+#include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/close_boundaries.hpp"
 #include "host/certify/fill_certificate.hpp"
 #include "host/certify/raise_levels.hpp"
-#include "host/certify/result_units.hpp"
 #include "host/crew/crew.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
@@ -116,15 +116,19 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const L
   return bricks;
 }
 
-// The largest |V - gold| + T + P that leaves room for arithmetic and the device's samplers.
-double node_tolerance(const Inputs& in, const SamplerTerms& sampler) {
-  if (in.plan.settings.comparison.terms == Terms::grid) return in.plan.epsilon_abs;
-  const double tolerance = in.plan.epsilon_abs - in.arithmetic -
-                           std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+// What a bound holds beside what is measured at nodes: arithmetic and the device's samplers.
+double beside_nodes(const Inputs& in, const SamplerTerms& sampler) {
+  if (in.plan.settings.comparison.terms == Terms::grid) return 0;
+  return in.arithmetic + std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+}
+
+// The largest |V - gold| + T + P that leaves room for these.
+double node_tolerance(const Inputs& in, double epsilon_abs, const SamplerTerms& sampler) {
+  const double tolerance = epsilon_abs - beside_nodes(in, sampler);
   if (tolerance > 0) return tolerance;
   throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
-                                   to_world(in.plan.epsilon_abs, in.units),
-                                   to_world(in.plan.epsilon_abs - tolerance, in.units)));
+                                   to_world(epsilon_abs, in.units),
+                                   to_world(epsilon_abs - tolerance, in.units)));
 }
 
 [[noreturn]] void refuse_slack(const Inputs& in, const ClassifyBricks::Bounds& bounds, float slack,
@@ -179,13 +183,15 @@ void keep_share(const Inputs& in, const BuildShare& share, std::vector<std::uint
       }
 }
 
-void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, double tolerance,
+void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, NodeTolerance tolerance,
               const BuildShare& share = {}) {
   // Gold computed in two blocks differs by rounding; a brick at the gold rate must pass all the same. The
   // bound on rounding lies far above what is ever seen, and here nothing is promised: verification decides.
   double largest = 0;
   for (const float v : bricks.base) largest = std::max(largest, std::fabs(static_cast<double>(v)));
-  const double strict = tolerance - std::min(2 * in.arithmetic, 0x1p-15 * largest);
+  const double less = std::min(2 * in.arithmetic, 0x1p-15 * largest);
+  tolerance.of_all -= less;
+  for (float& one : tolerance.by_brick) one -= static_cast<float>(less);
   // Those that may hold a tested node.
   std::vector<std::uint8_t> near = in.gold.fine.gold().bricks_near_coverage();
   for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && in.selected[i];
@@ -193,20 +199,21 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
   const MixedVolume level0 = as_mixed(bricks.base, in.gold.fine.gold().settings());
   const DeviceField base(in.state, level0);
   if (in.crew) in.crew->use(level0, in.room);
-  test.classify(base, strict, near);
+  test.classify(base, tolerance, near);
   in.watch.lap("classify");
 }
 
 // Levels only rise. A brick that was found over the tolerance stays so until it changes: what was raised
 // for it can have been a neighbour whose samples round to what they were.
 std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks& test, OpenBricks& bricks,
-                                          double tolerance) {
+                                          const NodeTolerance& tolerances) {
   const std::vector<BrickMeasure>& measures = test.measures();
   const bool anisotropic = in.gold.fine.gold().settings().anisotropic;
   std::vector<LevelTriple> to = bricks.level;
   for (std::size_t i = 0; i < to.size(); ++i) {
     const BrickMeasure& m = measures[i];
     if (!bricks.involved[i] || m.violated == 0) continue;
+    const double tolerance = tolerances.of(i);
     // Of a brick that coarse gold proposed a level for.
     if (!(static_cast<double>(m.slack) <= tolerance)) refuse_slack(in, test.bounds(), m.slack, tolerance);
     if (!raise_levels(bricks, static_cast<std::int64_t>(i), m.violated,
@@ -231,19 +238,20 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
 }
 
 // Whether a measured volume will do; else the smaller tolerance that it is brought within.
-using Accept = std::function<std::optional<double>(const Measured&)>;
+using Accept = std::function<std::optional<NodeTolerance>(const Measured&)>;
 
 // Those that a smaller tolerance may ask more of than the one they were measured with.
-std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures, double tolerance) {
+std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures,
+                                       const NodeTolerance& tolerance) {
   std::vector<std::uint8_t> above(measures.size(), 0);
   for (std::size_t i = 0; i < above.size(); ++i)
-    above[i] = !(static_cast<double>(measures[i].total) <= tolerance);
+    above[i] = !(static_cast<double>(measures[i].total) <= tolerance.of(i));
   return above;
 }
 
 // Closes, packs, measures; raises bricks until every node is within the tolerance, and the volume accepted.
-Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, double tolerance,
-                           const Accept& accept) {
+Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks,
+                           NodeTolerance tolerance, const Accept& accept) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
   // change those.
   std::vector<std::uint8_t> pending(bricks.level.size());
@@ -278,10 +286,10 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      const std::optional<double> smaller = accept(out);
+      std::optional<NodeTolerance> smaller = accept(out);
       if (!smaller) return out;
       volume = std::move(out.volume);
-      tolerance = *smaller;
+      tolerance = std::move(*smaller);
       test.measure(field, volume.level, tolerance, bricks_above(test.measures(), tolerance), "repair");
       in.watch.lap("verify");
     }
@@ -293,7 +301,8 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 
 // The volume of these base samples within the tolerance; of a share, what it classifies, and no volume.
 Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
-                         double tolerance, const Accept& accept, const std::optional<BuildShare>& share) {
+                         const NodeTolerance& tolerance, const Accept& accept,
+                         const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
@@ -388,26 +397,45 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
   // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
-  const double tolerance = node_tolerance(in, with_reserve(sampler_of(slopes, longest_atlas)));
+  const SamplerTerms reserved = with_reserve(sampler_of(slopes, longest_atlas));
+  std::optional<BrickRefinement> refinement;
+  if (options.refinement) refinement.emplace(*options.refinement, units);
+  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
+  const double tolerance = node_tolerance(in, epsilon_abs, reserved);
   records.begin(journal_head(kinds, scan, plan, digest, options, gold.fine(), tolerance));
   int times = 0;
-  const Accept accept = [&](const Measured& measured) -> std::optional<double> {
+  bool refined = false;
+  const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
     const SamplerTerms sampler = sampler_of(field_slopes(measured.volume), [&](const DeviceInfo& info) {
       return atlas_length(info, measured.volume);
     });
-    result.certificate = fill_certificate(in, device, scan, filtered, options, measured, sampler);
+    result.certificate =
+        fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
+    refined = refinement && refinement->asks(measured.volume, result.certificate, beside_nodes(in, sampler),
+                                             node_tolerance(in, plan.epsilon_abs, reserved));
+    if (refined) return std::nullopt;
     const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
     if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
-    return node_tolerance(in, with_reserve(sampler));
+    const double less = node_tolerance(in, epsilon_abs, with_reserve(sampler));
+    return refinement ? refinement->with_bricks(less) : NodeTolerance(less);
+  };
+  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
+  const auto volume_on = [&](const Lattice& lattice) {
+    for (;;) {
+      times = 0;
+      MixedVolume volume =
+          measured_volume(in, base, lattice, refinement ? refinement->with_bricks(tolerance) : tolerance,
+                          accept, share)
+              .volume;
+      if (!refined) return volume;
+    }
   };
   try {
-    result.volume = measured_volume(in, base, settings.lattice, tolerance, accept, share).volume;
+    result.volume = volume_on(settings.lattice);
   } catch (const ToleranceError&) {
     // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
     if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
-    times = 0;
-    const Lattice floats = lattice_of(base, plan, units, StorageChoice::f32);
-    result.volume = measured_volume(in, base, floats, tolerance, accept, share).volume;
+    result.volume = volume_on(lattice_of(base, plan, units, StorageChoice::f32));
   }
   if (crew) {
     result.message_bytes = crew->bytes();

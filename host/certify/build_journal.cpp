@@ -93,6 +93,9 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
       {"bricks per block", fmt::format("{}x{}x{}", blocks[0], blocks[1], blocks[2])},
       {"tolerance of a node", exact(tolerance)},
       {"plan", digest}};
+  // Only where there is one: journals of earlier versions stay good.
+  if (options.refinement)
+    head["refinement"] = exact(options.refinement->everywhere_abs) + " " + options.refinement->digest;
   return head;
 }
 

@@ -43,6 +43,8 @@ void check_options(const CertifyOptions& options) {
     for (std::size_t a = 0; a < 3; ++a)
       if (!((*build.roi)[a] < (*build.roi)[a + 3]))
         throw InputError(fmt::format("`roi`: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
+  if (build.refinement && build.window)
+    throw InputError("`window` leaves bricks without a bound, which refinement goes by: take one of the two");
   const PlanSettings& plan = options.plan;
   if (plan.levels == Levels::isotropic && plan.coarsening.value_or(LevelTriple{}) != LevelTriple{})
     throw InputError("`coarsening`: isotropic levels have the grid itself as their base");

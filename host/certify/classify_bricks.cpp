@@ -47,7 +47,7 @@ bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
   return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
 }
 
-void ClassifyBricks::classify(const DeviceField& base, double tolerance,
+void ClassifyBricks::classify(const DeviceField& base, const NodeTolerance& tolerance,
                               const std::vector<std::uint8_t>& near) {
   // Nothing of an earlier attempt stays: its levels are of another tolerance, or of another lattice.
   host_.uncount(tile_bytes_);
@@ -86,7 +86,7 @@ void ClassifyBricks::for_each_band(const std::vector<std::uint8_t>& selected, co
   progress_ = whole_progress_;
 }
 
-void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
+void ClassifyBricks::classify_band(const DeviceField& base, const NodeTolerance& tolerance,
                                    const std::vector<std::uint8_t>& near) {
   std::vector<std::uint8_t> refined = near;
   if (coarse_) {
@@ -94,18 +94,18 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
     test(*coarse_, base, tolerance, near, "screen", [&](const BrickLevels& l) {
       const std::size_t id = at(l.base.brick);
       coarse_slack_[id] = l.base.slack;
-      const Verdict verdict = coarse_verdict(l.base, tolerance);
+      const Verdict verdict = coarse_verdict(l.base, tolerance.of(id));
       if (verdict != Verdict::beyond) refined[id] = 0;
       if (verdict == Verdict::undecided) undecided[id] = 1;
       if (verdict == Verdict::within) take(l, true);
     });
     test(fine_, base, tolerance, undecided, "screen", [&](const BrickLevels& l) {
-      if (passes(l.base, tolerance)) take(l, true);
+      if (passes(l.base, tolerance.of(at(l.base.brick)))) take(l, true);
       else refined[at(l.base.brick)] = 1;
     });
     std::vector<std::uint8_t> easy = refined, hard = refined;
     for (std::size_t i = 0; i < easy.size(); ++i) {
-      easy[i] = refined[i] && is_easy(i, tolerance);
+      easy[i] = refined[i] && is_easy(i, tolerance.of(i));
       hard[i] = refined[i] && !easy[i];
     }
     refine(*coarse_, base, tolerance, easy, GoldStream::For::samples);
@@ -117,12 +117,12 @@ void ClassifyBricks::classify_band(const DeviceField& base, double tolerance,
 }
 
 // Level 0 only.
-void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
                           const std::vector<std::uint8_t>& selected, const std::string& stage,
                           const std::function<void(const BrickLevels&)>& visit) {
   BlockPass pass;
   pass.ask = BlockPass::Ask::test;
-  pass.tolerance = static_cast<float>(tolerance);
+  pass.tolerance = tolerance;
   pass.selected = selected;
   gold.run(
       std::move(pass), &base, [&](ByteReader in) { read_levels(in, visit); }, progress_, stage);
@@ -130,13 +130,13 @@ void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, double 
 
 // Levels above 0, with their tiles. On coarse gold only levels that it can test are taken. What is proposed
 // is measured on fine gold later, as every refined brick that coarse gold does not pass.
-void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, double tolerance,
+void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
                             const std::vector<std::uint8_t>& selected, GoldStream::For purpose) {
   BlockPass pass;
   pass.ask = BlockPass::Ask::classify;
   pass.fine = &gold == &fine_;
   pass.purpose = purpose;
-  pass.tolerance = static_cast<float>(tolerance);
+  pass.tolerance = tolerance;
   pass.selected = selected;
   const BlockPass asked = pass;
   gold.run(
@@ -144,8 +144,9 @@ void ClassifyBricks::refine(JournalledGold& gold, const DeviceField& base, doubl
       [&](ByteReader in) {
         read_levels(in, [&](const BrickLevels& l) {
           if (!is_taken(asked, l)) return;
-          if (asked.fine && l.base.total >= 0 && !(static_cast<double>(l.base.slack) <= tolerance))
-            refuse_(l.base.slack, tolerance);
+          if (asked.fine && l.base.total >= 0 &&
+              !(static_cast<double>(l.base.slack) <= tolerance.of(at(l.base.brick))))
+            refuse_(l.base.slack, tolerance.of(at(l.base.brick)));
           take(l, purpose != GoldStream::For::proposing);
         });
         take_tiles(in);
@@ -205,12 +206,13 @@ void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
       progress_, "repair");
 }
 
-void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
-                                const std::vector<std::uint8_t>& selected, const std::string& stage,
+void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field,
+                                const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected,
+                                const std::string& stage,
                                 const std::function<void(const BrickMeasure&)>& visit) {
   BlockPass pass;
   pass.ask = BlockPass::Ask::measure;
-  pass.tolerance = static_cast<float>(tolerance);
+  pass.tolerance = tolerance;
   pass.selected = selected;
   gold.run(
       std::move(pass), &field,
@@ -221,7 +223,7 @@ void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field, 
 }
 
 void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
-                             double tolerance, const std::vector<std::uint8_t>& pending,
+                             const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                              const std::string& stage) {
   for_each_band(pending, [&](const std::vector<std::uint8_t>& of_band) {
     measure_band(field, stored, tolerance, of_band, stage);
@@ -229,16 +231,16 @@ void ClassifyBricks::measure(const DeviceField& field, const std::vector<LevelTr
 }
 
 void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored,
-                                  double tolerance, const std::vector<std::uint8_t>& pending,
+                                  const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                                   const std::string& stage) {
   std::vector<std::uint8_t> rest = pending;
   if (coarse_) {
     // The test needs V to be trilinear in every cell of gold. Closing may have raised a brick's own level.
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
-      easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance);
+      easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance.of(i));
     measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
-      if (coarse_verdict(m, tolerance) != Verdict::within) return;
+      if (coarse_verdict(m, tolerance.of(at(m.brick))) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
       take_slack(m);
       rest[at(m.brick)] = 0;
@@ -250,7 +252,7 @@ void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<Le
   });
 }
 
-void ClassifyBricks::sharpen(const DeviceField& field, double tolerance) {
+void ClassifyBricks::sharpen(const DeviceField& field, const NodeTolerance& tolerance) {
   if (!coarse_) return;
   const int rate = fine_.gold().settings().rate;
   for (;;) {

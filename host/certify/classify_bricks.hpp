@@ -39,18 +39,20 @@ class ClassifyBricks {
 
   /// Levels and tiles of the bricks `near`, by |interpolant - F| <= tolerance at every tested node; those
   /// that stay at level 0 are measured on the stored base samples, which closing does not change.
-  void classify(const DeviceField& base, double tolerance, const std::vector<std::uint8_t>& near);
+  void classify(const DeviceField& base, const NodeTolerance& tolerance,
+                const std::vector<std::uint8_t>& near);
 
   /// Measures a closed field, of the levels `stored`, on the bricks `pending`.
-  void measure(const DeviceField& field, const std::vector<LevelTriple>& stored, double tolerance,
-               const std::vector<std::uint8_t>& pending, const std::string& stage);
+  void measure(const DeviceField& field, const std::vector<LevelTriple>& stored,
+               const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
+               const std::string& stage);
 
   /// Tiles anew for bricks whose level rose.
   void extract(const std::vector<std::uint8_t>& raised);
 
   /// Measures on the fine gold the bricks whose coarse total is above every error seen, until none is: then
   /// the largest error is that of all fine nodes.
-  void sharpen(const DeviceField& field, double tolerance);
+  void sharpen(const DeviceField& field, const NodeTolerance& tolerance);
 
   [[nodiscard]] const std::vector<BrickMeasure>& measures() const { return measures_; }
   /// By brick; of those refined, with levels per axis.
@@ -64,15 +66,17 @@ class ClassifyBricks {
   /// `selected` that lie in it.
   using Work = std::function<void(const std::vector<std::uint8_t>& selected)>;
   void for_each_band(const std::vector<std::uint8_t>& selected, const Work& work);
-  void classify_band(const DeviceField& base, double tolerance, const std::vector<std::uint8_t>& near);
-  void measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored, double tolerance,
-                    const std::vector<std::uint8_t>& pending, const std::string& stage);
-  void test(JournalledGold& gold, const DeviceField& base, double tolerance,
+  void classify_band(const DeviceField& base, const NodeTolerance& tolerance,
+                     const std::vector<std::uint8_t>& near);
+  void measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored,
+                    const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
+                    const std::string& stage);
+  void test(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
             const std::vector<std::uint8_t>& selected, const std::string& stage,
             const std::function<void(const BrickLevels&)>& visit);
-  void refine(JournalledGold& gold, const DeviceField& base, double tolerance,
+  void refine(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
               const std::vector<std::uint8_t>& selected, GoldStream::For purpose);
-  void measure_at(JournalledGold& gold, const DeviceField& field, double tolerance,
+  void measure_at(JournalledGold& gold, const DeviceField& field, const NodeTolerance& tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
                   const std::function<void(const BrickMeasure&)>& visit);
   void take(const BrickLevels& levels, bool is_bound);

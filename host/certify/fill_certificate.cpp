@@ -43,11 +43,12 @@ Vec3 position_of(const Inputs& in, const MixedVolume& volume, const BrickMeasure
 
 Certificate fill_certificate(const Inputs& in, const Device& device, const ProjectionSet& scan,
                              const FilteredScan& filtered, const BuildOptions& options,
-                             const Measured& measured, const SamplerTerms& sampler) {
+                             const Measured& measured, const SamplerTerms& sampler, double epsilon_abs) {
   const Plan& plan = in.plan;
   Certificate c;
-  c.epsilon = plan.epsilon;
-  c.epsilon_abs = plan.epsilon_abs;
+  c.epsilon =
+      epsilon_abs == plan.epsilon_abs ? plan.epsilon : plan.epsilon * (epsilon_abs / plan.epsilon_abs);
+  c.epsilon_abs = epsilon_abs;
   c.reference_range = plan.reference_range;
   const BrickMeasure* worst = nullptr;
   c.brick_totals.reserve(measured.bricks.size());

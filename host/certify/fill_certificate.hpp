@@ -53,6 +53,6 @@ struct Measured {
 
 Certificate fill_certificate(const Inputs& in, const Device& device, const ProjectionSet& scan,
                              const FilteredScan& filtered, const BuildOptions& options,
-                             const Measured& measured, const SamplerTerms& sampler);
+                             const Measured& measured, const SamplerTerms& sampler, double epsilon_abs);
 
 }  // namespace vdvr

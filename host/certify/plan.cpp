@@ -19,7 +19,7 @@
 #include "host/certify/foresee.hpp"
 #include "host/gold/base_of_gold.hpp"
 #include "host/gold/prepared_scan.hpp"
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"

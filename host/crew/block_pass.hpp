@@ -27,7 +27,7 @@ struct BlockPass {
   bool fine = true;  ///< gold at the rate that certifies, else at half of it
   GoldStream::For purpose = GoldStream::For::measuring;
   std::int64_t number = 0;  ///< of the passes at this rate
-  float tolerance = 0;
+  NodeTolerance tolerance = 0.0;
   Lattice lattice{};                   ///< of tiles
   std::vector<std::uint8_t> selected;  ///< by brick
   std::vector<LevelTriple> level;      ///< by brick, for `extract`

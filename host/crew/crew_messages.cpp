@@ -218,7 +218,8 @@ void put_pass(ByteWriter& out, const BlockPass& pass) {
   out.put(static_cast<std::uint8_t>(pass.fine));
   out.put(static_cast<std::uint8_t>(pass.purpose));
   out.put(pass.number);
-  out.put(pass.tolerance);
+  out.put(pass.tolerance.of_all);
+  out.put(pass.tolerance.by_brick);
   put(out, pass.lattice);
   out.put(pass.selected);
   out.put(pass.level);
@@ -230,7 +231,8 @@ BlockPass get_pass(ByteReader& in) {
   pass.fine = in.get<std::uint8_t>() != 0;
   pass.purpose = static_cast<GoldStream::For>(in.get<std::uint8_t>());
   pass.number = in.get<std::int64_t>();
-  pass.tolerance = in.get<float>();
+  pass.tolerance.of_all = in.get<double>();
+  pass.tolerance.by_brick = in.get_vector<float>();
   pass.lattice = get_lattice(in);
   pass.selected = in.get_vector<std::uint8_t>();
   pass.level = in.get_vector<LevelTriple>();

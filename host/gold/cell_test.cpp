@@ -10,7 +10,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrCellTest) == 36);
+static_assert(sizeof(VdvrCellTest) == 32);
 
 namespace {
 
@@ -45,11 +45,11 @@ CellTestResults cell_test(opencl::State& state, const DeviceField& field, const 
   defines.emplace_back("VDVR_BRICK_NODES", std::to_string(brick_nodes));
   defines.emplace_back("VDVR_WINDOWED", test.windowed != 0 ? "1" : "0");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
-                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, VdvrCellTest>
+                 cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, VdvrCellTest>
       kernel(state, "gold/cell_test", "cell_test", defines);
   kernel({{count((brick_nodes + lanes - 1) / lanes), across, layers}, {1, 1, 1}}, total.buffer(),
          error.buffer(), slack.buffer(), violated.buffer(), field.samples.buffer(), field.bricks.buffer(),
-         field.grid, gold.gold.buffer(), gold.addend.buffer(), gold.margin.buffer(),
+         field.grid, gold.gold.buffer(), gold.addend.buffer(), gold.tolerances.buffer(), gold.margin.buffer(),
          gold.first_brick.buffer(), selected.buffer(), s, test);
   CellTestResults out{floats(total), floats(error), floats(slack), {}};
   out.violated.assign(out.total.size(), 0);

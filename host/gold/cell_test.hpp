@@ -15,9 +15,10 @@ namespace vdvr {
 
 /// Blocks of gold on the device and what their cells add to second differences.
 struct GoldOnDevice {
-  const opencl::DeviceArray<float>& gold;    ///< [block][y + halo][x + halo][gold stride]
-  const opencl::DeviceArray<float>& margin;  ///< [block][y + halo][x + halo]
-  const opencl::DeviceArray<float>& addend;  ///< [block][brick z][brick y][brick x]
+  const opencl::DeviceArray<float>& gold;        ///< [block][y + halo][x + halo][gold stride]
+  const opencl::DeviceArray<float>& margin;      ///< [block][y + halo][x + halo]
+  const opencl::DeviceArray<float>& addend;      ///< [block][brick z][brick y][brick x]
+  const opencl::DeviceArray<float>& tolerances;  ///< the same: beyond which a part is violated
   const opencl::DeviceArray<cl_int4>& first_brick;
   VdvrGoldShape shape;
 };

@@ -161,11 +161,16 @@ void GoldBatch::require_slack() {
              first_brick_, gold_, margin_, addend_, above_, below_);
 }
 
-std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tolerance,
+std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const NodeTolerance& tolerance,
                                              const opencl::DeviceArray<std::uint8_t>& selected, bool parts) {
   std::vector<cl_int4> firsts;
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
   const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  std::vector<float> tolerances(addend_.size(), static_cast<float>(tolerance.of_all));
+  for (const std::int64_t brick : bricks_)
+    tolerances[slot(brick)] = static_cast<float>(tolerance.of(at(brick)));
+  const opencl::DeviceArray<float> on_device(state_, std::span<const float>(tolerances),
+                                             "tolerances of bricks");
   const auto window = widened_window(errors_, settings_);
   const VdvrCellTest test{.z_first = to_int(shape_.z_first),
                           .z_last = to_int(shape_.z_last),
@@ -174,10 +179,9 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, float tol
                           .window_low = static_cast<float>(window.first),
                           .window_high = static_cast<float>(window.second),
                           .parts = parts ? 1 : 0,
-                          .tolerance = tolerance,
                           .curvature = eighth * of_curvature_};
   const CellTestResults found =
-      cell_test(state_, field, {gold_, margin_, addend_, first, shape_on_device()}, test, selected,
+      cell_test(state_, field, {gold_, margin_, addend_, on_device, first, shape_on_device()}, test, selected,
                 std::int64_t{settings_.granularity} * settings_.rate);
   std::vector<BrickMeasure> out;
   for (const std::int64_t brick : bricks_) {
@@ -264,10 +268,14 @@ struct GoldBatch::Candidate {
 
 // Every brick names its next level, and all that name the cheapest of these are tested together. What a brick
 // names next is seldom cheaper: most levels are fitted once.
-void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search, float tolerance) {
+void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
+                           const NodeTolerance& tolerances) {
   std::map<std::size_t, std::pair<LevelTriple, std::vector<Candidate>>> by_rank;
+  const auto tolerance_of = [&](const Candidate& c) {
+    return static_cast<float>(tolerances.of(at(c.result->base.brick)));
+  };
   const auto ask = [&](Candidate&& c) {
-    if (const auto level = search.next(c.search, tolerance)) {
+    if (const auto level = search.next(c.search, tolerance_of(c))) {
       auto& [named, group] = by_rank[search.rank(*level)];
       named = *level;
       group.push_back(std::move(c));
@@ -282,7 +290,7 @@ void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearc
     const std::vector<float> errors = errors_at(level, bricks);
     std::vector<BrickClass*> results;
     for (std::size_t i = 0; i < group.size(); ++i) {
-      if (!(errors[i] <= tolerance)) continue;
+      if (!(errors[i] <= tolerance_of(group[i]))) continue;
       passed.push_back(bricks[i]);
       results.push_back(group[i].result);
     }
@@ -291,7 +299,7 @@ void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearc
       BrickClass& result = *group[i].result;
       const float total =
           errors[i] + rounding_share * static_cast<float>(rounding_of(result.tile, settings_.lattice));
-      if (total <= tolerance) {
+      if (total <= tolerance_of(group[i])) {
         result.level = level;
         result.passes = true;
       } else {
@@ -303,7 +311,7 @@ void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearc
   }
 }
 
-std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, float tolerance,
+std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, const NodeTolerance& tolerance,
                                             const opencl::DeviceArray<std::uint8_t>& selected,
                                             bool gold_too) {
   std::vector<BrickClass> out;
@@ -311,7 +319,7 @@ std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, float toler
     BrickClass c;
     c.base = m;
     c.base.violated = 0;
-    c.passes = m.total < 0 || m.total <= tolerance;
+    c.passes = m.total < 0 || m.total <= static_cast<float>(tolerance.of(at(m.brick)));
     out.push_back(std::move(c));
   }
   std::vector<std::int64_t> open;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "host/gold/gold_stream.hpp"
+#include "host/gold/node_tolerance.hpp"
 
 namespace vdvr {
 
@@ -58,7 +59,7 @@ class GoldBatch {
   /// each, per brick of bricks(): |interpolant - F| may be at most the tolerance. Level 0 is measured on the
   /// stored base samples through the sampler: closing never changes those, so it is final. Bricks that no
   /// level suits get gold itself, with `gold_too`.
-  std::vector<BrickClass> classify(const DeviceField& base, float tolerance,
+  std::vector<BrickClass> classify(const DeviceField& base, const NodeTolerance& tolerance,
                                    const opencl::DeviceArray<std::uint8_t>& selected, bool gold_too);
 
   /// What linear interpolation along single axes errs by in these bricks.
@@ -96,7 +97,7 @@ class GoldBatch {
 
   /// Measures a stored field on every selected brick. `parts`: also which parts of it violate the tolerance,
   /// at the cost of that brick once more.
-  std::vector<BrickMeasure> measure(const DeviceField& field, float tolerance,
+  std::vector<BrickMeasure> measure(const DeviceField& field, const NodeTolerance& tolerance,
                                     const opencl::DeviceArray<std::uint8_t>& selected, bool parts = false);
 
  private:
@@ -104,7 +105,8 @@ class GoldBatch {
   struct TileRequest;
   struct Candidate;
   [[nodiscard]] TileRequest request(std::int64_t brick, const Index3& spacing, std::uint64_t offset) const;
-  void try_levels(std::vector<Candidate>& candidates, const TripleSearch& search, float tolerance);
+  void try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
+                  const NodeTolerance& tolerances);
   std::vector<float> errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks);
   std::vector<float> copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
                                 const LevelSamples* lattice);

@@ -7,7 +7,7 @@
 #include <bit>
 #include <cmath>
 
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"

@@ -12,7 +12,7 @@
 #include "host/bounds/covered_range.hpp"
 #include "host/bounds/six_taps.hpp"
 #include "host/certify/classify_bricks.hpp"
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 #include "host/fdk/filter_cone.hpp"
 #include "host/gold/base_of_gold.hpp"
 #include "host/fbp/reconstruct.hpp"

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -23,6 +24,18 @@ struct BuildShare {
   int part = 1, parts = 1;
 };
 
+/// Refinement where something asks for it: bricks begin at a tolerance that holds everywhere, and are brought
+/// within a smaller one, round by round, as whoever looks at the volume asks. The plan's epsilon is then the
+/// smallest tolerance that can be asked for, since its rates suit that one.
+struct Refinement {
+  double everywhere_abs = 0;  ///< density units, no less than the plan's epsilon_abs
+  /// Given a measured volume and its certificate, in world units: [bz][by][bx] what |V - F| may be at most,
+  /// or nothing where the volume will do. Called again once bricks are within it, or within the plan's
+  /// epsilon.
+  std::function<std::vector<float>(const MixedVolume&, const Certificate&)> ask;
+  std::string digest;  ///< of what `ask` goes by: a journal is of one
+};
+
 struct BuildOptions {
   std::optional<std::array<double, 6>> roi;  ///< x0,y0,z0,x1,y1,z1: certify the points of this closed box
                                              ///< only; what that does to the grid, certify.hpp says
@@ -35,6 +48,7 @@ struct BuildOptions {
   /// Keeps what is finished, block by block, and knows what an earlier process finished. Not owned; build()
   /// calls begin() and leaves it to the caller to remove() it once the result is stored.
   Journal* journal = nullptr;
+  std::optional<Refinement> refinement{};  ///< none: the plan's epsilon everywhere; excludes `window`
   /// Of shares, to be joined: what they hold is not computed again. Not owned.
   std::vector<Journal*> parts{};
   CrewOptions crew{};  ///< who else computes

@@ -270,7 +270,7 @@ inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 // One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at
 // which its test fails.
 int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, VdvrGoldShape s,
-                  VdvrCellTest test, int x, int y, int z, float below, float above) {
+                  VdvrCellTest test, float tolerance, int x, int y, int z, float below, float above) {
   int parts = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int ix = x + (corner & 1), iy = y + (corner >> 1 & 1), iz = z + (corner >> 2);
@@ -279,7 +279,7 @@ int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, 
     if (p->margin[column] < s.lowest || node < test.z_first || node > test.z_last) continue;
     const Column at = column_of(p, ix, iy, grid, s.rate);
     const float e = field_at(p, &at, samples, iz) - p->gold[column * s.gold_stride + iz];
-    if (!(fmax(e + below, above - e) <= test.tolerance))
+    if (!(fmax(e + below, above - e) <= tolerance))
       parts |= 1 << (part_of(iz, p->last_z) * 9 + part_of(iy, p->last_y) * 3 + part_of(ix, p->last_x));
   }
   return parts;
@@ -291,7 +291,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                         volatile __global int* slack_max, volatile __global int* violated,
                         __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
                         __global const float* gold, __global const float* addend,
-                        __global const float* margin, __global const int4* first_brick,
+                        __global const float* tolerances, __global const float* margin,
+                        __global const int4* first_brick,
                         __global const uchar* selected, VdvrGoldShape s, VdvrCellTest test) {
   const int begin = (int)get_global_id(0) * VDVR_LANES;
   const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
@@ -300,6 +301,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                   first_brick, selected, s) ||
       begin >= p.last_z)
     return;
+  const float tolerance = tolerances[p.slot];
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
   const int to_x = s.gold_stride, to_y = p.row * s.gold_stride;
   const INT node = begin + p.z * VDVR_BRICK_NODES + INDEX, cell = begin + INDEX;
@@ -392,14 +394,14 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           const VEC both = select(-unlimited, MORE(all.ep + below, all.em + above), counts);
           largest_total = MORE(largest_total, both);
           largest_error = MORE(largest_error, select(-unlimited, MORE(all.ep, all.em), counts));
-          if (test.parts && any(both > test.tolerance)) {
+          if (test.parts && any(both > tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
             WRITE(below, belows);
             WRITE(above, aboves);
             for (int i = 0; i < VDVR_LANES; ++i)
-              if (totals[i] > test.tolerance)
-                parts |= failing_parts(&p, samples, grid, s, test, ix - 1, iy - 1, begin + i, belows[i],
+              if (totals[i] > tolerance)
+                parts |= failing_parts(&p, samples, grid, s, test, tolerance, ix - 1, iy - 1, begin + i, belows[i],
                                        aboves[i]);
           }
           largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));

@@ -9,7 +9,6 @@ typedef struct {
   int windowed;         // whether cells outside the window do not count
   float window_low, window_high;
   int parts;  // whether to say which parts of bricks are over the tolerance
-  float tolerance;
   float curvature;  // of the second differences: an eighth, or what finer gold would have of these
 } VdvrCellTest;
 

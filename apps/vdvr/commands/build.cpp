@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/crew.hpp"
@@ -33,17 +35,20 @@ int build_file(const Arguments& args, const CommonOptions& common, Wanted wanted
                      {"resumed", {{"records", journals.replayed()}, {"shares", journals.parts.size()}}},
                      {"peak_bytes", devices.peak_memory()},
                      {"messages", {{"bytes", result.message_bytes}, {"seconds", result.message_seconds}}},
+                     {"pictures", pictures_json(planned)},
                      {record_name(result.certificate), certificate_json(result.certificate)},
                      {"seconds", seconds_json(result.seconds)}};
   print_result(common, json, [&] {
     print_scan(planned.scan);
     print_grid(result.volume.grid);
     print_certificate(result.certificate);
+    print_pictures(planned);
     print_storage(result.volume, bytes);
     print_seconds(result.seconds);
     fmt::print("written        {}\n", output.string());
   });
-  return certificate_exit_code(args.who(), result.certificate);
+  return std::max(pictures_exit_code(args.who(), planned),
+                  certificate_exit_code(args.who(), result.certificate));
 }
 
 // A part of the blocks, into a journal that --resume of the whole joins.
@@ -85,6 +90,7 @@ int build_command(Arguments& args) {
   const auto output = args.path("output");
   check_output(output, common.force || continues(args, output), {args.path("IN")});
   if (const auto share = share_option(args)) {
+    refuse(args, {"picture-tolerance"}, "excludes --share: what pictures ask is known once all is measured");
     const auto journal = open_journal(args, common, share_path(output, *share));
     return resumable(*journal, [&] { return build_part(args, common, wanted, output, *share, *journal); });
   }

@@ -113,6 +113,8 @@ int plan_command(Arguments& args) {
   refuse(args, {"window"}, "a plan is for the whole grid; give it to build");
   if (args.has("size"))
     refuse(args, {"roi"}, "with --size a plan is for that grid, the whole of it; leave out one of the two");
+  refuse(args, {"picture-tolerance", "views", "picture-finest"},
+         "a plan foresees one tolerance for all bricks; build refines for pictures, and prints each round");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
   Wanted wanted = wanted_of(args);
   // Pictures show the whole volume.

@@ -8,6 +8,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
+#include "apps/vdvr/ray_certificate.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
@@ -17,7 +18,7 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error"};
+const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error", "class", "band", "lo", "hi"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
 // Twenty pictures a second: a turn of 60 takes three.
@@ -41,7 +42,7 @@ void add_options(Arguments& args) {
   args.value("iso", "V[,V...]",
              "densities of up to 8 iso-surfaces (default: one between background and object)")
       .value("iso-opacity", "O[,O...]", "of each (default 1; of several the densest 1, others 0.3)")
-      .value("show", "colour|depth|normal|error",
+      .value("show", "colour|depth|normal|error|class|band|lo|hi",
              "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, or "
              "how far the samples it was made of can lie from the scan")
       .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
@@ -65,6 +66,7 @@ void add_options(Arguments& args) {
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("unverified", "render although content and certificate do not match");
+  add_ray_certificate(args);
   add_scan(args);
   add_projection_options(args);
   args.group("Camera");
@@ -424,6 +426,9 @@ int render_command(Arguments& args) {
   if (kind == OutputKind::values)
     refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
+  check_ray_certificate(args, o.mode, kind == OutputKind::values);
+  const bool certifies = args.has("certify");
+  if (certifies) check_output(ray_certificate_path(output), common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
   const std::string method = method_option(args);
@@ -446,7 +451,11 @@ int render_command(Arguments& args) {
   const RenderResult result =
       kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
       : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
+      : certifies                ? source.draw(o)
                                  : draw_one(stage, o, output, kind);
+  Json ray_certificate;
+  if (certifies)
+    ray_certificate = write_ray_certificate(args, scene, o, result.image, output, progress.callback());
   progress.clear();
 
   const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
@@ -470,6 +479,7 @@ int render_command(Arguments& args) {
                      {"outside_certificate", outside_certificate(o)},
                      {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
                      {"method", method},
+                     {"certificate", ray_certificate},
                      {"resident_bytes", source.bytes()},
                      {"device", source.device().info().name}};
   print_result(common, json, [&] {
@@ -485,6 +495,7 @@ int render_command(Arguments& args) {
     if (certified)
       fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
                  scene.certificate->epsilon_abs);
+    if (certifies) print_ray_certificate(ray_certificate);
     fmt::print("  not covered  {}\n", outside_certificate(o));
     if (has_transfer)
       fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,

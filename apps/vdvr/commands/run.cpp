@@ -248,7 +248,8 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
 
   const std::uint64_t bytes = std::filesystem::file_size(folder.file("volume.vdvr"));
   print_result(common, outcome_json(output, out, bytes), [&] { print_outcome(output, out, bytes); });
-  return certificate_exit_code(args.who(), certificate);
+  return std::max(pictures_exit_code(args.who(), out.planned),
+                  certificate_exit_code(args.who(), certificate));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "host/certify/result_units.hpp"
+#include "host/bounds/result_units.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,31 @@
+// `render --certify` of surfaces and maxima: what is certain of F in a picture, beside the picture or in its
+// place.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/vdvr/pictures.hpp"
+#include "vdvr/image.hpp"
+#include "vdvr/progress.hpp"
+
+namespace vdvr::cli {
+
+/// --certify. What --show has beside its usual values comes with it.
+void add_ray_certificate(Arguments& args);
+inline const std::vector<std::string>& certified_outputs() {
+  static const std::vector<std::string> names{"class", "band", "lo", "hi"};
+  return names;
+}
+/// Refuses what goes with no certificate; before anything is read.
+void check_ray_certificate(const Arguments& args, RenderMode mode, bool values);
+/// OUTPUT.certificate.json.
+std::filesystem::path ray_certificate_path(const std::filesystem::path& output);
+
+/// The certificate of a picture of `scene`. `image`: what was drawn, which is marked; written, or what --show
+/// asks for. The JSON of the file.
+Json write_ray_certificate(const Arguments& args, const Scene& scene, const RenderOptions& options,
+                           Image image, const std::filesystem::path& output, const Progress& progress);
+void print_ray_certificate(const Json& certificate);
+
+}  // namespace vdvr::cli

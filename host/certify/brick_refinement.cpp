@@ -1,0 +1,41 @@
+#include "host/certify/brick_refinement.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "host/bounds/result_units.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+BrickRefinement::BrickRefinement(const Refinement& wanted, const Units& units)
+    : wanted_(wanted), units_(units), everywhere_(from_world(wanted.everywhere_abs, units)) {}
+
+bool BrickRefinement::asks(const MixedVolume& volume, const Certificate& certificate, double rest,
+                           double least) {
+  const std::vector<float> asked = [&] {
+    if (units_.are_world()) return wanted_.ask(volume, certificate);
+    MixedVolume in_world = volume;
+    scale(in_world, units_.density());
+    in_world.grid = to_world(volume.grid, units_);
+    return wanted_.ask(in_world, to_world(certificate, units_));
+  }();
+  if (asked.empty()) return false;
+  if (asked.size() != volume.level.size())
+    throw InputError(fmt::format("refinement asks for {} bricks of {}", asked.size(), volume.level.size()));
+  if (by_brick_.empty()) by_brick_.assign(asked.size(), std::numeric_limits<float>::infinity());
+  bool more = false;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const double bound = from_world(static_cast<double>(asked[i]), units_);
+    const auto tolerance = static_cast<float>(std::max(bound - rest, least));
+    if (!(tolerance < by_brick_[i])) continue;
+    by_brick_[i] = tolerance;
+    const float total = certificate.brick_totals[i];
+    more = more || (total >= 0 && total > tolerance);
+  }
+  return more;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,33 @@
+// Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of vdvr/build.hpp).
+// Called by build.cpp.
+#pragma once
+
+#include <vector>
+
+#include "host/gold/node_tolerance.hpp"
+#include "host/scan/units.hpp"
+#include "vdvr/build.hpp"
+
+namespace vdvr {
+
+class BrickRefinement {
+ public:
+  /// Refers to `wanted`. All but what `ask` is given is in `units`.
+  BrickRefinement(const Refinement& wanted, const Units& units);
+  /// What |V - F| may be everywhere.
+  [[nodiscard]] double everywhere() const { return everywhere_; }
+  /// Asks. `rest` is what a brick's bound holds beside what is measured at nodes, `least` the least tolerance
+  /// of a node. Tolerances only fall: false where `ask` is content, or asks for nothing that bricks do not
+  /// have.
+  bool asks(const MixedVolume& volume, const Certificate& certificate, double rest, double least);
+  /// With those asked for so far.
+  [[nodiscard]] NodeTolerance with_bricks(double all) const { return {all, by_brick_}; }
+
+ private:
+  const Refinement& wanted_;
+  Units units_;
+  double everywhere_;
+  std::vector<float> by_brick_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,130 @@
+#include "vdvr/certified_rays.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/fdk/filter_cone.hpp"
+#include "host/rays/crossings.hpp"
+#include "host/rays/emission.hpp"
+#include "host/system/parallel.hpp"
+#include "vdvr/certify.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+
+FloatImage empty(std::int64_t width, std::int64_t height, std::int64_t channels, float value) {
+  return {width, height, std::vector<float>(static_cast<std::size_t>(width * height * channels), value),
+          channels};
+}
+float down(double x) {
+  const auto f = static_cast<float>(x);
+  return static_cast<double>(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
+}
+float up(double x) { return -down(-x); }
+
+ProjectionSet geometry_of(const Certificate& certificate) {
+  auto scan = noted_geometry(certificate);
+  if (!scan)
+    throw InputError(
+        "the file does not say which points are covered: another program wrote it without; build it "
+        "again");
+  return std::move(*scan);
+}
+
+}  // namespace
+
+double SurfaceBounds::share(std::uint8_t kind) const {
+  return hit.empty() ? 0
+                     : static_cast<double>(std::count(hit.begin(), hit.end(), kind)) /
+                           static_cast<double>(hit.size());
+}
+
+std::array<double, 3> background_of(const PictureViews& views, std::int64_t y) {
+  const double part = views.height > 1 ? static_cast<double>(y) / static_cast<double>(views.height - 1) : 0;
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c)
+    out[c] = (1 - part) * views.background_top[c] + part * views.background_bottom[c];
+  return out;
+}
+
+struct CertifiedRays::Impl {
+  Impl(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan, bool image3d)
+      : bounds(brick_bounds(certificate, image3d)),
+        coverage(certified_coverage(scan, certificate.field)),
+        field(volume, bounds, coverage, certificate.roi) {
+    if (certificate.window)
+      throw InputError(
+          "the certificate has a window: outside of it nothing bounds |V - F|, so that nothing can "
+          "be said of whole rays; build without --window");
+  }
+  std::vector<float> bounds;
+  Coverage coverage;
+  RayField field;
+};
+
+CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certificate,
+                             const ProjectionSet& scan, bool image3d)
+    : impl_(std::make_unique<Impl>(volume, certificate, scan, image3d)) {}
+CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d)
+    : CertifiedRays(volume, certificate, geometry_of(certificate), image3d) {}
+CertifiedRays::~CertifiedRays() = default;
+
+ColourBounds CertifiedRays::colours(const PictureViews& views, std::size_t view,
+                                    const Progress& progress) const {
+  const MediumRanges ranges(views.transfer);
+  ColourBounds out{empty(views.width, views.height, 3, 0), empty(views.width, views.height, 3, 0)};
+  parallel_for(views.height, progress, "certify", [&](std::int64_t y) {
+    const std::array<double, 3> background = background_of(views, y);
+    for (std::int64_t x = 0; x < views.width; ++x) {
+      const ColourInterval w = colour_interval(
+          impl_->field, pixel_ray(views.cameras[view], views.width, views.height, x, y), ranges, background);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::size_t i = static_cast<std::size_t>(y * views.width + x) * 3 + c;
+        out.low.values[i] = down(w.low[c]);
+        out.high.values[i] = up(w.high[c]);
+      }
+    }
+  });
+  return out;
+}
+
+SurfaceBounds CertifiedRays::surface(const Camera& camera, std::int64_t width, std::int64_t height,
+                                     double value, const Progress& progress) const {
+  SurfaceBounds out{std::vector<std::uint8_t>(static_cast<std::size_t>(width * height)),
+                    empty(width, height, 1, nothing), empty(width, height, 1, nothing)};
+  parallel_for(height, progress, "certify", [&](std::int64_t y) {
+    for (std::int64_t x = 0; x < width; ++x) {
+      const Crossing c = first_crossing(impl_->field, pixel_ray(camera, width, height, x, y), value);
+      const auto i = static_cast<std::size_t>(y * width + x);
+      out.hit[i] = static_cast<std::uint8_t>(c.hit);
+      if (c.hit != Hit::none) out.first.values[i] = down(c.first);
+      if (c.hit == Hit::sure) out.last.values[i] = up(c.last);
+    }
+  });
+  return out;
+}
+
+MaximumBounds CertifiedRays::maximum(const Camera& camera, std::int64_t width, std::int64_t height,
+                                     const Progress& progress) const {
+  MaximumBounds out;
+  for (FloatImage* image : {&out.low, &out.high, &out.first, &out.last})
+    *image = empty(width, height, 1, nothing);
+  parallel_for(height, progress, "certify", [&](std::int64_t y) {
+    for (std::int64_t x = 0; x < width; ++x) {
+      const Maximum m = maximum_along(impl_->field, pixel_ray(camera, width, height, x, y));
+      if (!m.any) continue;
+      const auto i = static_cast<std::size_t>(y * width + x);
+      out.low.values[i] = down(m.low);
+      out.high.values[i] = up(m.high);
+      out.first.values[i] = down(m.first);
+      out.last.values[i] = up(m.last);
+    }
+  });
+  return out;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,69 @@
+// Pictures of the ideal field F, as far as a certificate tells them: intervals of colours, of the depth of a
+// surface, of a maximum (docs/pixel-bounds.md). Double precision on the host, ray by ray.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "vdvr/camera.hpp"
+#include "vdvr/certificate.hpp"
+#include "vdvr/export.hpp"
+#include "vdvr/image.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/picture_refinement.hpp"
+#include "vdvr/progress.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+/// Three channels, display values: F's unlit picture of mode dvr lies between, in every pixel.
+struct ColourBounds {
+  FloatImage low, high;
+};
+
+/// Of an iso-surface, [y][x].
+struct SurfaceBounds {
+  /// 0: F does not pass the value on that ray. 1: it may. 2: it does.
+  std::vector<std::uint8_t> hit;
+  /// Distances from the eye, world units: where F passes first lies between; `last` only where it is sure;
+  /// NaN where there is none. Where a ray begins within the bound of the value, `first` is where it begins.
+  FloatImage first, last;
+
+  [[nodiscard]] double share(std::uint8_t kind) const;
+};
+
+/// The largest F along rays, and where it lies: [y][x], NaN where a ray misses the covered region. `high` is
+/// infinite where a ray passes a brick that was not tested.
+struct MaximumBounds {
+  FloatImage low, high, first, last;
+};
+
+class VDVR_API CertifiedRays {
+ public:
+  /// Rays are those within the covered cylinder, the grid and the region of interest. Refers to the volume.
+  /// `scan`: the geometry, its projections are not looked at. Throws InputError where the certificate has no
+  /// bounds by brick, or a window.
+  CertifiedRays(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan,
+                bool image3d = false);
+  /// The same with the geometry that the certificate notes. Throws InputError where it notes none.
+  CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d = false);
+  ~CertifiedRays();
+  CertifiedRays(const CertifiedRays&) = delete;
+  CertifiedRays& operator=(const CertifiedRays&) = delete;
+
+  /// Cost: some ten to a hundred cells and parts a ray, 0.1 us each.
+  [[nodiscard]] ColourBounds colours(const PictureViews& views, std::size_t view,
+                                     const Progress& progress = {}) const;
+  [[nodiscard]] SurfaceBounds surface(const Camera& camera, std::int64_t width, std::int64_t height,
+                                      double value, const Progress& progress = {}) const;
+  [[nodiscard]] MaximumBounds maximum(const Camera& camera, std::int64_t width, std::int64_t height,
+                                      const Progress& progress = {}) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vdvr
