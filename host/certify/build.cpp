@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/bounds/result_units.hpp"
 #include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
