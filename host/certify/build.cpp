@@ -24,6 +24,7 @@
 #include "host/sampler/sampler_terms.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
 
@@ -360,6 +361,9 @@ Certificate certify(const Inputs& in, const Device& device, const ProjectionSet&
   c.padding = filtered.fft_length;
   c.window = options.window;
   c.roi = options.roi;
+  if (const CoveredCylinder covered = CertifiedRegion(scan, plan.field).cylinder();
+      covered.radius > 0 && covered.z.first < covered.z.second)
+    c.covered = covered;
   c.not_covered_count = plan.not_covered_count;
   c.not_covered_fraction = plan.not_covered_fraction;
   c.not_covered_rule = kNotCoveredRule;

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
@@ -62,6 +63,7 @@ void add_options(Arguments& args) {
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("unverified", "render although content and certificate do not match");
+  add_clip(args);
   add_scan(args);
   add_projection_options(args);
   args.group("Camera");
@@ -194,6 +196,8 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
+  if (flat) refuse(args, {"clip", "clip-covered", "covered-from"}, "does not apply to a slice");
+  if (!args.has("clip-covered")) refuse(args, {"covered-from"}, "goes with --clip-covered");
   if (flat)
     refuse(args,
            {"azimuth", "elevation", "zoom", "turntable", "tf", "iso", "step", "no-shading", "show",
@@ -420,6 +424,7 @@ int render_command(Arguments& args) {
   o.slice_range = given_range(args).value_or(std::pair{bright.grey_lo, bright.grey_hi});
   o.sampler = safe_sampler(o.sampler, scene.certificate);
   o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
+  o.clip = clip_for(args, scene, progress.callback());
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr";
   o.skip_empty = !args.has("no-skip");
