@@ -15,7 +15,6 @@
 #include "host/render/glm_vectors.hpp"
 #include "host/render/raycast.hpp"
 #include "host/render/raycast_params.hpp"
-#include "host/system/round_up.hpp"
 #include "shared/certify_params.h"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/error.hpp"
@@ -179,7 +178,8 @@ class Launch {
       fullest_.fill(0);
       kernel(range, field..., bricks, v_.field.grid, distance_.buffer(), bounds_.buffer(), ranges_.buffer(),
              next_.buffer(), p, q_, least_.buffer(), most_.buffer(), list_.buffer(), fullest_.buffer());
-      const std::uint64_t fullest = fullest_.to_host().front();
+      std::uint64_t fullest = 0;
+      for (const cl_uint pieces : fullest_.to_host()) fullest = std::max<std::uint64_t>(fullest, pieces);
       if (fullest <= longest) continue;
       // Some lists were too short: the band once more.
       q_.capacity = static_cast<int>(fullest + fullest / 8);
@@ -197,7 +197,8 @@ class Launch {
     const auto packets = [&](int rows) {
       band.height = rows;
       range = packet_range(band, {}, lanes);
-      return round_up(range.global[0], range.local[0]) * round_up(range.global[1], range.local[1]);
+      return opencl::round_up(range.global[0], range.local[0]) *
+             opencl::round_up(range.global[1], range.local[1]);
     };
     const std::uint64_t numbers = o_.shading ? VDVR_LIT_PIECE_NUMBERS : VDVR_PIECE_NUMBERS;
     const auto floats = [&](int rows) {

@@ -63,6 +63,8 @@ struct PictureBound {
   double parts_mean = 0;
 };
 VDVR_API PictureBound bound_of_picture(const PixelBounds& bounds, const Image& drawn);
+/// Bounds from dark, 0, to light, the largest; untested pixels grey; a scale at the right, a line below.
+VDVR_API Image picture_of_bound(const PictureBound& bound, const PixelBounds& bounds);
 /// Share of pixels whose ideal bytes all lie within `levels` of the drawn ones.
 VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, double levels);
 
