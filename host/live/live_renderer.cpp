@@ -132,9 +132,8 @@ LiveFrame LiveRenderer::draw(const LiveView& view, std::int64_t width, std::int6
         fmt::format("`size` {}x{}: each side must be 1 to {} pixels", width, height, kMostLivePixels));
   Impl::Kind& kind = impl_->kind_of(view);
   std::pair<std::int64_t, std::int64_t> size{width, height};
-  // A bound's slice is looked up on the host in no time, and its caption needs its size.
-  const bool looked_up = view.mode == RenderMode::error || (is_flat(view) && view.bound);
-  if (moving && !looked_up) size = kind.pace.size(width, height);
+  // A bound's slice is looked up on the host in no time, and its frame needs its size.
+  if (moving && view.mode != RenderMode::error) size = kind.pace.size(width, height);
   const auto start = std::chrono::steady_clock::now();
   LiveFrame frame;
   frame.image = impl_->picture(view, size.first, size.second);
