@@ -7,6 +7,7 @@
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/stop.hpp"
 
@@ -175,14 +176,14 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   const PixelBounds bounds = source.certify(o, options);
   throw_if_stopped();
   const PictureBound bound = bound_of_picture(bounds, drawn.image);
-  const CertifiedPicture picture{o,
-                                 options,
-                                 {covered.radius, {covered.low[2], covered.high[2]}},
-                                 certificate.content_sha256,
-                                 output.filename().string(),
-                                 sha256_of_pixels(drawn.image),
-                                 overlay_names(overlay)};
-  const Json json = picture_certificate_json(picture, bounds, bound, certificate);
+  CertifiedPicture picture{o,
+                           options,
+                           {covered.radius, {covered.low[2], covered.high[2]}},
+                           certificate.content_sha256,
+                           output.filename().string(),
+                           sha256_of_pixels(drawn.image),
+                           "",
+                           overlay_names(overlay)};
   const std::string show = args.text_or("show", "colour");
   if (show == "colour") {
     draw_overlay(drawn, scene, o, overlay, true, caption_of(bound, bounds, certificate));
@@ -191,6 +192,8 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
     write_shown(out, show, bounds, bound);
   }
   write_png(out.bound, picture_of_bound(bound, bounds));
+  picture.file_sha256 = sha256_of_file(out.picture);
+  const Json json = picture_certificate_json(picture, bounds, bound, certificate);
   io::write_file(out.certificate, json.dump(2) + "\n");
   report(progress, "", 1);
 

@@ -64,6 +64,7 @@ Json picture_json(const CertifiedPicture& picture) {
   for (const std::string& name : picture.overlays) overlays.push_back(name);
   return {{"file", picture.file},
           {"sha256", picture.pixels_sha256},
+          {"file_sha256", picture.file_sha256},
           {"width", o.width},
           {"height", o.height},
           {"mode", "dvr"},
@@ -87,6 +88,7 @@ void read_picture(const Json& j, CertifiedPicture& picture) {
   RenderOptions& o = picture.options;
   picture.file = j.at("file").get<std::string>();
   picture.pixels_sha256 = j.at("sha256").get<std::string>();
+  picture.file_sha256 = j.at("file_sha256").get<std::string>();
   picture.overlays = j.at("overlays").get<std::vector<std::string>>();
   o.width = j.at("width").get<std::int64_t>();
   o.height = j.at("height").get<std::int64_t>();
@@ -184,6 +186,8 @@ CertifiedPicture read_picture_certificate(const std::filesystem::path& path) {
     picture.certify.kappa = j.at("kappa").get<double>();
     picture.certify.theta = j.at("theta").get<double>();
     picture.certify.fast = j.at("fast").get<bool>();
+    picture.stored_mean = j.at("levels").at("mean").get<double>();
+    picture.stored_max = j.at("levels").at("max").get<double>();
     picture.covered.radius = j.at("covered").at("radius").get<double>();
     const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
     picture.covered.z = {z[0], z[1]};

@@ -17,8 +17,10 @@ struct CertifiedPicture {
   RenderOptions options;
   CertifyPictureOptions certify;
   CoveredCylinder covered;
-  std::string content_sha256, file, pixels_sha256;  ///< of the volume; the picture and its rgb bytes
-  std::vector<std::string> overlays;                ///< drawn over it afterwards
+  std::string content_sha256, file, pixels_sha256,
+      file_sha256;                    ///< of the volume; the picture, its rgb bytes before overlays, its file
+  std::vector<std::string> overlays;  ///< drawn over it afterwards
+  double stored_mean = 0, stored_max = 0;  ///< levels, as read
 };
 
 /// What is proved, in one sentence.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,5 +68,16 @@ VDVR_API PictureBound bound_of_picture(const PixelBounds& bounds, const Image& d
 VDVR_API Image picture_of_bound(const PictureBound& bound, const PixelBounds& bounds);
 /// Share of pixels whose ideal bytes all lie within `levels` of the drawn ones.
 VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, double levels);
+
+/// A pixel of the ideal picture, without light, by the field's values in the middles of steps of a ray.
+struct IdealPixel {
+  std::array<double, 3> rgb{0, 0, 0};
+  double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
+  std::size_t points = 0;
+};
+/// `field` gives values at world points, as ExactField::at. `step` in base cells.
+VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                                const RenderOptions& options, const Grid& grid, std::int64_t x,
+                                std::int64_t y, double step);
 
 }  // namespace vdvr
