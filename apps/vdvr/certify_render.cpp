@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/explain_pixel.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/stop.hpp"
@@ -101,6 +103,54 @@ std::int64_t beyond(const PictureBound& bound, double tolerance, std::string& te
   return count;
 }
 
+struct Explained {
+  std::int64_t x = 0, y = 0;
+  PixelExplanation why;
+};
+
+std::optional<Explained> explained(const Arguments& args, const Scene& scene, const RenderOptions& o,
+                                   SamplerKind sampler) {
+  const auto pixel = args.numbers("explain", 2);
+  if (!pixel) return std::nullopt;
+  const auto inside = [](double at, std::int64_t size) {
+    return at >= 0 && at < static_cast<double>(size) && at == std::floor(at);
+  };
+  if (!inside((*pixel)[0], o.width) || !inside((*pixel)[1], o.height))
+    throw InputError(fmt::format("--explain: {},{} is no pixel of {}x{}; 0,0 is the first", (*pixel)[0],
+                                 (*pixel)[1], o.width, o.height));
+  Explained e{static_cast<std::int64_t>((*pixel)[0]), static_cast<std::int64_t>((*pixel)[1]), {}};
+  e.why = explain_pixel(scene.volume, brick_bounds(*scene.certificate, sampler == SamplerKind::image3d), o,
+                        e.x, e.y);
+  return e;
+}
+
+Json explained_json(const Explained& e) {
+  Json bricks = Json::array();
+  for (const BrickShare& b : e.why.bricks)
+    bricks.push_back({{"brick", b.brick},
+                      {"bound", std::isfinite(b.bound) ? Json(b.bound) : Json()},
+                      {"levels", b.levels}});
+  return {{"pixel", Json::array({e.x, e.y})}, {"bricks", bricks}, {"of_points", e.why.of_points}};
+}
+
+void print_explained(const Explained& e, const Scene& scene, const RenderOptions& o, double bound) {
+  fmt::print("  pixel ({}, {}): bound {:.1f} levels; to first order {:.1f}, of which\n", e.x, e.y, bound,
+             e.why.levels);
+  const Index3 n = scene.volume.bricks();
+  for (std::size_t i = 0; i < std::min<std::size_t>(6, e.why.bricks.size()); ++i) {
+    const BrickShare& b = e.why.bricks[i];
+    const auto at = static_cast<std::int64_t>(b.brick);
+    const LevelTriple& l = scene.volume.level[b.brick];
+    fmt::print("    {:>5.1f}  brick ({}, {}, {}), level zyx {}{}{}, |V - F| <= {:.4g}\n", b.levels, at % n[0],
+               at / n[0] % n[1], at / (n[0] * n[1]), l[0], l[1], l[2], b.bound);
+  }
+  const auto worst = std::max_element(e.why.of_points.begin(), e.why.of_points.end());
+  if (worst == e.why.of_points.end() || !(*worst > 0)) return;
+  const TransferPoint& p = o.transfer.points[static_cast<std::size_t>(worst - e.why.of_points.begin())];
+  fmt::print("    {:>5.1f}  at the transfer function's point {:.6g} (opacity {:.3g})\n", *worst, p.value,
+             p.opacity);
+}
+
 void check_file(const Arguments& args, const Scene& scene) {
   const std::string name = args.path("FILE").string();
   if (!scene.certificate || !scene.verified)
@@ -126,6 +176,8 @@ void add_certify(Arguments& args) {
                      "region alone. fast: in one pass, 1.4 to 3 times as wide")
       .value("certify-parts", "K",
              "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
+      .value("explain", "X,Y",
+             "what makes the bound of this pixel: bricks, and points of the transfer function")
       .value("picture-tolerance", "N", "exit with 1 where a pixel is not certain to N levels of 255");
 }
 
@@ -135,7 +187,7 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
   const std::string show = args.text_or("show", "colour");
   const bool of_bounds = std::find(kShown.begin(), kShown.end(), show) != kShown.end();
   if (!asks_certify(args)) {
-    refuse(args, {"certify-parts"}, "goes with --certify");
+    refuse(args, {"certify-parts", "explain"}, "goes with --certify");
     if (of_bounds) throw InputError(fmt::format("--show {} goes with --certify", show));
     return;
   }
@@ -197,6 +249,7 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   io::write_file(out.certificate, json.dump(2) + "\n");
   report(progress, "", 1);
 
+  const auto why = explained(args, scene, o, bounds.sampler);
   std::string pixels;
   const std::optional<double> tolerance = args.number("picture-tolerance");
   const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
@@ -204,12 +257,17 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   printed["output"] = output.string();
   printed["seconds"] = {{"draw", drawn.seconds}, {"certify", bounds.seconds}};
   if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
+  if (why) printed["explain"] = explained_json(*why);
   print_result(common, printed, [&] {
     fmt::print("{}\n", bound_line(bound, certificate));
     fmt::print("  {}: {} x {}, light {}; bound in {}, certificate in {}\n", output.string(), o.width,
                o.height, text_of(bounds.light), out.bound.string(), out.certificate.string());
     fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
                drawn.seconds, bounds.seconds, source.device().info().name);
+    if (why)
+      print_explained(
+          *why, scene, o,
+          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
     if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
   });
   if (over == 0) return 0;
