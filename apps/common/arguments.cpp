@@ -100,6 +100,13 @@ Arguments& Arguments::value(const std::string& name, const std::string& shape, c
   return *this;
 }
 
+Arguments& Arguments::value_or_flag(const std::string& name, const std::string& shape,
+                                    const std::string& implied, const std::string& help) {
+  groups_.back().add_options()(
+      name.c_str(), po::value<std::string>()->value_name(shape)->implicit_value(implied, ""), help.c_str());
+  return *this;
+}
+
 Arguments& Arguments::values(const std::string& name, const std::string& shape, const std::string& help) {
   groups_.back().add_options()(
       name.c_str(), po::value<std::vector<std::string>>()->composing()->value_name(shape), help.c_str());

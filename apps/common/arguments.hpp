@@ -27,6 +27,9 @@ class Arguments {
   Arguments& flag(const std::string& name, const std::string& help);
   /// `name` may be "output,o"; `shape` is the placeholder of the help text.
   Arguments& value(const std::string& name, const std::string& shape, const std::string& help);
+  /// A value that may be left out, and is `implied` then: --name, or --name=VALUE.
+  Arguments& value_or_flag(const std::string& name, const std::string& shape, const std::string& implied,
+                           const std::string& help);
   /// The same, which may be given several times; read by texts().
   Arguments& values(const std::string& name, const std::string& shape, const std::string& help);
   /// The next stray word; all positionals are required.

@@ -98,6 +98,20 @@ SliceFrame frame_of_slice(const RenderOptions& o, const Grid& grid,
   return frame;
 }
 
+void draw_overlay(RenderResult& r, const Scene& scene, const RenderOptions& o, const Overlay& overlay,
+                  bool certified, const std::vector<std::string>& caption) {
+  if (!overlay.any()) return;
+  const bool translucent =
+      std::any_of(o.surfaces.begin(), o.surfaces.end(), [](const IsoSurface& s) { return s.opacity < 1; });
+  if (overlay.box && o.mode == RenderMode::iso && translucent)
+    throw InputError("--box: how far edges show through translucent surfaces is not known; leave it out");
+  if (overlay.box) draw_box(r.image, o.camera, scene.volume.grid, hidden_part(o.mode, r.values));
+  std::int64_t above = 0;
+  if (overlay.caption) above = draw_caption(r.image, caption);
+  if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified), above);
+  if (overlay.axes) draw_axes(r.image, o.camera, above);
+}
+
 RenderResult render_with_overlay(Source& source, const RenderOptions& o, const Overlay& overlay,
                                  bool certified) {
   const Scene& scene = source.scene();
@@ -113,17 +127,8 @@ RenderResult render_with_overlay(Source& source, const RenderOptions& o, const O
   }
   if (o.mode == RenderMode::slice && !overlay.plain) return draw_framed(source, o, certified);
   RenderResult r = source.draw(o);
-  if (!overlay.any()) return r;
-  const bool translucent =
-      std::any_of(o.surfaces.begin(), o.surfaces.end(), [](const IsoSurface& s) { return s.opacity < 1; });
-  if (overlay.box && o.mode == RenderMode::iso && translucent)
-    throw InputError("--box: how far edges show through translucent surfaces is not known; leave it out");
-  if (overlay.box) draw_box(r.image, o.camera, scene.volume.grid, hidden_part(o.mode, r.values));
-  std::int64_t above = 0;
-  if (overlay.caption)
-    above = draw_caption(r.image, caption_lines(o, scene.volume.grid, certificate_of(scene, certified)));
-  if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified), above);
-  if (overlay.axes) draw_axes(r.image, o.camera, above);
+  draw_overlay(r, scene, o, overlay, certified,
+               caption_lines(o, scene.volume.grid, certificate_of(scene, certified)));
   return r;
 }
 

@@ -20,6 +20,10 @@ Overlay overlay_options(const Arguments& args, RenderMode mode);
 SliceFrame frame_of_slice(const RenderOptions& options, const Grid& grid,
                           const std::optional<Certificate>& certificate);
 
+/// Over a picture that was drawn with `options`. `caption` stands in place of the certificate's own.
+void draw_overlay(RenderResult& result, const Scene& scene, const RenderOptions& options,
+                  const Overlay& overlay, bool certified, const std::vector<std::string>& caption);
+
 /// Renders, and draws what was asked for over the picture.
 RenderResult render_with_overlay(Source& source, const RenderOptions& options, const Overlay& overlay,
                                  bool certified);

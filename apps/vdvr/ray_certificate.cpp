@@ -120,24 +120,16 @@ Json maximum(const std::string& show, const CertifiedRays& rays, const RenderOpt
 
 }  // namespace
 
-void add_ray_certificate(Arguments& args) {
-  args.flag("certify",
-            "of iso and mip: what is certain of F in each pixel, as OUTPUT.certificate.json; surfaces that F "
-            "may have "
-            "or not are striped; --show class|band of iso, and lo|hi as .npy, write it itself");
-}
-
 void check_ray_certificate(const Arguments& args, RenderMode mode, bool values) {
   const std::string show = args.text_or("show", "colour");
   const bool certified_show =
       std::find(certified_outputs().begin(), certified_outputs().end(), show) != certified_outputs().end();
+  const bool by_ray = mode == RenderMode::iso || mode == RenderMode::mip;
+  if (args.has("certify") && !by_ray) return;  // certify_render.hpp
   if (!args.has("certify")) {
     if (certified_show) throw InputError(fmt::format("--show {}: goes with --certify", show));
     return;
   }
-  if (mode != RenderMode::iso && mode != RenderMode::mip)
-    throw InputError(fmt::format("--certify: --mode {} has no certificate by ray here; iso and mip have",
-                                 args.text_or("mode", "dvr")));
   refuse(args, {"turntable", "method", "unverified", "axes", "box", "colorbar", "caption"},
          "does not go with --certify, which is of one plain picture of the certified field");
   if (show != "colour" && !certified_show)

@@ -11,8 +11,7 @@
 
 namespace vdvr::cli {
 
-/// --certify. What --show has beside its usual values comes with it.
-void add_ray_certificate(Arguments& args);
+/// What --show has beside its usual values; the option is declared by add_certify (certify_render.hpp).
 inline const std::vector<std::string>& certified_outputs() {
   static const std::vector<std::string> names{"class", "band", "lo", "hi"};
   return names;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/vdvr/pictures.hpp"
+#include "vdvr/certify_picture.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/progress.hpp"
 
@@ -30,6 +31,8 @@ class Source {
   [[nodiscard]] const Scene& scene() const { return *scene_; }
   [[nodiscard]] Device& device() { return *device_; }
   [[nodiscard]] RenderResult draw(const RenderOptions& options);
+  /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
+  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify);
   /// On the device beside what a frame needs: volume, or projections.
   [[nodiscard]] std::uint64_t bytes() const;
 

@@ -217,6 +217,14 @@ void read_scope(const Member& m, Certificate& c) {
     c.window = {w[0], w[1]};
   }
   if (const Member roi = m.at("roi"); !roi.is_null()) c.roi = roi.numbers<6>();
+  if (m.has("covered")) {
+    const Member covered = m.at("covered");
+    const auto z = covered.at("z").numbers<2>();
+    c.covered = CoveredCylinder{covered.at("radius").number(), {z[0], z[1]}};
+    if (!(c.covered->radius > 0 && z[0] < z[1]))
+      throw FileError(
+          "certificate: member 'covered' is no cylinder: its radius must be above 0 and z in order");
+  }
   const Member not_covered = m.at("not_covered");
   c.not_covered_count = not_covered.at("count").integer();
   c.not_covered_fraction = not_covered.at("fraction").number();
@@ -295,6 +303,9 @@ std::string to_json(const Certificate& c) {
   if (!c.field.preparation.none()) j["field"]["preparation"] = json_of(c.field.preparation);
   j["window"] = c.window ? numbers("window", std::array{c.window->first, c.window->second}) : Json(nullptr);
   j["roi"] = c.roi ? numbers("roi", *c.roi) : Json(nullptr);
+  if (c.covered)
+    j["covered"] = {{"radius", finite("covered.radius", c.covered->radius)},
+                    {"z", numbers("covered.z", std::array{c.covered->z.first, c.covered->z.second})}};
   j["not_covered"] = {{"count", c.not_covered_count},
                       {"fraction", finite("not_covered.fraction", c.not_covered_fraction)},
                       {"rule", c.not_covered_rule}};

@@ -9,6 +9,7 @@
 #include "host/gold/worst_node.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "vdvr/certified_region.hpp"
 
 namespace vdvr {
 namespace {
@@ -89,6 +90,9 @@ Certificate fill_certificate(const Inputs& in, const Device& device, const Proje
   c.padding = filtered.fft_length;
   c.window = options.window;
   c.roi = options.roi;
+  if (const CoveredCylinder covered = CertifiedRegion(scan, plan.field).cylinder();
+      covered.radius > 0 && covered.z.first < covered.z.second)
+    c.covered = covered;
   c.not_covered_count = plan.not_covered_count;
   c.not_covered_fraction = plan.not_covered_fraction;
   c.not_covered_rule = kNotCoveredRule;

@@ -13,6 +13,10 @@ bool CertifiedRegion::contains(const Vec3& point) const {
 
 double CertifiedRegion::inner_radius() const { return coverage_->inner_radius(); }
 
+CoveredCylinder CertifiedRegion::cylinder() const {
+  return {coverage_->inner_radius(), coverage_->heights()};
+}
+
 Grid certified_grid(const ProjectionSet& scan, const FieldOptions& field, const GridOptions& options) {
   if (!scan.cone) return make_grid(scan.geometry, options);
   const Coverage coverage = certified_coverage(scan, field);

@@ -49,6 +49,15 @@ void check_lights(const std::vector<Vec3>& lights) {
       throw InputError(fmt::format("`light` {},{},{} has no direction", l[0], l[1], l[2]));
 }
 
+void check_clip(const Clip& c) {
+  for (std::size_t a = 0; a < 3; ++a)
+    if (!(c.low[a] < c.high[a]))
+      throw InputError(fmt::format("`clip` {} is not below {} along {}", c.low[a], c.high[a], "xyz"[a]));
+  if (!(c.radius > 0) || !std::isfinite(c.axis[0]) || !std::isfinite(c.axis[1]))
+    throw InputError(fmt::format("`clip` needs a radius above 0 and a finite axis, not {} about {},{}",
+                                 c.radius, c.axis[0], c.axis[1]));
+}
+
 }  // namespace
 
 void check_options(const RenderOptions& o) {
@@ -69,6 +78,7 @@ void check_options(const RenderOptions& o) {
     return;
   }
   check_camera(o.camera);
+  if (o.clip) check_clip(*o.clip);
   if (!(o.step >= 0x1p-10 && o.step <= 1024))
     throw InputError(fmt::format("`step` {} must lie between 1/1024 and 1024 base cells", o.step));
   if (!(o.termination > 0 && o.termination <= 1))

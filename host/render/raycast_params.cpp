@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
@@ -15,7 +16,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 416 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 456 && sizeof(VdvrSlice) == 48);
 
 namespace {
 
@@ -47,6 +48,28 @@ void set_lights(VdvrRaycast& p, const RenderOptions& o) {
   }
   // Together they are as bright as one alone.
   p.light_share = 0.75f / static_cast<float>(std::max(1, p.head_light + p.lights));
+}
+
+// Faces of the grid stay where they are. Others move inward by more than what fp32 makes of positions on a
+// ray: those are sums of the eye's and of a product that is no longer than eye and grid together.
+void set_clip(VdvrRaycast& p, const Grid& g, const std::optional<Clip>& clip) {
+  const std::array<float, 3> eye{p.eye_x, p.eye_y, p.eye_z};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto cells = static_cast<double>(g.cells[a]);
+    p.clip_low[a] = 0;
+    p.clip_high[a] = static_cast<float>(cells);
+    if (!clip) continue;
+    const double inward = 0x1p-20 * (2 * std::abs(static_cast<double>(eye[a])) + cells);
+    const double low = (clip->low[a] - g.origin[a]) / g.spacing[a],
+                 high = (clip->high[a] - g.origin[a]) / g.spacing[a];
+    if (low > 0) p.clip_low[a] = static_cast<float>(std::min(low + inward, cells + 1));
+    if (high < cells) p.clip_high[a] = static_cast<float>(std::max(high - inward, -1.0));
+  }
+  if (!clip || !std::isfinite(clip->radius)) return;
+  p.cylinder_x = static_cast<float>((clip->axis[0] - g.origin[0]) / g.spacing[0]);
+  p.cylinder_y = static_cast<float>((clip->axis[1] - g.origin[1]) / g.spacing[1]);
+  p.cylinder_per_x = static_cast<float>(g.spacing[0] / clip->radius);
+  p.cylinder_per_y = static_cast<float>(g.spacing[1] / clip->radius);
 }
 
 }  // namespace
@@ -88,6 +111,7 @@ VdvrRaycast make_params(const DrawnField& v, const RenderOptions& o, const Baked
   p.skip = o.skip_empty ? 1 : 0;
   set_surfaces(p, o.surfaces);
   set_lights(p, o);
+  set_clip(p, v.grid, o.clip);
   return p;
 }
 

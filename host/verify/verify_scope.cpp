@@ -130,7 +130,13 @@ void compare_rates(Compare& out, const MixedVolume& v, const Certificate& c) {
 }
 
 void compare_coverage(Compare& out, const ProjectionSet& scan, const MixedVolume& v, const Certificate& c) {
-  const std::int64_t count = count_not_covered(v.grid, certified_coverage(scan, c.field));
+  const Coverage coverage = certified_coverage(scan, c.field);
+  if (c.covered) {  // a part of the region would do, but is not what was written
+    out.number("covered.radius", c.covered->radius, coverage.inner_radius());
+    out.number("covered.z[0]", c.covered->z.first, coverage.heights().first);
+    out.number("covered.z[1]", c.covered->z.second, coverage.heights().second);
+  }
+  const std::int64_t count = count_not_covered(v.grid, coverage);
   out.integer("not_covered.count", c.not_covered_count, count);
   out.number("not_covered.fraction", c.not_covered_fraction,
              static_cast<double>(count) / static_cast<double>(v.grid.sample_count()));

@@ -42,6 +42,12 @@ struct Bound {
   bool rigorous = false;
 };
 
+/// An upright cylinder about the rotation axis, x = y = 0, world: points that certificates speak of.
+struct CoveredCylinder {
+  double radius = 0;
+  std::pair<double, double> z{0, 0};
+};
+
 struct Certificate {
   double epsilon = 0;          ///< fraction of reference_range
   double epsilon_abs = 0;      ///< density units
@@ -68,6 +74,8 @@ struct Certificate {
   std::int64_t padding = 0;  ///< length of the ramp filter's FFT
   std::optional<std::pair<double, double>> window;
   std::optional<std::array<double, 6>> roi;
+  /// The largest such cylinder; nothing in files of earlier versions.
+  std::optional<CoveredCylinder> covered;
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   std::string not_covered_rule;

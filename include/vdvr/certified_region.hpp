@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "vdvr/certificate.hpp"
 #include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/grid.hpp"
@@ -21,6 +22,8 @@ class VDVR_API CertifiedRegion {
   explicit CertifiedRegion(const ProjectionSet& scan, const FieldOptions& field = {});
   [[nodiscard]] bool contains(const Vec3& point) const;
   [[nodiscard]] double inner_radius() const;
+  /// The largest upright cylinder in it.
+  [[nodiscard]] CoveredCylinder cylinder() const;
 
  private:
   std::shared_ptr<const Coverage> coverage_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,18 @@ enum class Classification { post, preintegrated };
 /// Other modes and D2VR take adaptive for fixed.
 enum class StepMode { fixed, level, adaptive };
 
+/// What of a volume is drawn: the points that lie in a box and in an upright cylinder about (axis x, axis y),
+/// both closed, world units. What lies outside is absent, as if the volume ended there: a surface that is cut
+/// shows its inside. Rays enter and leave rounded inward, by at most some 1e-4 of the radius.
+struct Clip {
+  Vec3 low{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+           -std::numeric_limits<double>::infinity()},
+      high{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+           std::numeric_limits<double>::infinity()};
+  std::array<double, 2> axis{0, 0};
+  double radius = std::numeric_limits<double>::infinity();
+};
+
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
   RenderOutput output = RenderOutput::colour;
@@ -64,6 +77,7 @@ struct RenderOptions {
   double termination = 0.99;   ///< early ray termination: opacity at which a ray stops
   bool skip_empty = true;      ///< brick min/max skipping; the picture is the same to the bit without it
   SamplerKind sampler = SamplerKind::automatic;
+  std::optional<Clip> clip;  ///< of every mode but slice
   /// Behind the volume, display values, top and bottom row.
   std::array<double, 3> background_top{0.13, 0.14, 0.16}, background_bottom{0.03, 0.03, 0.04};
 };

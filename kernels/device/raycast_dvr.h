@@ -16,7 +16,7 @@
 // for shading, and its bound does not count as seen.
 #define SHADED_WEIGHT 0.001953125f
 
-// Rays clipped to the grid's box. Positions in cells, parameter t in lengths from `entry`.
+// Rays clipped to what is drawn of the grid. Positions in cells, parameter t in lengths from `entry`.
 typedef struct {
   V3 world;  // unit direction, world axes
   V3 entry, direction, inverse;
@@ -30,16 +30,41 @@ RAY_INLINE V3 pick3(I m, V3 a, V3 b) { return v3(PICK(m, a.x, b.x), PICK(m, a.y,
 
 #include "device/shade.h"
 
-// One axis of a ray and the two faces of the grid across it.
-RAY_INLINE V clip(V direction, float eye, int cells, V* inverse, V* far) {
+// One axis of a ray and the two faces across it of the box that is drawn.
+RAY_INLINE V clip(V direction, float eye, float low, float high, V* inverse, V* far) {
   // A component of 1e-12 stands for 0 in the divisions: the slab test then decides by the sign alone, without
   // 0/0.
   const V tiny = (V)(1e-12f);
   const V d = PICK(fabs(direction) < tiny, copysign(tiny, direction), direction);
   *inverse = 1.0f / d;
-  const V a = -eye * *inverse, b = ((float)cells - eye) * *inverse;
+  const V a = (low - eye) * *inverse, b = (high - eye) * *inverse;
   *far = MOST(a, b);
   return LEAST(a, b);
+}
+
+// Cuts [near, far] to the part inside the upright cylinder. With the radius as unit, a ray comes nearest to
+// the axis at `middle`. It passes the axis at a distance of which `beside` is the square. The radius is taken
+// as smaller by more than all rounding, here and of positions on the ray: 2^-18 of the distances that are
+// added.
+RAY_INLINE void clip_to_cylinder(const VdvrRaycast* p, const Ray* ray, V* near, V* far) {
+  const float ex = (p->eye_x - p->cylinder_x) * p->cylinder_per_x,
+              ey = (p->eye_y - p->cylinder_y) * p->cylinder_per_y;
+  const float around = 1.0f + fabs(ex) + fabs(ey) + fabs(p->cylinder_x * p->cylinder_per_x) +
+                       fabs(p->cylinder_y * p->cylinder_per_y);
+  const V dx = ray->direction.x * p->cylinder_per_x, dy = ray->direction.y * p->cylinder_per_y;
+  const V across = dx * dx + dy * dy;
+  // Below this a ray does not leave its place in xy, as far as fp32 can tell.
+  const I upright = across < 1e-20f;
+  const V divisor = PICK(upright, (V)(1.0f), across), cross = ex * dy - ey * dx;
+  const V beside = PICK(upright, (V)(ex * ex + ey * ey), cross * cross / divisor);
+  const V under = 1.0f - 0x1p-18f * around - beside;
+  const I meets = under > 0.0f;
+  const V half_way = sqrt(PICK(meets, under, (V)(0.0f)) / divisor), middle = -(ex * dx + ey * dy) / divisor;
+  const V from = PICK(meets & upright, *near, middle - half_way),
+          to = PICK(meets & upright, *far, middle + half_way);
+  *near = MOST(*near, from);
+  *far = LEAST(*far, to);
+  *far = PICK(meets, *far, *near);
 }
 
 // The camera's rays through the centres of pixels (px, py), clipped. Where length is not above 0 they miss
@@ -56,12 +81,14 @@ RAY_INLINE Ray cast_rays(const VdvrRaycast* p, VdvrGrid grid, I px, I py) {
   ray.direction = v3(ray.world.x * p->cells_per_length_x, ray.world.y * p->cells_per_length_y,
                      ray.world.z * p->cells_per_length_z);
   V3 far;
-  const V near_x = clip(ray.direction.x, p->eye_x, grid.cells_x, &ray.inverse.x, &far.x);
-  const V near_y = clip(ray.direction.y, p->eye_y, grid.cells_y, &ray.inverse.y, &far.y);
-  const V near_z = clip(ray.direction.z, p->eye_z, grid.cells_z, &ray.inverse.z, &far.z);
-  const V near_xy = MOST(near_x, near_y), near = MOST(near_xy, near_z), far_xy = LEAST(far.x, far.y);
+  const V near_x = clip(ray.direction.x, p->eye_x, p->clip_low[0], p->clip_high[0], &ray.inverse.x, &far.x);
+  const V near_y = clip(ray.direction.y, p->eye_y, p->clip_low[1], p->clip_high[1], &ray.inverse.y, &far.y);
+  const V near_z = clip(ray.direction.z, p->eye_z, p->clip_low[2], p->clip_high[2], &ray.inverse.z, &far.z);
+  const V near_xy = MOST(near_x, near_y), far_xy = LEAST(far.x, far.y);
+  V near = MOST(near_xy, near_z), end = LEAST(far_xy, far.z);
+  if (p->cylinder_per_x > 0.0f) clip_to_cylinder(p, &ray, &near, &end);
   ray.first = MOST(near, (V)(0.0f));
-  ray.length = LEAST(far_xy, far.z) - ray.first;
+  ray.length = end - ray.first;
   ray.entry = clamp_to_grid(v3(p->eye_x + ray.first * ray.direction.x, p->eye_y + ray.first * ray.direction.y,
                                p->eye_z + ray.first * ray.direction.z),
                             grid);

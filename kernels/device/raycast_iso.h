@@ -4,6 +4,7 @@
 // never steps back. Included by raycast.cl.
 #ifndef VDVR_RAYCAST_ISO_H
 #define VDVR_RAYCAST_ISO_H
+#include "device/ray_cells.h"
 
 // Bisections of a piece: 2^-20 of a chord, which is as far as fp32 knows the ray's positions.
 #define BISECTIONS 20
@@ -35,55 +36,6 @@ RAY_INLINE Surfaces surfaces_at(const VdvrRaycast* p, I number) {
 #undef CHOOSE
   return s;
 }
-
-// The field at the corners of a box, f<z><y><x>.
-typedef struct {
-  V f000, f001, f010, f011, f100, f101, f110, f111;
-} Octet;
-
-RAY_INLINE void octet_range(const Octet* o, V* lo, V* hi) {
-  const V a = LEAST(o->f000, o->f001), b = LEAST(o->f010, o->f011), c = LEAST(o->f100, o->f101),
-          d = LEAST(o->f110, o->f111), ab = LEAST(a, b), cd = LEAST(c, d);
-  const V e = MOST(o->f000, o->f001), f = MOST(o->f010, o->f011), g = MOST(o->f100, o->f101),
-          h = MOST(o->f110, o->f111), ef = MOST(e, f), gh = MOST(g, h);
-  *lo = LEAST(ab, cd);
-  *hi = MOST(ef, gh);
-}
-
-#ifdef VDVR_SAMPLER_IMAGE3D
-// Of the box that points a and b of one cell span.
-RAY_INLINE Octet octet_between(FIELD, const OpenBrick* brick, VdvrGrid grid, V3 a, V3 b) {
-#define AT(X, Y, Z) sample_open(THE_FIELD, brick, grid, v3(X, Y, Z)).value
-  const Octet o = {AT(a.x, a.y, a.z), AT(b.x, a.y, a.z), AT(a.x, b.y, a.z), AT(b.x, b.y, a.z),
-                   AT(a.x, a.y, b.z), AT(b.x, a.y, b.z), AT(a.x, b.y, b.z), AT(b.x, b.y, b.z)};
-#undef AT
-  return o;
-}
-#else
-// Of the box that fractions a and b of a cell span, by the cell's own corners.
-RAY_INLINE Octet octet_within(Octet o, V3 a, V3 b) {
-#define ALONG(FROM, TO, A, B)                                          \
-  {                                                                    \
-    const V low = lerp(o.FROM, o.TO, A), high = lerp(o.FROM, o.TO, B); \
-    o.FROM = low;                                                      \
-    o.TO = high;                                                       \
-  }
-  ALONG(f000, f001, a.x, b.x)
-  ALONG(f010, f011, a.x, b.x)
-  ALONG(f100, f101, a.x, b.x)
-  ALONG(f110, f111, a.x, b.x)
-  ALONG(f000, f010, a.y, b.y)
-  ALONG(f001, f011, a.y, b.y)
-  ALONG(f100, f110, a.y, b.y)
-  ALONG(f101, f111, a.y, b.y)
-  ALONG(f000, f100, a.z, b.z)
-  ALONG(f001, f101, a.z, b.z)
-  ALONG(f010, f110, a.z, b.z)
-  ALONG(f011, f111, a.z, b.z)
-#undef ALONG
-  return o;
-}
-#endif
 
 // The field along the diagonal of a box from f000 (s = 0) to f111 (s = 1), and where it turns.
 typedef struct {
@@ -127,30 +79,6 @@ RAY_INLINE V cubic_root(const Cubic* q, V from, V to, V value, I up) {
     to = PICK(is_before, to, middle);
   }
   return 0.5f * (from + to);
-}
-
-// One axis of a box that a ray passes, by its faces low and high.
-RAY_INLINE V enters(V low, V high, V entry, V inverse) {
-  const V a = (low - entry) * inverse, b = (high - entry) * inverse;
-  return LEAST(a, b);
-}
-RAY_INLINE V leaves(V low, V high, V entry, V inverse) {
-  const V a = (low - entry) * inverse, b = (high - entry) * inverse;
-  return MOST(a, b);
-}
-
-// The coordinate of the next cell: beyond the face that the ray leaves by, else no less far than before.
-RAY_INLINE V beyond(I by_this, I up, V low, V high, V before, V reached) {
-  const V further = PICK(up, MOST(before, reached), LEAST(before, reached));
-  // The largest number below a face belongs to the cell before it.
-  const V below = PACKET(as_float)(PACKET(as_int)(low) - 1);
-  return PICK(by_this, PICK(up, high, PICK(low > 0.0f, below, (V)(0.0f))), further);
-}
-
-RAY_INLINE V fraction_of(V c, V low, V scale) {
-  V f = (c - low) * scale;
-  f = LEAST(f, (V)(1.0f));
-  return MOST(f, (V)(0.0f));
 }
 
 // Adds the crossing of surface `number` at parameter `at` in the lanes `crossing`.
@@ -209,40 +137,6 @@ RAY_INLINE void meet_surfaces(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p
   }
 }
 
-// A box of cells, and where rays leave it along each axis.
-typedef struct {
-  V3 low, high, far;
-} Box;
-RAY_INLINE Box box_between(const Ray* ray, V3 low, V3 high) {
-  Box b;
-  b.low = low;
-  b.high = high;
-  b.far = v3(leaves(low.x, high.x, ray->entry.x, ray->inverse.x),
-             leaves(low.y, high.y, ray->entry.y, ray->inverse.y),
-             leaves(low.z, high.z, ray->entry.z, ray->inverse.z));
-  return b;
-}
-RAY_INLINE V enters_box(const Ray* ray, const Box* b) {
-  const V x = enters(b->low.x, b->high.x, ray->entry.x, ray->inverse.x);
-  const V y = enters(b->low.y, b->high.y, ray->entry.y, ray->inverse.y);
-  const V z = enters(b->low.z, b->high.z, ray->entry.z, ray->inverse.z);
-  const V xy = MOST(x, y), xyz = MOST(xy, z);
-  return MOST(xyz, (V)(0.0f));
-}
-RAY_INLINE V leaves_box(const Box* b) {
-  const V xy = LEAST(b->far.x, b->far.y);
-  return LEAST(xy, b->far.z);
-}
-// The bricks that lie on the same side as those at `at`.
-RAY_INLINE Box box_around(const Ray* ray, I3 at, I away) {
-  const I less = away - 1;
-  return box_between(ray,
-                     v3(TO_V((at.x - less) * VDVR_GRANULARITY), TO_V((at.y - less) * VDVR_GRANULARITY),
-                        TO_V((at.z - less) * VDVR_GRANULARITY)),
-                     v3(TO_V((at.x + away) * VDVR_GRANULARITY), TO_V((at.y + away) * VDVR_GRANULARITY),
-                        TO_V((at.z + away) * VDVR_GRANULARITY)));
-}
-
 // Meets the surfaces in the cells at c, which `sampled` was taken from. Returns the cells.
 RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray,
                           const OpenBrick* brick, const Sampled* sampled, V3 c, I active, I* was,
@@ -251,11 +145,13 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
   const V3 low = cell.low;
   const Box box = box_between(
       ray, low, v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z));
+  Octet octet;
 #ifdef VDVR_SAMPLER_IMAGE3D
   const I worth = active;
 #else
-  Octet octet = {sampled->s000, sampled->s001, sampled->s010, sampled->s011,
-                 sampled->s100, sampled->s101, sampled->s110, sampled->s111};
+  const Octet corners = {sampled->s000, sampled->s001, sampled->s010, sampled->s011,
+                         sampled->s100, sampled->s101, sampled->s110, sampled->s111};
+  octet = corners;
   V lo, hi;
   octet_range(&octet, &lo, &hi);
   const I worth = active & ((side_of(p, lo - p->slack) != *was) | (side_of(p, hi + p->slack) != *was));
@@ -264,15 +160,7 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
   const V in = enters_box(ray, &box), far = leaves_box(&box), cut = LEAST(far, ray->length),
           out = MOST(cut, in);
   const V3 a = position_at(ray, grid, in), b = position_at(ray, grid, out);
-#ifdef VDVR_SAMPLER_IMAGE3D
-  const Octet octet = octet_between(THE_FIELD, brick, grid, a, b);
-#else
-  octet = octet_within(octet,
-                       v3(fraction_of(a.x, low.x, cell.scale.x), fraction_of(a.y, low.y, cell.scale.y),
-                          fraction_of(a.z, low.z, cell.scale.z)),
-                       v3(fraction_of(b.x, low.x, cell.scale.x), fraction_of(b.y, low.y, cell.scale.y),
-                          fraction_of(b.z, low.z, cell.scale.z)));
-#endif
+  octet = octet_of_piece(THE_FIELD, brick, grid, octet, low, cell.scale, a, b);
   const Cubic cubic = cubic_along(&octet);
   meet_surfaces(THE_FIELD, bricks, grid, p, ray, &cubic, in, out, worth, was, seen THE_BOUNDS);
   return box;
@@ -288,7 +176,6 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
   THE_PIXELS;
   Seen seen = nothing_seen((V)(-1.0f));
   const Ray ray = cast_rays(&p, grid, px, py);
-  const I3 up = {ray.inverse.x > 0.0f, ray.inverse.y > 0.0f, ray.inverse.z > 0.0f};
   I active = ends_of(&p, &ray, px, py, (V)(1.0f)) > 0, samples = 0, was = 0, away = 0;
   V3 c = ray.entry;
   OpenBrick brick = no_brick();
@@ -314,16 +201,7 @@ __kernel VDVR_HINT void raycast_iso(FIELD, BRICKS, VdvrGrid grid, __global const
       box.high = pick3(leap, around.high, box.high);
       box.far = pick3(leap, around.far, box.far);
     }
-    const V step = leaves_box(&box), within = LEAST(step, ray.length);
-    const V3 reached = position_at(&ray, grid, MOST(within, (V)(0.0f)));
-    const I3 by = {box.far.x <= step, box.far.y <= step, box.far.z <= step};
-    const I outside = (by.x & PICK(up.x, (I)(box.high.x >= (float)grid.cells_x), (I)(box.low.x <= 0.0f))) |
-                      (by.y & PICK(up.y, (I)(box.high.y >= (float)grid.cells_y), (I)(box.low.y <= 0.0f))) |
-                      (by.z & PICK(up.z, (I)(box.high.z >= (float)grid.cells_z), (I)(box.low.z <= 0.0f)));
-    c = v3(beyond(by.x, up.x, box.low.x, box.high.x, c.x, reached.x),
-           beyond(by.y, up.y, box.low.y, box.high.y, c.y, reached.y),
-           beyond(by.z, up.z, box.low.z, box.high.z, c.z, reached.z));
-    active &= (step < ray.length) & NOT(outside) & (seen.alpha < p.termination);
+    active &= pass_box(&ray, grid, &box, &c) & (seen.alpha < p.termination);
   }
   put_seen(&p, picture, row_samples, px, py, &seen, seen.depth, samples);
 }

@@ -2,8 +2,9 @@
 // slice. One source for both samplers and for packets of 1 to 16 rays per work-item (device/packet.h).
 //
 // Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, the last in the middle of the path
-// that is left. Each belongs to the brick that vdvr_brick_of names; bricks decide what is skipped and which record is open, never where a sample lies. The
-// rays of a packet share k; each counts from its own entry. So neither skipping nor packets change a bit.
+// that is left. Each belongs to the brick that vdvr_brick_of names; bricks decide what is skipped and which
+// record is open, never where a sample lies. The rays of a packet share k; each counts from its own entry. So
+// neither skipping nor packets change a bit.
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where
 // worth sampling), ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities
@@ -65,8 +66,8 @@ __kernel VDVR_HINT void raycast_mip(FIELD, BRICKS, VdvrGrid grid, __global const
   int k = 0;
   while (k < end) {
     const I active = k < ends;
-    const float t = ((float)k + 0.5f) * p.step;
-    const V3 c = position_at(&ray, grid, (V)(t));
+    const V middle = (V)(((float)k + 0.5f) * p.step), t = LEAST(middle, ray.length);
+    const V3 c = position_at(&ray, grid, t);
     if (ANY(active & NOT(is_inside(&brick, c)))) {
       const I3 at = brick_at(grid, c);
       if (p.skip) {

@@ -39,7 +39,7 @@ typedef struct {
 
 #define VDVR_LIGHTS 8
 
-// Scalars only: no alignment that two compilers could read differently. 416 bytes.
+// Scalars only: no alignment that two compilers could read differently. 456 bytes.
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
@@ -65,6 +65,10 @@ typedef struct {
   int lights;
   float light[VDVR_LIGHTS][3];  // unit vectors towards them, world axes
   float light_share;            // of each in the light that is not ambient
+  // What is drawn: a box in cells, within the grid, and an upright cylinder. Its centre in cells, and radii
+  // per cell, 0 where there is none.
+  float clip_low[3], clip_high[3];
+  float cylinder_x, cylinder_y, cylinder_per_x, cylinder_per_y;
 } VdvrRaycast;
 
 // A slice: cell coordinate of pixel (x, y) is first + x * dx along axis `across`, first + y * dy along axis

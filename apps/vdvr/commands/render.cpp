@@ -5,6 +5,8 @@
 #include <array>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/certify_render.hpp"
+#include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
@@ -18,7 +20,8 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error", "class", "band", "lo", "hi"};
+const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error", "bound",
+                                        "lo",     "hi",    "middle", "class", "band"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
 // Twenty pictures a second: a turn of 60 takes three.
@@ -42,9 +45,12 @@ void add_options(Arguments& args) {
   args.value("iso", "V[,V...]",
              "densities of up to 8 iso-surfaces (default: one between background and object)")
       .value("iso-opacity", "O[,O...]", "of each (default 1; of several the densest 1, others 0.3)")
-      .value("show", "colour|depth|normal|error|class|band|lo|hi",
-             "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, or "
-             "how far the samples it was made of can lie from the scan")
+      .value(
+          "show", "colour|depth|normal|error|bound|lo|hi|middle|class|band",
+          "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, or "
+          "how far the samples it was made of can lie from the scan; with --certify the bound of each pixel, "
+          "the ends of its interval or their middle; of iso the class of each pixel, or "
+          "the band of its depth")
       .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
@@ -66,7 +72,8 @@ void add_options(Arguments& args) {
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("unverified", "render although content and certificate do not match");
-  add_ray_certificate(args);
+  add_certify(args);
+  add_clip(args);
   add_scan(args);
   add_projection_options(args);
   args.group("Camera");
@@ -203,12 +210,16 @@ void check_d2vr(const Arguments& args, const RenderOptions& o) {
 }
 
 void check_combination(const Arguments& args, const RenderOptions& o) {
+  check_certify(args, o);
   if (method_option(args) == "d2vr") check_d2vr(args, o);
   const bool flat = o.mode == RenderMode::slice || o.mode == RenderMode::error;
   frames_grid(args);
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
+  if (flat) refuse(args, {"clip", "clip-covered", "covered-from"}, "does not apply to a slice");
+  if (!args.has("clip-covered") && !asks_certify(args))
+    refuse(args, {"covered-from"}, "goes with --clip-covered and --certify");
   if (flat)
     refuse(args,
            {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading", "show",
@@ -427,7 +438,8 @@ int render_command(Arguments& args) {
     refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   check_ray_certificate(args, o.mode, kind == OutputKind::values);
-  const bool certifies = args.has("certify");
+  // Colours are certified by the device, surfaces and maxima ray by ray on the host.
+  const bool certifies = args.has("certify") && o.mode != RenderMode::dvr;
   if (certifies) check_output(ray_certificate_path(output), common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
@@ -443,10 +455,16 @@ int render_command(Arguments& args) {
   const Orbit orbit = orbit_options(args, kOrbit);
   const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
   o.camera = camera_for(args, frame, orbit);
+  o.clip = clip_for(args, scene, progress.callback());
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr";
   o.skip_empty = !args.has("no-skip");
 
+  if (asks_certify(args) && !certifies) {
+    const int code = certify_render(args, common, source, o, overlay, output, progress.callback());
+    progress.clear();
+    return code;
+  }
   const Stage stage{source, overlay, certified, frame};
   const RenderResult result =
       kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())

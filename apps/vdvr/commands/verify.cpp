@@ -8,6 +8,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/verification.hpp"
+#include "apps/vdvr/verify_picture.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -46,12 +47,21 @@ void check_field_options(const Arguments& args, const FieldOptions& stored) {
 int verify_command(Arguments& args) {
   args.positional("FILE", "the certified volume")
       .value("projections", "IN", "the projections it was built from")
+      .value("picture", "X.certificate.json",
+             "a certified picture of the volume instead: hashes, the intervals again, and with --projections "
+             "F itself along random rays")
+      .value("rays", "R", "of --picture, how many (default 16)")
       .flag("exhaustive", "every gold node; otherwise a stratified sample of bricks and the worst ones");
   add_scan(args);
   add_field(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
+  if (args.has("picture")) {
+    refuse(args, {"exhaustive"}, "does not apply to --picture");
+    return verify_picture(args, common);
+  }
+  refuse(args, {"rays"}, "goes with --picture");
   const auto path = args.path("FILE"), projections = args.path("projections");
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));

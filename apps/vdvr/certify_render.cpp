@@ -1,0 +1,286 @@
+#include "apps/vdvr/certify_render.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/vdvr/clip.hpp"
+#include "apps/vdvr/picture_certificate.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/explain_pixel.hpp"
+#include "vdvr/hash.hpp"
+#include "vdvr/output_file.hpp"
+#include "vdvr/stop.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+const std::vector<std::string> kShown{"bound", "lo", "hi", "middle"};
+
+struct Outputs {
+  std::filesystem::path picture, bound, certificate;
+  bool values = false;  ///< .npy
+};
+
+Outputs outputs_of(const std::filesystem::path& picture) {
+  Outputs o{picture, picture, picture, picture.extension() == ".npy"};
+  o.bound.replace_extension(".bound.png");
+  o.certificate.replace_extension(".certificate.json");
+  return o;
+}
+
+/// Between or of the ends, values as float32 or as they are shown.
+FloatImage end_of(const PixelBounds& b, const std::string& which) {
+  FloatImage image = which == "lo" ? b.lo : b.hi;
+  if (which == "middle")
+    for (std::size_t i = 0; i < image.values.size(); ++i)
+      image.values[i] = (b.lo.values[i] + b.hi.values[i]) / 2;
+  return image;
+}
+
+Image as_image(const FloatImage& values) {
+  Image image{values.width, values.height, {}};
+  for (const float x : values.values)
+    image.rgb.push_back(static_cast<std::uint8_t>(std::clamp(x, 0.0f, 1.0f) * 255.0f + 0.5f));
+  return image;
+}
+
+CertifyPictureOptions certify_options(const Arguments& args) {
+  CertifyPictureOptions c;
+  c.fast = args.has("certify") && args.choice("certify", {"exact", "fast"}, "exact") == "fast";
+  c.kappa = args.positive_or("certify-parts", c.kappa);
+  return c;
+}
+
+/// The steps in which the picture is drawn are a part of its bound, so they are fine unless they were chosen.
+void refine_drawing(const Arguments& args, RenderOptions& o) {
+  if (!args.has("step") && !args.has("classification") && !args.has("step-mode"))
+    o.classification = Classification::preintegrated;
+  o.termination = 1 - CertifyPictureOptions{}.theta;
+  if (o.gradient == GradientKind::automatic) o.gradient = GradientKind::central;
+}
+
+std::vector<std::string> overlay_names(const Overlay& overlay) {
+  std::vector<std::string> names;
+  if (overlay.axes) names.emplace_back("axes");
+  if (overlay.box) names.emplace_back("box");
+  if (overlay.colour_bar) names.emplace_back("colorbar");
+  if (overlay.caption) names.emplace_back("caption");
+  return names;
+}
+
+std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds& bounds,
+                                    const Certificate& certificate) {
+  return {bound_line(bound, certificate),
+          fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
+                      text_of(bounds.light))};
+}
+
+void write_shown(const Outputs& out, const std::string& show, const PixelBounds& bounds,
+                 const PictureBound& bound) {
+  if (show == "bound") {
+    if (out.values) write_npy(out.picture, bound.levels);
+    else write_png(out.picture, picture_of_bound(bound, bounds));
+    return;
+  }
+  const FloatImage values = end_of(bounds, show);
+  if (out.values) write_npy(out.picture, values);
+  else write_png(out.picture, as_image(values));
+}
+
+/// Says which pixels lie beyond; how many.
+std::int64_t beyond(const PictureBound& bound, double tolerance, std::string& text) {
+  std::int64_t count = 0;
+  for (std::size_t i = 0; i < bound.levels.values.size(); ++i) {
+    if (static_cast<double>(bound.levels.values[i]) <= tolerance) continue;
+    const auto at = static_cast<std::int64_t>(i);
+    if (++count <= 8)
+      text += fmt::format("{}({}, {}) {:.1f}", count == 1 ? "" : ", ", at % bound.levels.width,
+                          at / bound.levels.width, bound.levels.values[i]);
+  }
+  if (count > 8) text += fmt::format(" and {} more", count - 8);
+  return count;
+}
+
+struct Explained {
+  std::int64_t x = 0, y = 0;
+  PixelExplanation why;
+};
+
+std::optional<Explained> explained(const Arguments& args, const Scene& scene, const RenderOptions& o,
+                                   SamplerKind sampler) {
+  const auto pixel = args.numbers("explain", 2);
+  if (!pixel) return std::nullopt;
+  const auto inside = [](double at, std::int64_t size) {
+    return at >= 0 && at < static_cast<double>(size) && at == std::floor(at);
+  };
+  if (!inside((*pixel)[0], o.width) || !inside((*pixel)[1], o.height))
+    throw InputError(fmt::format("--explain: {},{} is no pixel of {}x{}; 0,0 is the first", (*pixel)[0],
+                                 (*pixel)[1], o.width, o.height));
+  Explained e{static_cast<std::int64_t>((*pixel)[0]), static_cast<std::int64_t>((*pixel)[1]), {}};
+  e.why = explain_pixel(scene.volume, brick_bounds(*scene.certificate, sampler == SamplerKind::image3d), o,
+                        e.x, e.y);
+  return e;
+}
+
+Json explained_json(const Explained& e) {
+  Json bricks = Json::array();
+  for (const BrickShare& b : e.why.bricks)
+    bricks.push_back({{"brick", b.brick},
+                      {"bound", std::isfinite(b.bound) ? Json(b.bound) : Json()},
+                      {"levels", b.levels}});
+  return {{"pixel", Json::array({e.x, e.y})}, {"bricks", bricks}, {"of_points", e.why.of_points}};
+}
+
+void print_explained(const Explained& e, const Scene& scene, const RenderOptions& o, double bound) {
+  fmt::print("  pixel ({}, {}): bound {:.1f} levels; to first order {:.1f}, of which\n", e.x, e.y, bound,
+             e.why.levels);
+  const Index3 n = scene.volume.bricks();
+  for (std::size_t i = 0; i < std::min<std::size_t>(6, e.why.bricks.size()); ++i) {
+    const BrickShare& b = e.why.bricks[i];
+    const auto at = static_cast<std::int64_t>(b.brick);
+    const LevelTriple& l = scene.volume.level[b.brick];
+    fmt::print("    {:>5.1f}  brick ({}, {}, {}), level zyx {}{}{}, |V - F| <= {:.4g}\n", b.levels, at % n[0],
+               at / n[0] % n[1], at / (n[0] * n[1]), l[0], l[1], l[2], b.bound);
+  }
+  const auto worst = std::max_element(e.why.of_points.begin(), e.why.of_points.end());
+  if (worst == e.why.of_points.end() || !(*worst > 0)) return;
+  const TransferPoint& p = o.transfer.points[static_cast<std::size_t>(worst - e.why.of_points.begin())];
+  fmt::print("    {:>5.1f}  at the transfer function's point {:.6g} (opacity {:.3g})\n", *worst, p.value,
+             p.opacity);
+}
+
+void check_file(const Arguments& args, const Scene& scene) {
+  const std::string name = args.path("FILE").string();
+  if (!scene.certificate || !scene.verified)
+    throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
+  if (scene.certificate->comparison)
+    throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
+  if (scene.certificate->window)
+    throw InputError(
+        fmt::format("{}: was certified within a --window, and outside it F is unknown: build it "
+                    "without --window to certify pictures",
+                    name));
+}
+
+}  // namespace
+
+const std::vector<std::string>& bound_outputs() { return kShown; }
+
+void add_certify(Arguments& args) {
+  args.group("Certified pictures")
+      .value_or_flag(
+          "certify", "exact|fast", "exact",
+          "for every pixel an interval that holds the colour of the ideal picture: writes beside "
+          "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
+          "region alone. fast: in one pass, 1.4 to 3 times as wide. Of iso and mip: what is certain "
+          "of F in each pixel, as X.certificate.json; surfaces that F may have or not are striped")
+      .value("certify-parts", "K",
+             "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
+      .value("explain", "X,Y",
+             "what makes the bound of this pixel: bricks, and points of the transfer function")
+      .value("picture-tolerance", "N", "exit with 1 where a pixel is not certain to N levels of 255");
+}
+
+bool asks_certify(const Arguments& args) { return args.has("certify") || args.has("picture-tolerance"); }
+
+void check_certify(const Arguments& args, const RenderOptions& o) {
+  const std::string show = args.text_or("show", "colour");
+  const bool of_bounds = std::find(kShown.begin(), kShown.end(), show) != kShown.end();
+  if (!asks_certify(args)) {
+    refuse(args, {"certify-parts", "explain"}, "goes with --certify");
+    if (of_bounds) throw InputError(fmt::format("--show {} goes with --certify", show));
+    return;
+  }
+  if (o.mode == RenderMode::iso || o.mode == RenderMode::mip) {  // ray_certificate.hpp
+    refuse(args, {"certify-parts", "explain", "picture-tolerance"}, "is of --mode dvr");
+    if (args.choice("certify", {"exact", "fast"}, "exact") == "fast")
+      throw InputError("--certify fast is of --mode dvr; iso and mip have the exact one alone");
+    return;
+  }
+  if (o.mode != RenderMode::dvr)
+    throw InputError(fmt::format("--certify: pictures of --mode dvr, iso and mip are certified, not of {}",
+                                 args.text("mode")));
+  if (show != "colour" && !of_bounds)
+    throw InputError(fmt::format("--certify: --show {} is not certified; colours are", show));
+  if (of_bounds) refuse(args, {"axes", "box", "colorbar", "caption"}, "is not drawn over bounds");
+  if (args.has("turntable"))
+    throw InputError("--certify: one picture at a time; give each its --azimuth instead of --turntable");
+  if (args.text_or("method", "vdvr") != "vdvr")
+    throw InputError("--certify: the certificate is of --method vdvr");
+  if (o.gradient == GradientKind::stored)
+    throw InputError("--gradient stored: a certified picture takes central or analytic");
+  refuse(args, {"unverified"}, "excludes --certify");
+  if (args.path("output").extension() == ".npy" && !of_bounds)
+    throw InputError("--certify: as .npy there are --show bound, lo, hi and middle");
+}
+
+int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions o,
+                   const Overlay& overlay, const std::filesystem::path& output, const Progress& progress) {
+  const Scene& scene = source.scene();
+  check_file(args, scene);
+  const Certificate& certificate = *scene.certificate;
+  const Outputs out = outputs_of(output);
+  for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
+  const Clip covered = covered_clip(args, scene, progress);
+  Clip clip = covered;
+  if (o.clip) cut(clip, o.clip->low, o.clip->high);
+  o.clip = clip;
+  refine_drawing(args, o);
+  const CertifyPictureOptions options = certify_options(args);
+  report(progress, "draw", 0);
+  RenderResult drawn = source.draw(o);
+  throw_if_stopped();
+  report(progress, "certify", 0);
+  const PixelBounds bounds = source.certify(o, options);
+  throw_if_stopped();
+  const PictureBound bound = bound_of_picture(bounds, drawn.image);
+  CertifiedPicture picture{o,
+                           options,
+                           {covered.radius, {covered.low[2], covered.high[2]}},
+                           certificate.content_sha256,
+                           output.filename().string(),
+                           sha256_of_pixels(drawn.image),
+                           "",
+                           overlay_names(overlay)};
+  const std::string show = args.text_or("show", "colour");
+  if (show == "colour") {
+    draw_overlay(drawn, scene, o, overlay, true, caption_of(bound, bounds, certificate));
+    write_png(out.picture, drawn.image);
+  } else {
+    write_shown(out, show, bounds, bound);
+  }
+  write_png(out.bound, picture_of_bound(bound, bounds));
+  picture.file_sha256 = sha256_of_file(out.picture);
+  const Json json = picture_certificate_json(picture, bounds, bound, certificate);
+  io::write_file(out.certificate, json.dump(2) + "\n");
+  report(progress, "", 1);
+
+  const auto why = explained(args, scene, o, bounds.sampler);
+  std::string pixels;
+  const std::optional<double> tolerance = args.number("picture-tolerance");
+  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
+  Json printed = json;
+  printed["output"] = output.string();
+  printed["seconds"] = {{"draw", drawn.seconds}, {"certify", bounds.seconds}};
+  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
+  if (why) printed["explain"] = explained_json(*why);
+  print_result(common, printed, [&] {
+    fmt::print("{}\n", bound_line(bound, certificate));
+    fmt::print("  {}: {} x {}, light {}; bound in {}, certificate in {}\n", output.string(), o.width,
+               o.height, text_of(bounds.light), out.bound.string(), out.certificate.string());
+    fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
+               drawn.seconds, bounds.seconds, source.device().info().name);
+    if (why)
+      print_explained(
+          *why, scene, o,
+          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
+    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
+  });
+  if (over == 0) return 0;
+  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", output.string(), over,
+                                  *tolerance, pixels));
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,21 @@
+// Which part of a volume is drawn: --clip, --clip-covered, --covered-from. Called by: the render command.
+#pragma once
+
+#include <optional>
+
+#include "apps/vdvr/pictures.hpp"
+#include "vdvr/progress.hpp"
+
+namespace vdvr::cli {
+
+void add_clip(Arguments& args);
+/// Where the scene is covered: the certificate's cylinder, cut with its region of interest. Of files that do
+/// not say, from the scan that --covered-from names. Throws InputError for a scene without certificate, and
+/// for a file that does not say where no scan is named.
+Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& progress);
+/// What the options ask for; nothing where they ask for nothing. Throws as covered_clip.
+std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Progress& progress);
+/// Cuts `clip` to what also lies in `box`.
+void cut(Clip& clip, const Vec3& low, const Vec3& high);
+
+}  // namespace vdvr::cli

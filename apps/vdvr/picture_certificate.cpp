@@ -1,0 +1,213 @@
+#include "apps/vdvr/picture_certificate.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "vdvr/error.hpp"
+#include "vdvr/hash.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+constexpr const char* kFormat = "vdvr picture certificate 1";
+
+Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+double number_or(const Json& j, double none) { return j.is_null() ? none : j.get<double>(); }
+
+Json camera_json(const Camera& c) {
+  return {{"position", c.position},
+          {"focal_point", c.focal_point},
+          {"view_up", c.view_up},
+          {"view_angle_deg", c.view_angle_deg}};
+}
+
+Json transfer_points(const TransferFunction& f) {
+  Json points = Json::array();
+  for (const TransferPoint& p : f.points)
+    points.push_back({{"value", p.value}, {"rgb", p.rgb}, {"opacity", p.opacity}});
+  return {{"name", f.name}, {"points", points}};
+}
+
+Json clip_json(const Clip& c) {
+  Json low = Json::array(), high = Json::array();
+  for (std::size_t a = 0; a < 3; ++a) {
+    low.push_back(number_or_null(c.low[a]));
+    high.push_back(number_or_null(c.high[a]));
+  }
+  return {{"low", low}, {"high", high}, {"radius", number_or_null(c.radius)}};
+}
+
+Clip clip_of(const Json& j) {
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  Clip c;
+  for (std::size_t a = 0; a < 3; ++a) {
+    c.low[a] = number_or(j.at("low").at(a), -endless);
+    c.high[a] = number_or(j.at("high").at(a), endless);
+  }
+  c.radius = number_or(j.at("radius"), endless);
+  return c;
+}
+
+Json light_list(const std::vector<Vec3>& lights) {
+  Json list = Json::array();
+  for (const Vec3& l : lights) list.push_back(Json::array({l[0], l[1], l[2]}));
+  return list;
+}
+
+Json picture_json(const CertifiedPicture& picture) {
+  const RenderOptions& o = picture.options;
+  Json overlays = Json::array();
+  for (const std::string& name : picture.overlays) overlays.push_back(name);
+  return {{"file", picture.file},
+          {"sha256", picture.pixels_sha256},
+          {"file_sha256", picture.file_sha256},
+          {"width", o.width},
+          {"height", o.height},
+          {"mode", "dvr"},
+          {"camera", camera_json(o.camera)},
+          {"transfer", transfer_points(o.transfer)},
+          {"background_top", o.background_top},
+          {"background_bottom", o.background_bottom},
+          {"step", o.step},
+          {"classification", o.classification == Classification::post ? "post" : "preintegrated"},
+          {"step_mode", o.step_mode == StepMode::fixed ? "fixed" : "level"},
+          {"termination", o.termination},
+          {"shading", o.shading},
+          {"gradient", o.gradient == GradientKind::analytic ? "analytic" : "central"},
+          {"head_light", o.head_light},
+          {"lights", light_list(o.lights)},
+          {"clip", clip_json(o.clip.value_or(Clip{}))},
+          {"overlays", overlays}};
+}
+
+void read_picture(const Json& j, CertifiedPicture& picture) {
+  RenderOptions& o = picture.options;
+  picture.file = j.at("file").get<std::string>();
+  picture.pixels_sha256 = j.at("sha256").get<std::string>();
+  picture.file_sha256 = j.at("file_sha256").get<std::string>();
+  picture.overlays = j.at("overlays").get<std::vector<std::string>>();
+  o.width = j.at("width").get<std::int64_t>();
+  o.height = j.at("height").get<std::int64_t>();
+  const Json& c = j.at("camera");
+  o.camera.position = c.at("position").get<Vec3>();
+  o.camera.focal_point = c.at("focal_point").get<Vec3>();
+  o.camera.view_up = c.at("view_up").get<Vec3>();
+  o.camera.view_angle_deg = c.at("view_angle_deg").get<double>();
+  o.transfer.name = j.at("transfer").at("name").get<std::string>();
+  for (const Json& p : j.at("transfer").at("points"))
+    o.transfer.points.push_back({p.at("value").get<double>(), p.at("rgb").get<std::array<double, 3>>(),
+                                 p.at("opacity").get<double>()});
+  o.background_top = j.at("background_top").get<std::array<double, 3>>();
+  o.background_bottom = j.at("background_bottom").get<std::array<double, 3>>();
+  o.step = j.at("step").get<double>();
+  o.classification = j.at("classification").get<std::string>() == "post" ? Classification::post
+                                                                         : Classification::preintegrated;
+  o.step_mode = j.at("step_mode").get<std::string>() == "fixed" ? StepMode::fixed : StepMode::level;
+  o.termination = j.at("termination").get<double>();
+  o.shading = j.at("shading").get<bool>();
+  o.gradient =
+      j.at("gradient").get<std::string>() == "analytic" ? GradientKind::analytic : GradientKind::central;
+  o.head_light = j.at("head_light").get<bool>();
+  o.lights = j.at("lights").get<std::vector<Vec3>>();
+  o.clip = clip_of(j.at("clip"));
+}
+
+}  // namespace
+
+std::string sha256_of_pixels(const Image& image) {
+  Sha256 hash;
+  hash.update(image.rgb.data(), image.rgb.size());
+  return hash.hex();
+}
+
+std::string statement_of(const PixelBounds& bounds) {
+  return fmt::format(
+      "In every pixel and channel the ideal picture, continuous emission and absorption over F inside the "
+      "covered region{}, differs from the drawn one by at most the bound of that pixel.",
+      bounds.light == CertifiedLight::unlit ? ", without light"
+                                            : ", under the light that V was drawn with, step by step");
+}
+
+Json bound_json(const PictureBound& b) {
+  Json within = Json::object();
+  for (const auto& [levels, share] : b.within) within[std::to_string(levels)] = share;
+  return {
+      {"levels", {{"mean", b.mean}, {"p99", b.p99}, {"max", b.max}, {"half_width_mean", b.half_width_mean}}},
+      {"worst_pixel", b.worst},
+      {"within", within},
+      {"pixels",
+       {{"certified", b.pixels - b.untested},
+        {"certainly_background", b.background},
+        {"untested", b.untested}}}};
+}
+
+Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,
+                              const PictureBound& bound, const Certificate& certificate) {
+  Json json = {{"format", kFormat},
+               {"statement", statement_of(bounds)},
+               {"light", text_of(bounds.light)},
+               {"volume",
+                {{"content_sha256", picture.content_sha256},
+                 {"epsilon", certificate.epsilon},
+                 {"epsilon_abs", certificate.epsilon_abs}}},
+               {"picture", picture_json(picture)},
+               {"covered",
+                {{"radius", picture.covered.radius},
+                 {"z", Json::array({picture.covered.z.first, picture.covered.z.second})}}},
+               {"ray_offset_pixels", bounds.ray_offset_pixels},
+               {"sampler", bounds.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
+               {"parts", bound.parts_mean},
+               {"kappa", picture.certify.kappa},
+               {"theta", picture.certify.theta},
+               {"fast", picture.certify.fast}};
+  json.update(bound_json(bound));
+  return json;
+}
+
+CertifiedPicture read_picture_certificate(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw FileError(fmt::format("{}: cannot be read", path.string()));
+  std::ostringstream text;
+  text << in.rdbuf();
+  try {
+    const Json j = Json::parse(text.str());
+    if (j.at("format").get<std::string>() != kFormat)
+      throw FileError(
+          fmt::format("{}: is no certificate of a picture that this program reads: its format is "
+                      "'{}', not '{}'",
+                      path.string(), j.at("format").get<std::string>(), kFormat));
+    CertifiedPicture picture;
+    read_picture(j.at("picture"), picture);
+    picture.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
+    picture.certify.kappa = j.at("kappa").get<double>();
+    picture.certify.theta = j.at("theta").get<double>();
+    picture.certify.fast = j.at("fast").get<bool>();
+    picture.stored_mean = j.at("levels").at("mean").get<double>();
+    picture.stored_max = j.at("levels").at("max").get<double>();
+    picture.covered.radius = j.at("covered").at("radius").get<double>();
+    const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
+    picture.covered.z = {z[0], z[1]};
+    picture.options.sampler =
+        j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
+    return picture;
+  } catch (const Json::exception& e) {
+    throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));
+  }
+}
+
+std::string bound_line(const PictureBound& b, const Certificate& certificate) {
+  std::string line = fmt::format(
+      "certain: {:.0f} % of the pixels to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst {:.1f}",
+      100 * b.within[2].second, 100 * b.within[3].second, b.mean, b.max);
+  // The bound is linear in epsilon (docs/pixel-bounds.md).
+  if (b.mean > 1)
+    line += fmt::format("; certain to 1 level in the mean near epsilon {:.2g}", certificate.epsilon / b.mean);
+  if (b.untested > 0) line += fmt::format("; {} pixels see bricks that were not tested", b.untested);
+  return line;
+}
+
+}  // namespace vdvr::cli

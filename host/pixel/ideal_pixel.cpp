@@ -1,0 +1,50 @@
+// A pixel of the ideal picture from F itself, in double precision. Called by the verify command.
+#include <algorithm>
+#include <cmath>
+
+#include "host/pixel/pixel_ray.hpp"
+#include "vdvr/certify_picture.hpp"
+
+namespace vdvr {
+namespace {
+
+/// Back to front over values in the middles of steps of `length` base cells.
+std::array<double, 3> seen(const std::vector<double>& values, std::size_t stride, double length,
+                           const RenderOptions& o, std::int64_t y) {
+  std::array<double, 3> colour = background_of_pixel(o, y);
+  for (std::size_t i = values.size(); i-- > 0;) {
+    if (i % stride != stride / 2) continue;
+    const TransferPoint p = transfer_at(o.transfer.points, values[i]);
+    const double passes = std::pow(1 - p.opacity, length * static_cast<double>(stride));
+    for (std::size_t c = 0; c < 3; ++c) colour[c] = p.rgb[c] + (colour[c] - p.rgb[c]) * passes;
+  }
+  return colour;
+}
+
+}  // namespace
+
+IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                       const RenderOptions& o, const Grid& g, std::int64_t x, std::int64_t y, double step) {
+  const PixelRay s = pixel_ray(o, g, x, y);
+  const double unit = *std::min_element(g.spacing.begin(), g.spacing.end());
+  IdealPixel pixel;
+  std::vector<Vec3> points;
+  double h = 0;
+  if (s.first < s.last) {
+    // Thrice an odd number would do as well: every third middle is a middle of steps three times as long.
+    const auto count = 3 * static_cast<std::size_t>(std::ceil((s.last - s.first) / (3 * step * unit)));
+    h = (s.last - s.first) / static_cast<double>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      points.push_back(s.at(s.first + (static_cast<double>(i) + 0.5) * h));
+    }
+  }
+  const std::vector<double> values = points.empty() ? std::vector<double>{} : field(points);
+  pixel.rgb = seen(values, 1, h / unit, o, y);
+  pixel.points = points.size();
+  const auto coarse = seen(values, 3, h / unit, o, y);
+  for (std::size_t c = 0; c < 3; ++c)
+    pixel.quadrature = std::max(pixel.quadrature, std::abs(coarse[c] - pixel.rgb[c]));
+  return pixel;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,83 @@
+// What a picture of a certified volume is worth: for every pixel an interval that holds the colour of the
+// ideal picture, the continuous emission and absorption over F (docs/pixel-bounds.md).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vdvr/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/export.hpp"
+#include "vdvr/image.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/raycast.hpp"
+#include "vdvr/resident_volume.hpp"
+
+namespace vdvr {
+
+struct CertifyPictureOptions {
+  /// Pieces of a ray are cut until the field spreads by at most 2 kappa e on each part: smaller is narrower
+  /// and slower.
+  double kappa = 0.5;
+  /// A ray ends where at most this share of what lies behind can be seen.
+  double theta = 0x1p-10;
+  /// One pass over the ray and nothing kept: for intervals 1.4 to 3 times as wide, while one turns a view.
+  bool fast = false;
+};
+
+/// What of the light is certified. as_drawn: colour and opacity of F under the light that V was drawn with, a
+/// function on the ray that the drawn step fixes.
+enum class CertifiedLight { unlit, as_drawn };
+/// "unlit", "as drawn".
+VDVR_API const char* text_of(CertifiedLight light);
+
+/// [y][x] an interval a channel, display values.
+struct PixelBounds {
+  FloatImage lo, hi;                   ///< three channels
+  std::vector<std::uint32_t> parts;    ///< of each ray; 0: nothing in front of the background
+  std::vector<std::uint8_t> untested;  ///< 1: a brick without bound was seen
+  CertifiedLight light = CertifiedLight::unlit;
+  SamplerKind sampler = SamplerKind::buffer;
+  double ray_offset_pixels = 0;  ///< how far a ray passes from the middle of its pixel, at most
+  double seconds = 0;
+};
+
+/// Intervals of the picture that `options` draw: mode dvr, output colour. `bounds` are those of the sampler
+/// that Renderer::sampler() names (certificate.hpp, brick_bounds): |V - F| at every point that is drawn, so
+/// `options.clip` must lie in the covered region. With shading the light is as drawn, of gradients `central`
+/// or `analytic`. Throws InputError for other modes, gradients, counts of bounds, and what render() refuses.
+VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume,
+                                    const std::vector<float>& bounds, const RenderOptions& options,
+                                    const CertifyPictureOptions& certify = {});
+
+/// How far what was drawn can lie from the ideal picture, in levels of 255.
+struct PictureBound {
+  FloatImage levels;  ///< one channel: of the worst channel of each pixel; infinite where nothing is known
+  double mean = 0, p99 = 0, max = 0, half_width_mean = 0;
+  std::array<std::int64_t, 2> worst{0, 0};                                                  ///< pixel x, y
+  std::array<std::pair<int, double>, 5> within{{{1, 0}, {2, 0}, {4, 0}, {8, 0}, {16, 0}}};  ///< shares
+  std::int64_t pixels = 0, background = 0, untested = 0;
+  double parts_mean = 0;
+};
+VDVR_API PictureBound bound_of_picture(const PixelBounds& bounds, const Image& drawn);
+/// Bounds from dark, 0, to light, the largest; untested pixels grey; a scale at the right, a line below.
+VDVR_API Image picture_of_bound(const PictureBound& bound, const PixelBounds& bounds);
+/// Share of pixels whose ideal bytes all lie within `levels` of the drawn ones.
+VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, double levels);
+
+/// A pixel of the ideal picture, without light, by the field's values in the middles of steps of a ray.
+struct IdealPixel {
+  std::array<double, 3> rgb{0, 0, 0};
+  double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
+  std::size_t points = 0;
+};
+/// `field` gives values at world points, as ExactField::at. `step` in base cells.
+VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                                const RenderOptions& options, const Grid& grid, std::int64_t x,
+                                std::int64_t y, double step);
+
+}  // namespace vdvr

@@ -1,0 +1,327 @@
+// A ray in pieces, each within one cell of one brick: what the field can be on it, and what the transfer
+// function then shows (docs/pixel-bounds.md). Included by kernels of kernels/pixel, after raycast_dvr.h.
+//
+// VDVR_LIGHT: pieces also end where the drawn steps do, and each has the light that its step was drawn with.
+#ifndef VDVR_CERTIFY_RAY_H
+#define VDVR_CERTIFY_RAY_H
+#include "device/ray_cells.h"
+
+#ifndef VDVR_LIGHT
+#define VDVR_LIGHT 0
+#endif
+
+// The field on a piece is the cubic of Bernstein coefficients b0 to b3, and F lies within e of it.
+typedef struct {
+  V b0, b1, b2, b3;
+  V length, e;
+  V lit, highlight;  // a colour c is seen as c * lit + highlight
+} Piece;
+
+// Where rays are: the next piece begins at t, in the cell at c.
+typedef struct {
+  OpenBrick brick;
+  V3 c;
+  V t, bound;  // of the brick's field
+  I away, active;
+#if VDVR_LIGHT
+  I step, lit_step;  // that t lies in, and that the light was found for
+  V lit, highlight;
+#endif
+} Walk;
+
+#define RANGES __global const float4 *restrict ranges, __global const int *restrict next_shown
+#define THE_RANGES ranges, next_shown
+
+RAY_INLINE I bin_of(const VdvrCertify* q, V value, float outward) {
+  V x = (value - q->range_lo) * q->range_scale + outward;
+  x = MOST(x, (V)(0.0f));
+  x = LEAST(x, (V)((float)(q->bins - 1)));
+  return TO_I(x);
+}
+// Whether no value of [from, to] shows anything.
+RAY_INLINE I is_clear(RANGES, const VdvrCertify* q, V from, V to) {
+  const I first = bin_of(q, from, -VDVR_BIN_MARGIN), last = bin_of(q, to, VDVR_BIN_MARGIN);
+  return GATHER(I, next_shown, first) > last;
+}
+
+// The two rows of the table, of runs of 2^k bins, that hold all bins of [from, to].
+typedef struct {
+  I first, second;
+} Rows;
+RAY_INLINE Rows rows_of(const VdvrCertify* q, V from, V to) {
+  const I first = bin_of(q, from, -VDVR_BIN_MARGIN), last = bin_of(q, to, VDVR_BIN_MARGIN);
+  const I k = 31 - AS_I(clz(AS_U(last - first + 1)));
+  const Rows r = {k * q->bins + first, k * q->bins + last - ((I)(1) << k) + 1};
+  return r;
+}
+// The least extinction of [from, to], in halvings a length.
+RAY_INLINE V least_extinction(RANGES, const VdvrCertify* q, V from, V to) {
+  const Rows r = rows_of(q, from, to);
+  __global const float* negative = (__global const float*)ranges + 1;
+  const V a = GATHER(V, negative, 8 * r.first), b = GATHER(V, negative, 8 * r.second);
+  return -MOST(a, b);
+}
+// Extinctions and visible colours over [from, to]. Of colours the negative of the least, as the table has
+// them.
+typedef struct {
+  V t1, minus_t0;
+  V3 c1, minus_c0;
+} Shown;
+RAY_INLINE Shown shown_between(RANGES, const VdvrCertify* q, V from, V to) {
+  const Rows r = rows_of(q, from, to);
+#define FIRST_LOW(n) ranges[2 * LANE(r.first, n)]
+#define FIRST_HIGH(n) ranges[2 * LANE(r.first, n) + 1]
+#define SECOND_LOW(n) ranges[2 * LANE(r.second, n)]
+#define SECOND_HIGH(n) ranges[2 * LANE(r.second, n) + 1]
+  const V4 al = TURN(FIRST_LOW), ah = TURN(FIRST_HIGH), bl = TURN(SECOND_LOW), bh = TURN(SECOND_HIGH);
+#undef FIRST_LOW
+#undef FIRST_HIGH
+#undef SECOND_LOW
+#undef SECOND_HIGH
+  Shown s;
+  s.t1 = MOST(al.x, bl.x);
+  s.minus_t0 = MOST(al.y, bl.y);
+  s.c1 = v3(MOST(al.z, bl.z), MOST(al.w, bl.w), MOST(ah.x, bh.x));
+  s.minus_c0 = v3(MOST(ah.y, bh.y), MOST(ah.z, bh.z), MOST(ah.w, bh.w));
+  return s;
+}
+
+RAY_INLINE Walk start_walk(const VdvrRaycast* p, const Ray* ray, I px, I py) {
+  Walk w;
+  w.brick = no_brick();
+  w.c = ray->entry;
+  w.t = w.bound = (V)(0.0f);
+  w.away = (I)(0);
+  w.active = ends_of(p, ray, px, py, (V)(1.0f)) > 0;
+#if VDVR_LIGHT
+  w.step = (I)(0);
+  w.lit_step = (I)(-1);
+  w.lit = (V)(1.0f);
+  w.highlight = (V)(0.0f);
+#endif
+  return w;
+}
+
+#if VDVR_LIGHT
+// The light of the steps that lanes `needed` are in: what is drawn with, from the field at the step's middle.
+RAY_INLINE void light_steps(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, const Ray* ray, Walk* w,
+                            I needed) {
+  needed &= w->step != w->lit_step;
+  if (!ANY(needed)) return;
+  const float3 cells_per_length =
+      (float3)(p->cells_per_length_x, p->cells_per_length_y, p->cells_per_length_z);
+  const V3 c = position_at(ray, grid, middle_of_step(ray, TO_V(w->step) * p->step, (V)(p->step)));
+  const OpenBrick around = open_brick(bricks, grid, brick_at(grid, c));
+  const Sampled sampled = sample_open(THE_FIELD, &around, grid, c);
+  const V3 g = gradient_at(THE_FIELD, bricks, grid, &around, &sampled, c, cells_per_length, needed);
+  const V none = (V)(0.0f), one = (V)(1.0f);
+  const V highlight = shade(p, v3(none, none, none), g, ray->world, p->gradient_full).x;
+  const V white = shade(p, v3(one, one, one), g, ray->world, p->gradient_full).x;
+  w->lit = PICK(needed, white - highlight, w->lit);
+  w->highlight = PICK(needed, highlight, w->highlight);
+  w->lit_step = PICK(needed, w->step, w->lit_step);
+}
+// The step that t lies in, by the products that steps begin at.
+RAY_INLINE I step_at(const VdvrRaycast* p, V t) {
+  I k = TO_I(t * p->inverse_step);
+  k += PICK(t >= TO_V(k + 1) * p->step, (I)(1), (I)(0));
+  return k - PICK(t < TO_V(k) * p->step, (I)(1), (I)(0));
+}
+#endif
+
+// Passes one cell, or all bricks that are clear. Returns the lanes that have a piece there which may show
+// something.
+RAY_INLINE I next_piece(FIELD, BRICKS, VdvrGrid grid, __global const uchar* restrict distance,
+                        __global const float* restrict bounds, RANGES, const VdvrRaycast* p,
+                        const VdvrCertify* q, const Ray* ray, Walk* w, Piece* piece) {
+  if (ANY(w->active & NOT(is_inside(&w->brick, w->c)))) {
+    const I3 at = brick_at(grid, w->c);
+    w->brick = open_brick(bricks, grid, at);
+    w->away = TO_I(GATHER(U8, distance, brick_index(grid, at)));
+    w->bound = GATHER(V, bounds, brick_index(grid, at));
+  }
+  Box box = {w->c, w->c, w->c};
+  const I leap = w->active & (w->away > 0), here = w->active & (w->away == 0);
+  V3 low = w->c, scale = w->c;
+  Octet corners;
+  I shows = here;
+  if (ANY(here)) {
+#ifdef VDVR_SAMPLER_IMAGE3D
+    Sampled sampled;
+    sampled.value = 0.0f;
+#else
+    const Sampled sampled = sample_open(THE_FIELD, &w->brick, grid, w->c);
+    const Octet o = {sampled.s000, sampled.s001, sampled.s010, sampled.s011,
+                     sampled.s100, sampled.s101, sampled.s110, sampled.s111};
+    corners = o;
+#endif
+    const CellBox cell = cell_box(grid, &w->brick, &sampled, w->c);
+    low = cell.low;
+    scale = cell.scale;
+    box = box_between(ray, low, v3(low.x + 1.0f / scale.x, low.y + 1.0f / scale.y, low.z + 1.0f / scale.z));
+  }
+  if (ANY(leap)) {
+    const Box around = box_around(ray, w->brick.at, w->away);
+    box.low = pick3(leap, around.low, box.low);
+    box.high = pick3(leap, around.high, box.high);
+    box.far = pick3(leap, around.far, box.far);
+  }
+  const V in = w->t, far = leaves_box(&box), cut = LEAST(far, ray->length);
+  V out = MOST(cut, in);
+#if VDVR_LIGHT
+  const V step_end = TO_V(w->step + 1) * p->step;
+  const I ends_step = here & (step_end < out);
+  out = PICK(ends_step, step_end, out);
+#else
+  const I ends_step = (I)(0);
+#endif
+  shows &= out > in;
+  V e = w->bound;
+#ifndef VDVR_SAMPLER_IMAGE3D
+  if (ANY(shows)) {
+    V least, most;
+    octet_range(&corners, &least, &most);
+    // What a position's rounding does to the field is its slope in the cell.
+    e += q->slack + (most - least) * (q->reach[0] * scale.x + q->reach[1] * scale.y + q->reach[2] * scale.z);
+    shows &= NOT(is_clear(THE_RANGES, q, least - e, most + e));
+  }
+#endif
+  if (ANY(shows)) {
+    const V3 a = position_at(ray, grid, in), b = position_at(ray, grid, out);
+    const Octet f = octet_of_piece(THE_FIELD, &w->brick, grid, corners, low, scale, a, b);
+#ifdef VDVR_SAMPLER_IMAGE3D
+    V least, most;
+    octet_range(&f, &least, &most);
+    // The box of the piece may be as thin as its position is uncertain: the cell's own faces tell the slope.
+    const Octet whole =
+        octet_between(THE_FIELD, &w->brick, grid, low,
+                      v3(low.x + 1.0f / scale.x, low.y + 1.0f / scale.y, low.z + 1.0f / scale.z));
+    octet_range(&whole, &least, &most);
+    e += q->slack + (most - least) * (q->reach[0] * scale.x + q->reach[1] * scale.y + q->reach[2] * scale.z);
+#endif
+    piece->b0 = f.f000;
+    piece->b1 = (f.f100 + f.f010 + f.f001) * (1.0f / 3.0f);
+    piece->b2 = (f.f110 + f.f101 + f.f011) * (1.0f / 3.0f);
+    piece->b3 = f.f111;
+    piece->length = PICK(shows, out - in, (V)(0.0f));
+    piece->e = e;
+#if VDVR_LIGHT
+    light_steps(THE_FIELD, bricks, grid, p, ray, w, shows);
+    piece->lit = w->lit;
+    piece->highlight = w->highlight;
+#endif
+  }
+  w->t = PICK(w->active, out, w->t);
+  V3 behind = w->c;
+  const I onward = pass_box(ray, grid, &box, &behind);
+  w->c = pick3(ends_step, w->c, behind);
+  w->active &= ends_step | onward;
+#if VDVR_LIGHT
+  w->step = PICK(ends_step, w->step + 1, step_at(p, w->t));
+#endif
+  return shows;
+}
+
+// The least and the largest coefficient of a piece.
+RAY_INLINE V least_of(const Piece* s) {
+  const V a = LEAST(s->b0, s->b1), b = LEAST(s->b2, s->b3);
+  return LEAST(a, b);
+}
+RAY_INLINE V most_of(const Piece* s) {
+  const V a = MOST(s->b0, s->b1), b = MOST(s->b2, s->b3);
+  return MOST(a, b);
+}
+
+// Into how many parts a piece is cut, so that the coefficients of each spread by 2 kappa e at most.
+RAY_INLINE I parts_of(const VdvrCertify* q, const Piece* s) {
+  const V a = fabs(s->b1 - s->b0), b = fabs(s->b2 - s->b1), c = fabs(s->b3 - s->b2), ab = MOST(a, b),
+          most = MOST(ab, c), e = MOST(s->e, (V)(1e-30f));
+  V n = ceil(q->parts_per_spread * most / e);
+  n = LEAST(n, (V)((float)VDVR_MOST_PARTS));
+  n = MOST(n, (V)(1.0f));
+  return PICK(s->length > 0.0f, TO_I(n), (I)(0));
+}
+
+RAY_INLINE V mixed(V a, V b, V s) { return (1.0f - s) * a + s * b; }
+// Cuts a piece in two at s of its length: [0, s] and [s, 1]. Both are halves of one de Casteljau scheme.
+RAY_INLINE void cut_piece(Piece* piece, float s, Piece* first, Piece* second) {
+  const V b0 = piece->b0, b1 = piece->b1, b2 = piece->b2, b3 = piece->b3, at = (V)(s);
+  const V b01 = mixed(b0, b1, at), b12 = mixed(b1, b2, at), b23 = mixed(b2, b3, at);
+  const V b012 = mixed(b01, b12, at), b123 = mixed(b12, b23, at), middle = mixed(b012, b123, at);
+  first->b0 = b0;
+  first->b1 = b01;
+  first->b2 = b012;
+  first->b3 = middle;
+  second->b0 = middle;
+  second->b1 = b123;
+  second->b2 = b23;
+  second->b3 = b3;
+}
+RAY_INLINE void pick_coefficients(I m, const Piece* from, Piece* to) {
+  to->b0 = PICK(m, from->b0, to->b0);
+  to->b1 = PICK(m, from->b1, to->b1);
+  to->b2 = PICK(m, from->b2, to->b2);
+  to->b3 = PICK(m, from->b3, to->b3);
+}
+
+// One part's colours as they are seen, and what passes it: at its largest and its least extinction.
+typedef struct {
+  V3 c1, c0;
+  V dense, thin;
+  I shows;
+} Part;
+RAY_INLINE Part part_of(RANGES, const VdvrCertify* q, const Piece* coefficients, const Piece* whole, V length,
+                        I active) {
+  const Shown s =
+      shown_between(THE_RANGES, q, least_of(coefficients) - whole->e, most_of(coefficients) + whole->e);
+  Part part;
+  part.shows = active & (s.t1 > 0.0f);
+  part.c1 = s.c1;
+  part.c0 = v3(-s.minus_c0.x, -s.minus_c0.y, -s.minus_c0.z);
+#if VDVR_LIGHT
+  const V l = whole->lit, h = whole->highlight;
+  part.c1 = v3(part.c1.x * l + h, part.c1.y * l + h, part.c1.z * l + h);
+  part.c0 = v3(part.c0.x * l + h, part.c0.y * l + h, part.c0.z * l + h);
+#endif
+  part.dense = exp2(-length * s.t1);
+  part.thin = exp2(length * s.minus_t0);
+  return part;
+}
+// The box step (docs/pixel-bounds.md, theorem 3), of one channel, above and below the colour behind.
+RAY_INLINE V step_above(V c1, V behind, const Part* part) {
+  return c1 + (behind - c1) * PICK(c1 > behind, part->dense, part->thin);
+}
+RAY_INLINE V step_below(V c0, V behind, const Part* part) {
+  return c0 + (behind - c0) * PICK(c0 < behind, part->dense, part->thin);
+}
+RAY_INLINE V3 above3(const Part* part, V3 u) {
+  return pick3(part->shows,
+               v3(step_above(part->c1.x, u.x, part), step_above(part->c1.y, u.y, part),
+                  step_above(part->c1.z, u.z, part)),
+               u);
+}
+RAY_INLINE V3 below3(const Part* part, V3 d) {
+  return pick3(part->shows,
+               v3(step_below(part->c0.x, d.x, part), step_below(part->c0.y, d.y, part),
+                  step_below(part->c0.z, d.z, part)),
+               d);
+}
+
+RAY_INLINE V3 least3(V3 a, V3 b) { return v3(LEAST(a.x, b.x), LEAST(a.y, b.y), LEAST(a.z, b.z)); }
+RAY_INLINE V3 most3(V3 a, V3 b) { return v3(MOST(a.x, b.x), MOST(a.y, b.y), MOST(a.z, b.z)); }
+
+// Every lane's interval of a pixel, in the rows of this launch. [y][x] r, g, b and the parts it took; r, g, b
+// and flags.
+RAY_INLINE void put_interval(const VdvrRaycast* p, const VdvrCertify* q, __global float4* restrict least,
+                             __global float4* restrict most, I px, I py, V3 lo, V3 hi, I parts, I flags) {
+#define PUT(n)                                                                                     \
+  if (LANE(px, n) < p->width && LANE(py, n) < p->height && LANE(py, n) < q->first_row + q->rows) { \
+    const ulong i = (ulong)LANE(py, n) * (ulong)p->width + (ulong)LANE(px, n);                     \
+    least[i] = (float4)(LANE(lo.x, n), LANE(lo.y, n), LANE(lo.z, n), (float)LANE(parts, n));       \
+    most[i] = (float4)(LANE(hi.x, n), LANE(hi.y, n), LANE(hi.z, n), (float)LANE(flags, n));        \
+  }
+  EACH(PUT)
+#undef PUT
+}
+
+#endif

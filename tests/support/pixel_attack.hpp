@@ -1,0 +1,125 @@
+// An attack on intervals of pixels: fields f along each ray that keep the brick's bounds, random, at either
+// end and chosen against each channel, whose pictures must lie in the intervals.
+#pragma once
+
+#include <random>
+
+#include "tests/reference/ideal_picture.hpp"
+#include "tests/support/mixed_volumes.hpp"
+#include "vdvr/certify_picture.hpp"
+
+namespace vdvr::support {
+
+/// Steps of a ray within one cell of the base, and what f may be on them.
+struct AttackStep {
+  double length = 0;  ///< base cells
+  double lo = 0, hi = 0;
+};
+
+/// A step's f is constant and the field moves on it: what f may be is so much narrower, and then holds at
+/// every point of the step. `bounds` infinite: anything from -1 to 2.
+inline std::vector<AttackStep> steps_of(const MixedVolume& v, const std::vector<float>& bounds,
+                                        const RenderOptions& o, std::int64_t px, std::int64_t py,
+                                        int steps_a_cell) {
+  const reference::IdealRay ray = reference::ideal_ray(o, v.grid, px, py);
+  std::vector<AttackStep> steps;
+  if (!(ray.first < ray.last)) return steps;
+  std::vector<double> cuts{ray.first, ray.last};
+  for (std::size_t a = 0; a < 3; ++a)
+    for (std::int64_t i = 0; i <= v.grid.cells[a]; ++i) {
+      const double t =
+          (v.grid.origin[a] + static_cast<double>(i) * v.grid.spacing[a] - ray.from[a]) / ray.direction[a];
+      if (t > ray.first && t < ray.last) cuts.push_back(t);
+    }
+  std::sort(cuts.begin(), cuts.end());
+  const double unit = *std::min_element(v.grid.spacing.begin(), v.grid.spacing.end());
+  const Index3 n = v.bricks();
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const int parts = std::max(1, static_cast<int>(std::ceil((cuts[i + 1] - cuts[i]) / unit * steps_a_cell)));
+    const double h = (cuts[i + 1] - cuts[i]) / parts;
+    for (int k = 0; k < parts; ++k) {
+      const double from = cuts[i] + k * h;
+      const Vec3 middle = ray.at(from + h / 2);
+      const Index3 b = brick_at(v, middle);
+      const double e =
+          static_cast<double>(bounds[static_cast<std::size_t>((b[2] * n[1] + b[1]) * n[0] + b[0])]);
+      // Just inside the ends, which may be faces where the field jumps.
+      const double at = static_cast<double>(sample_at(v, middle)),
+                   first = static_cast<double>(sample_at(v, ray.at(from + h / 64))),
+                   last = static_cast<double>(sample_at(v, ray.at(from + h - h / 64)));
+      const double moves = 1.25 * std::max(std::abs(first - at), std::abs(last - at)) + 1e-5,
+                   room = std::max(0.0, e - moves);
+      AttackStep s{h / unit, at - room, at + room};
+      if (!std::isfinite(e)) s = {h / unit, -1, 2};
+      if (room > 0) steps.push_back(s);
+      else steps.push_back({h / unit, at, at});
+    }
+  }
+  return steps;
+}
+
+/// Whether V itself moves by more than a brick's bound on a step, which a constant f then cannot follow.
+inline bool follows(const std::vector<AttackStep>& steps) {
+  return std::all_of(steps.begin(), steps.end(), [](const AttackStep& s) { return s.hi > s.lo; });
+}
+
+/// Back to front, each step with the value that `choose(step, behind)` names.
+template <class Choose>
+reference::Rgb3 picture_of(const std::vector<AttackStep>& steps, const reference::Rgb3& background,
+                           Choose&& choose) {
+  reference::Rgb3 colour = background;
+  for (std::size_t i = steps.size(); i-- > 0;)
+    colour = reference::through(choose(steps[i], colour), steps[i].length, colour);
+  return colour;
+}
+
+/// Points of the transfer function that a step's values may take: its ends, its middle, and control points.
+inline std::vector<TransferPoint> choices(const std::vector<TransferPoint>& points, const AttackStep& s) {
+  std::vector<TransferPoint> all;
+  for (const double f : {0.0, 0.25, 0.5, 0.75, 1.0})
+    all.push_back(reference::shown_at(points, s.lo + f * (s.hi - s.lo)));
+  for (const TransferPoint& p : points)
+    if (p.value >= s.lo && p.value <= s.hi) all.push_back(p);
+  return all;
+}
+
+/// Against channel c: what is shown is the most (`up`) or the least that a step allows.
+inline reference::Rgb3 adversary(const std::vector<AttackStep>& steps,
+                                 const std::vector<TransferPoint>& points, const reference::Rgb3& background,
+                                 std::size_t c, bool up) {
+  return picture_of(steps, background, [&](const AttackStep& s, const reference::Rgb3& behind) {
+    TransferPoint best;
+    double most = -1e300;
+    for (const TransferPoint& p : choices(points, s)) {
+      const double gain = (p.rgb[c] - behind[c]) * -std::expm1(-reference::extinction(p.opacity) * s.length);
+      if ((up ? gain : -gain) > most) {
+        most = up ? gain : -gain;
+        best = p;
+      }
+    }
+    return best;
+  });
+}
+
+/// Soft to jumping, with points of no opacity and nearly all of it.
+inline TransferFunction random_transfer(std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  TransferFunction f{"random", {}};
+  const int count = 2 + static_cast<int>(random() % 6);
+  for (int i = 0; i < count; ++i) {
+    const double value = -0.1 + 1.2 * unit(random), kind = unit(random);
+    const double opacity = kind < 0.35   ? 0
+                           : kind < 0.8  ? 0.6 * unit(random) * unit(random)
+                           : kind < 0.95 ? unit(random)
+                                         : 0.9999;
+    f.points.push_back({value, {unit(random), unit(random), unit(random)}, opacity});
+    if (unit(random) < 0.3)  // a jump
+      f.points.push_back(
+          {value, {unit(random), unit(random), unit(random)}, unit(random) < 0.5 ? 0 : unit(random)});
+  }
+  std::stable_sort(f.points.begin(), f.points.end(),
+                   [](const auto& a, const auto& b) { return a.value < b.value; });
+  return f;
+}
+
+}  // namespace vdvr::support
