@@ -91,18 +91,19 @@ struct LiveRenderer::Impl {
   }
   [[nodiscard]] bool image3d() const { return renderer.sampler(scene.sampler) == SamplerKind::image3d; }
 
-  ErrorSlice bounds_of_slice(const LiveView& v, std::int64_t width, std::int64_t height) const {
-    return bound_slice(*volume, **certificate, image3d(), {v.slice_axis, v.slice_position, width, height});
+  ErrorSlice bounds_of_slice(const LiveView& v, std::int64_t width, std::int64_t height, bool framed) const {
+    return bound_slice(*volume, **certificate, image3d(),
+                       {v.slice_axis, v.slice_position, width, height, framed});
   }
 
-  /// Mode error is the picture with its caption, as `render --mode error` draws it.
+  /// Mode error is the picture with its frame, as `render --mode error` draws it.
   Image picture(const LiveView& v, std::int64_t width, std::int64_t height) {
-    if (v.mode == RenderMode::error) return bounds_of_slice(v, width, height).image;
+    if (v.mode == RenderMode::error) return bounds_of_slice(v, width, height, true).image;
     RenderOptions o = options_of(v, scene, width, height);
     Image image = renderer.render(o).image;
     if (!v.bound) return image;
     if (is_flat(v)) {
-      const ErrorSlice bounds = bounds_of_slice(v, width, height + kErrorCaption);
+      const ErrorSlice bounds = bounds_of_slice(v, width, height, false);
       mix(image, bounds.image, bounds.errors);
       return image;
     }

@@ -1,5 +1,5 @@
 // The sheet of `vdvr center`: scans of one row with other centres, reconstructed and drawn. Called by
-// programs; calls reconstruct and bitmap_font.cpp.
+// programs; calls reconstruct.
 #include "vdvr/center_sheet.hpp"
 
 #include <fmt/format.h>
@@ -9,7 +9,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/picture/bitmap_font.hpp"
+#include "host/picture/canvas.hpp"
+#include "host/picture/text.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 
@@ -17,7 +18,6 @@ namespace vdvr {
 namespace {
 
 using std::numbers::pi;
-using Colour = std::array<std::uint8_t, 3>;
 
 // --- scans of one row ---
 
@@ -126,16 +126,12 @@ ProjectionSet with_center(const ProjectionSet& row, double center) {
 
 constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kGrid{215, 215, 215}, kMark{215, 80, 20},
     kCurve{0, 90, 180};
-constexpr std::int64_t kAcross = 5, kEdge = 14, kGap = 8, kLine = kFontHeight * 2 + 10, kChart = 260;
-
-void fill(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c) {
-  for (std::int64_t j = std::max<std::int64_t>(0, y); j < std::min(image.height, y + h); ++j)
-    for (std::int64_t i = std::max<std::int64_t>(0, x); i < std::min(image.width, x + w); ++i)
-      std::copy(c.begin(), c.end(), image.rgb.begin() + (j * image.width + i) * 3);
-}
+constexpr std::int64_t kAcross = 5, kEdge = 14, kGap = 8, kLine = 24, kChart = 260;
+constexpr double kText = 16;
 
 void centred_text(Image& image, std::int64_t x, std::int64_t y, const std::string& text, const Colour& c) {
-  draw_text(image, x - static_cast<std::int64_t>(text.size()) * kFontAdvance, y, text, 2, c);
+  draw_text(image, static_cast<double>(x) - text_width(text, kText) / 2, static_cast<double>(y), text, kText,
+            c);
 }
 
 struct Slices {
@@ -161,7 +157,7 @@ std::string merit_text(const CenterSheet& sheet) {
 
 void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& options, const CenterSheet& sheet) {
   const std::int64_t x0 = kEdge + 10, x1 = image.width - kEdge - 10, y0 = top + kLine, y1 = y0 + kChart;
-  draw_text(image, kEdge, top, merit_text(sheet), 2, kInk);
+  draw_text(image, kEdge, static_cast<double>(top), merit_text(sheet), kText, kInk);
   const auto [low, high] = std::minmax_element(sheet.merit.begin(), sheet.merit.end());
   const double first = options.centers.front(), span = options.centers.back() - first;
   const auto place = [&](std::size_t i) {
@@ -188,10 +184,10 @@ void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& option
 Image draw(const CenterSheetOptions& options, const Slices& slices, const CenterSheet& sheet) {
   const auto count = static_cast<std::int64_t>(slices.values.size()), across = std::min(kAcross, count),
              down = (count + across - 1) / across, tile = slices.pixels() + kGap;
-  Image image{
-      2 * kEdge + across * tile, kEdge + kLine + down * (tile + kLine) + 2 * kLine + kChart + kEdge, {}};
-  image.rgb.assign(static_cast<std::size_t>(image.width * image.height * 3), kPaper[0]);
-  draw_text(image, kEdge, kEdge, options.title, 2, kInk);
+  Image image = blank(2 * kEdge + across * tile,
+                      kEdge + kLine + down * (tile + kLine) + 2 * kLine + kChart + kEdge, kPaper);
+  draw_text(image, kEdge, kEdge, fitted(options.title, static_cast<double>(image.width - 2 * kEdge), kText),
+            kText, kInk);
   const auto [low, high] = window_of(slices, options.marked);
   for (std::int64_t k = 0; k < count; ++k) {
     const std::int64_t x0 = kEdge + k % across * tile, y0 = kEdge + kLine + k / across * (tile + kLine);

@@ -3,88 +3,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec2.hpp>
-#include <numeric>
 #include <optional>
-#include <sstream>
 
-#include "host/picture/bitmap_font.hpp"
+#include "host/picture/canvas.hpp"
+#include "host/picture/text.hpp"
+#include "host/picture/ticks.hpp"
 #include "host/render/glm_vectors.hpp"
 
 namespace vdvr {
 namespace {
 
-using Colour = std::array<std::uint8_t, 3>;
 constexpr Colour kInk{235, 235, 235}, kShadow{0, 0, 0}, kEdge{200, 205, 215};
 
-/// Small pictures have small letters.
-int text_scale(const Image& image) { return std::min(image.width, image.height) >= 400 ? 2 : 1; }
-std::int64_t text_width(const std::string& s, int scale) {
-  return static_cast<std::int64_t>(s.size()) * kFontAdvance * scale;
-}
-
-void blend(Image& image, std::int64_t x, std::int64_t y, const Colour& c, double part) {
-  if (x < 0 || y < 0 || x >= image.width || y >= image.height || !(part > 0)) return;
-  auto* p = &image.rgb[static_cast<std::size_t>(3 * (y * image.width + x))];
-  for (std::size_t i = 0; i < 3; ++i)
-    p[i] = static_cast<std::uint8_t>(std::lround((1 - part) * p[i] + part * c[i]));
-}
-
-void fill(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c,
-          double part = 1) {
-  for (std::int64_t j = y; j < y + h; ++j)
-    for (std::int64_t i = x; i < x + w; ++i) blend(image, i, j, c, part);
-}
-
 /// Letters with a dark rim, legible on any picture.
-void label(Image& image, std::int64_t x, std::int64_t y, const std::string& s, int scale, const Colour& c) {
+void label(Image& image, double x, double top, const std::string& s, double size, const Colour& c) {
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx)
-      if (dx != 0 || dy != 0) draw_text(image, x + dx, y + dy, s, scale, kShadow);
-  draw_text(image, x, y, s, scale, c);
-}
-
-/// A smooth line of `width` pixels; `part(x, y)` scales its opacity.
-template <class Part>
-void line(Image& image, glm::dvec2 a, glm::dvec2 b, double width, const Colour& c, Part&& part) {
-  // Clip generously to the picture first: an end may lie far outside.
-  const glm::dvec2 lo{-8, -8},
-      hi{static_cast<double>(image.width) + 8, static_cast<double>(image.height) + 8};
-  double t0 = 0, t1 = 1;
-  const glm::dvec2 d = b - a;
-  for (int k = 0; k < 2; ++k) {
-    if (d[k] == 0) {
-      if (a[k] < lo[k] || a[k] > hi[k]) return;
-      continue;
-    }
-    const double u = (lo[k] - a[k]) / d[k], v = (hi[k] - a[k]) / d[k];
-    t0 = std::max(t0, std::min(u, v));
-    t1 = std::min(t1, std::max(u, v));
-  }
-  if (!(t0 <= t1)) return;
-  const glm::dvec2 p = a + t0 * d, q = a + t1 * d, e = q - p;
-  const double length2 = glm::dot(e, e), reach = width / 2 + 1;
-  // Column by column, or row by row where it is steep: pixels near the line only.
-  const int along = std::abs(e.x) >= std::abs(e.y) ? 0 : 1, across = 1 - along;
-  const double from = std::min(p[along], q[along]) - reach, to = std::max(p[along], q[along]) + reach;
-  for (auto i = static_cast<std::int64_t>(std::floor(from)); i <= static_cast<std::int64_t>(std::ceil(to));
-       ++i) {
-    const double t =
-        e[along] != 0 ? std::clamp((static_cast<double>(i) + 0.5 - p[along]) / e[along], 0.0, 1.0) : 0;
-    const double middle = p[across] + t * e[across];
-    for (auto j = static_cast<std::int64_t>(std::floor(middle - 2 * reach));
-         j <= static_cast<std::int64_t>(std::ceil(middle + 2 * reach)); ++j) {
-      const std::int64_t x = along == 0 ? i : j, y = along == 0 ? j : i;
-      const glm::dvec2 pixel{static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5};
-      const double s = length2 > 0 ? std::clamp(glm::dot(pixel - p, e) / length2, 0.0, 1.0) : 0;
-      const double away = glm::distance(pixel, p + s * e);
-      blend(image, x, y, c, std::clamp(width / 2 + 0.5 - away, 0.0, 1.0) * part(x, y));
-    }
-  }
+      if (dx != 0 || dy != 0) draw_text(image, x + dx, top + dy, s, size, kShadow);
+  draw_text(image, x, top, s, size, c);
 }
 
 // --- projection ---
@@ -124,38 +64,18 @@ std::optional<Segment> in_front(const View& view, Segment s, double near) {
   return s;
 }
 
-std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, std::size_t width) {
-  std::vector<std::string> lines;
-  for (const auto& paragraph : paragraphs) {
-    std::istringstream words(paragraph);
-    std::string text;
-    for (std::string word; words >> word;) {
-      if (!text.empty() && text.size() + 1 + word.size() > width) {
-        lines.push_back(text);
-        text.clear();
-      }
-      text += (text.empty() ? "" : " ") + word;
-    }
-    if (!text.empty()) lines.push_back(text);
-  }
-  return lines;
-}
-
-// At scale 1, in pixels.
-constexpr std::int64_t kCaptionMargin = 4, kCaptionLine = kFontHeight + 3;
-
 struct CaptionText {
+  double size = 0;
   std::vector<std::string> lines;
-  std::int64_t height = 0;  // pixels, with its margins
+  std::int64_t margin = 0, height = 0;  // pixels; the height with its margins
 };
 
-CaptionText caption_text(const Image& image, const std::vector<std::string>& paragraphs, int scale) {
-  const std::int64_t room = image.width - 2 * kCaptionMargin * scale;
-  const std::int64_t columns = std::max<std::int64_t>(1, room / (kFontAdvance * scale));
-  CaptionText text{wrapped(paragraphs, static_cast<std::size_t>(columns))};
-  // The gap under the last line is the margin's.
+CaptionText caption_text(const Image& image, const std::vector<std::string>& paragraphs, double size) {
+  CaptionText text{size, {}, std::lround(0.6 * size)};
+  text.lines = wrapped(paragraphs, static_cast<double>(image.width - 2 * text.margin), size);
+  const auto lines = static_cast<double>(text.lines.size());
   text.height =
-      (static_cast<std::int64_t>(text.lines.size()) * kCaptionLine + 2 * kCaptionMargin - 3) * scale;
+      std::lround(lines * line_height(size) - (line_height(size) - cap_height(size))) + 2 * text.margin;
   return text;
 }
 
@@ -191,16 +111,18 @@ void draw_box(Image& image, const Camera& camera, const Grid& grid, const std::v
         const auto visible = in_front(view, {from, to}, near);
         if (!visible) continue;
         const glm::dvec2 p = view.pixel(visible->a), q = view.pixel(visible->b);
-        if (front) line(image, p, q, 1.2, kEdge, [](std::int64_t, std::int64_t) { return 0.9; });
-        else line(image, p, q, 1.0, kEdge, [&](std::int64_t x, std::int64_t y) { return 0.6 * shows(x, y); });
+        if (front) draw_line(image, p, q, 1.2, kEdge, [](std::int64_t, std::int64_t) { return 0.9; });
+        else
+          draw_line(image, p, q, 1.0, kEdge,
+                    [&](std::int64_t x, std::int64_t y) { return 0.6 * shows(x, y); });
       }
 }
 
 void draw_axes(Image& image, const Camera& camera, std::int64_t above) {
   const View view(camera, image);
-  const int scale = text_scale(image);
+  const double size = text_size(image), thick = size / 10;
   const double length = 0.07 * static_cast<double>(std::min(image.width, image.height));
-  const double margin = length + 14 * scale;
+  const double margin = length + 1.6 * size;
   const glm::dvec2 foot{margin, static_cast<double>(image.height - above) - margin};
   struct Arrow {
     double depth;
@@ -220,38 +142,36 @@ void draw_axes(Image& image, const Camera& camera, std::int64_t above) {
   for (const Arrow& arrow : arrows) {
     const glm::dvec2 tip = foot + length * arrow.direction;
     const Colour& c = colours[arrow.axis];
-    line(image, foot, tip, 1.5 * scale, c, whole);
+    draw_line(image, foot, tip, thick, c, whole);
     const double seen = glm::length(arrow.direction);
     if (seen > 0.2) {
       const glm::dvec2 d = arrow.direction / seen, n{-d.y, d.x};
-      const double head = 3.0 * scale;
-      line(image, tip, tip - head * (d - 0.6 * n), 1.5 * scale, c, whole);
-      line(image, tip, tip - head * (d + 0.6 * n), 1.5 * scale, c, whole);
+      const double head = size / 4;
+      draw_line(image, tip, tip - head * (d - 0.6 * n), thick, c, whole);
+      draw_line(image, tip, tip - head * (d + 0.6 * n), thick, c, whole);
     }
     const glm::dvec2 out = seen > 0.05 ? arrow.direction / seen : glm::dvec2(0.7, 0.7);
-    const glm::dvec2 at = tip + 7.0 * scale * out;
-    label(image, std::lround(at.x - 2.5 * scale), std::lround(at.y - 3.5 * scale),
-          std::string(1, "xyz"[arrow.axis]), scale, c);
+    const glm::dvec2 at = tip + 0.6 * size * out;
+    const std::string name(1, "xyz"[arrow.axis]);
+    label(image, at.x - text_width(name, size) / 2, at.y - cap_height(size) / 2, name, size, c);
   }
 }
 
 void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
-  const int scale = text_scale(image);
+  const double size = text_size(image), cap = cap_height(size), line = line_height(size);
   const double lo = bar.points.front().value, hi = bar.points.back().value;
-  const std::int64_t line_height = (kFontHeight + 3) * scale, margin = 8 * scale, width = 10 * scale;
-  const std::int64_t top = margin + (bar.unit.empty() ? 0 : line_height + 2 * scale);
-  const std::int64_t height = std::min<std::int64_t>(image.height - above - margin - top, image.height / 2);
-  if (height < 2 * line_height) return;  // a picture too flat for a bar
-  std::vector<std::string> labels;
-  std::size_t longest = 0;
-  constexpr int quarters = 4;
-  for (int i = 0; i <= quarters; ++i) {
-    const double value = lo + (hi - lo) * i / quarters;
-    labels.push_back(fmt::format("{:.3g}", std::abs(value) < 1e-9 * (hi - lo) ? 0.0 : value));
-    longest = std::max(longest, labels.back().size());
-  }
-  const std::int64_t x =
-      image.width - margin - static_cast<std::int64_t>(longest) * kFontAdvance * scale - width - 4;
+  const std::int64_t margin = std::lround(0.6 * size), width = std::lround(0.8 * size);
+  const std::int64_t room = image.height - above - 2 * margin - std::lround(line);
+  const std::int64_t height = std::min<std::int64_t>(room, image.height / 2);
+  if (height < std::lround(3 * line)) return;  // a picture too flat for a bar
+  const Ticks ticks =
+      round_ticks(lo, hi, std::clamp(static_cast<int>(static_cast<double>(height) / (2 * line)), 2, 6));
+  double widest = 0;
+  for (const Tick& t : ticks.ticks) widest = std::max(widest, text_width(t.label, size));
+  const std::string power = times_power(ticks.exponent),
+                    unit = power + (power.empty() || bar.unit.empty() ? "" : " ") + bar.unit;
+  const std::int64_t top = margin + (unit.empty() ? std::lround(cap / 2) : std::lround(1.4 * line));
+  const std::int64_t x = image.width - 2 * margin - std::lround(widest) - width;
   fill(image, x - 1, top - 1, width + 2, height + 2, kInk);
   std::optional<glm::dvec2> before;
   const double most =
@@ -270,30 +190,31 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
     const double part = transfer_at(bar.points, lo + f * (hi - lo)).opacity / most;
     const glm::dvec2 here{static_cast<double>(x) + 0.5 + part * static_cast<double>(width - 1),
                           static_cast<double>(top + j) + 0.5};
-    if (before) line(image, *before, here, 1, kShadow, [](std::int64_t, std::int64_t) { return 0.8; });
+    if (before) draw_line(image, *before, here, 1, kShadow, [](std::int64_t, std::int64_t) { return 0.8; });
     before = here;
   }
-  if (!bar.unit.empty())
-    label(image, image.width - margin - text_width(bar.unit, scale), margin - 2 * scale, bar.unit, scale,
-          kInk);
-  for (int i = 0; i <= quarters; ++i) {
-    const std::int64_t y = top + (height - 1) * (quarters - i) / quarters;
-    fill(image, x + width + 1, y, 3, 1, kInk);
-    label(image, x + width + 6, y - kFontHeight * scale / 2, labels[static_cast<std::size_t>(i)], scale,
-          kInk);
+  if (!unit.empty())
+    label(image, static_cast<double>(image.width - margin) - text_width(unit, size),
+          static_cast<double>(margin), unit, size, kInk);
+  for (const Tick& t : ticks.ticks) {
+    const double part = hi > lo ? (t.value - lo) / (hi - lo) : 0.5;
+    const double y = static_cast<double>(top) + (1 - part) * static_cast<double>(height - 1);
+    fill(image, x + width + 1, std::lround(y), 3, 1, kInk);
+    label(image, static_cast<double>(x + width + margin), y - cap / 2, t.label, size, kInk);
   }
 }
 
 std::int64_t draw_caption(Image& image, const std::vector<std::string>& paragraphs) {
-  // A caption that would hide more than an eighth of the picture takes the small letters.
-  int scale = text_scale(image);
-  CaptionText text = caption_text(image, paragraphs, scale);
-  if (scale > 1 && text.height * 8 > image.height) text = caption_text(image, paragraphs, scale = 1);
-  const std::int64_t margin = kCaptionMargin * scale, top = image.height - text.height;
+  // A caption that would hide more than an eighth of the picture takes smaller letters.
+  const double size = text_size(image), small = std::max(10.0, 0.75 * size);
+  CaptionText text = caption_text(image, paragraphs, size);
+  if (text.height * 8 > image.height) text = caption_text(image, paragraphs, small);
+  const std::int64_t top = image.height - text.height;
   fill(image, 0, top, image.width, text.height, kShadow, 0.65);
   for (std::size_t i = 0; i < text.lines.size(); ++i)
-    draw_text(image, margin, top + margin + static_cast<std::int64_t>(i) * kCaptionLine * scale,
-              text.lines[i], scale, kInk);
+    draw_text(image, static_cast<double>(text.margin),
+              static_cast<double>(top + text.margin) + static_cast<double>(i) * line_height(text.size),
+              text.lines[i], text.size, kInk);
   return text.height;
 }
 

@@ -7,31 +7,42 @@
 #include <cmath>
 #include <limits>
 
-#include "host/picture/bitmap_font.hpp"
+#include "host/picture/canvas.hpp"
+#include "host/picture/text.hpp"
+#include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/region_of_interest.hpp"
+#include "vdvr/slice_frame.hpp"
 
 namespace vdvr {
 namespace {
 
-using Colour = std::array<std::uint8_t, 3>;
-
 constexpr Colour kPaper{24, 24, 24}, kInk{230, 230, 230}, kNotCompared{64, 64, 64};
 constexpr Colour kAbove{0, 255, 255};  // above the tolerance: a hue that the map does not have
-constexpr std::int64_t kCaption = kErrorCaption, kMargin = 8, kBar = 10;
+constexpr std::int64_t kMargin = 8, kBar = 10;
 
-/// Dark to light with rising luminance, so that it reads in print too; e in [0, 1].
+/// Dark to light with rising luminance, so that it reads in print too; from 0 to epsilon.
+constexpr std::array<std::array<double, 3>, 5> kStops{
+    {{0, 0, 8}, {80, 18, 120}, {190, 55, 85}, {248, 142, 10}, {252, 255, 165}}};
+
 Colour error_colour(double e) {
-  static constexpr std::array<std::array<double, 3>, 5> stops{
-      {{0, 0, 8}, {80, 18, 120}, {190, 55, 85}, {248, 142, 10}, {252, 255, 165}}};
   const double x = std::clamp(e, 0.0, 1.0) * 4;
   const auto i = std::min<std::size_t>(3, static_cast<std::size_t>(x));
   const double t = x - static_cast<double>(i);
   Colour c{};
   for (std::size_t k = 0; k < 3; ++k)
-    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * stops[i][k] + t * stops[i + 1][k]));
+    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * kStops[i][k] + t * kStops[i + 1][k]));
   return c;
+}
+
+std::vector<TransferPoint> error_colours(double epsilon) {
+  std::vector<TransferPoint> points;
+  for (std::size_t i = 0; i < kStops.size(); ++i)
+    points.push_back({epsilon * static_cast<double>(i) / 4,
+                      {kStops[i][0] / 255, kStops[i][1] / 255, kStops[i][2] / 255},
+                      1});
+  return points;
 }
 
 void put(Image& image, std::int64_t x, std::int64_t y, const Colour& colour) {
@@ -55,17 +66,27 @@ struct PixelGrid {
   std::size_t plane = 0;  ///< 0 or 1: which of the grid's two planes is the slice
 };
 
-PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o) {
+SliceFrame frame_of(const Grid& volume, const ErrorSliceOptions& o, double epsilon) {
+  SliceFrame f;
+  f.grid = volume;
+  f.axis = o.axis;
+  f.position = o.position;
+  f.colours = error_colours(epsilon);
+  f.quantity = "|V − F|";
+  f.unit = per_unit(volume.unit);
+  // What the caption says is known only when the slice is done.
+  f.caption_lines = o.width < 400 ? 4 : 2;
+  return f;
+}
+
+PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o, const SlicePlace& place) {
   const Axes a = axes_of(o.axis);
   const auto length = [&](std::size_t k) { return static_cast<double>(volume.cells[k]) * volume.spacing[k]; };
   const double lo = volume.origin[a.normal], hi = lo + length(a.normal);
   if (!(o.position >= lo && o.position <= hi))
     throw InputError(
         fmt::format("the slice at {} misses the volume, which reaches from {} to {}", o.position, lo, hi));
-  const std::int64_t wide = o.width, high = o.height - kCaption;
-  if (wide < 160 || high < 16)
-    throw InputError(fmt::format("an error picture needs at least 160x{} pixels, not {}x{}", 16 + kCaption,
-                                 o.width, o.height));
+  const std::int64_t wide = place.width, high = place.height;
   const double pixel =
       std::max(length(a.across) / static_cast<double>(wide), length(a.down) / static_cast<double>(high));
   const auto count = [&](std::size_t k) {
@@ -90,34 +111,50 @@ PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o) {
   return p;
 }
 
-/// A number in the characters that the caption's font has.
-std::string number(double value) { return fmt::format("{:.4g}", value); }
+std::string number(double value) { return number_text(value); }
 
-void draw_caption(Image& image, double epsilon, const std::string& text) {
+/// Below pictures of rays: the colours from 0 to epsilon, and a line of text.
+void draw_caption(Image& image, double epsilon, const std::string& line) {
+  constexpr double small = 12;
   const std::string low = "0", high = fmt::format("epsilon {}", number(epsilon));
-  const std::int64_t top = image.height - kCaption + kMargin;
-  const std::int64_t left = kMargin + std::int64_t{2} * kFontAdvance;
-  const std::int64_t right =
-      image.width - kMargin - static_cast<std::int64_t>(high.size() + 1) * kFontAdvance;
-  draw_text(image, kMargin, top + 1, low, 1, kInk);
-  draw_text(image, right + kFontAdvance, top + 1, high, 1, kInk);
+  const std::int64_t top = image.height - kErrorCaption + kMargin;
+  const auto above = static_cast<double>(top);
+  const std::int64_t left = 2 * kMargin + std::lround(text_width(low, small));
+  const std::int64_t right = image.width - 2 * kMargin - std::lround(text_width(high, small));
+  draw_text(image, kMargin, above, low, small, kInk);
+  draw_text(image, static_cast<double>(right + kMargin), above, high, small, kInk);
   for (std::int64_t x = left; x < right; ++x)
-    for (std::int64_t y = top; y < top + kBar; ++y)
-      put(image, x, y, error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
-  const int scale =
-      static_cast<std::int64_t>(text.size()) * kFontAdvance * 2 + 2 * kMargin <= image.width ? 2 : 1;
-  draw_text(image, kMargin, top + kBar + 6, text, scale, kInk);
+    fill(image, x, top, 1, kBar,
+         error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
+  const auto room = static_cast<double>(image.width - 2 * kMargin);
+  const double size = std::clamp(text_size(image), small, 15.0);
+  draw_text(image, kMargin, above + kBar + 7,
+            text_width(line, size) <= room ? line : fitted(line, room, small),
+            text_width(line, size) <= room ? size : small, kInk);
 }
 
-ErrorSlice empty_slice(const ErrorSliceOptions& o) {
+ErrorSlice empty_slice(const SlicePlace& place) {
   ErrorSlice s;
-  s.image = {o.width, o.height, {}};
-  s.image.rgb.resize(static_cast<std::size_t>(o.width * o.height * 3));
-  for (std::int64_t i = 0; i < o.width * o.height; ++i) put(s.image, i, 0, kPaper);
-  s.errors = {o.width, o.height - kCaption, {}};
-  s.errors.values.assign(static_cast<std::size_t>(s.errors.width * s.errors.height),
+  s.image = blank(place.width, place.height, kPaper);
+  s.errors = {place.width, place.height, {}};
+  s.errors.values.assign(static_cast<std::size_t>(place.width * place.height),
                          std::numeric_limits<float>::quiet_NaN());
   return s;
+}
+
+/// The frame, where one is wanted and has room.
+void put_in_frame(ErrorSlice& slice, SliceFrame frame, const SlicePlace& place, const ErrorSliceOptions& o,
+                  const std::string& line) {
+  if (!place.framed) return;
+  frame.caption = {line, "Grey: not compared. Cyan: above epsilon, the end of the scale."};
+  slice.image = framed_slice(frame, slice.image, o.width, o.height);
+}
+
+SlicePlace place_of(const SliceFrame& frame, const ErrorSliceOptions& o) {
+  if (o.width < 1 || o.height < 1)
+    throw InputError(fmt::format("an error slice of {}x{} pixels", o.width, o.height));
+  if (o.framed) return slice_place(frame, o.width, o.height);
+  return {0, 0, o.width, o.height, false};
 }
 
 /// Compares every pixel and colours it.
@@ -126,7 +163,7 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
   const CertifiedRegion region(scan, c.field);
   const Index3 samples = pixels.grid.samples();
   const std::int64_t left = (result.image.width - pixels.width) / 2;
-  const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
+  const std::int64_t top = (result.image.height - pixels.height) / 2;
   for (std::int64_t y = 0; y < pixels.height; ++y) {
     for (std::int64_t x = 0; x < pixels.width; ++x) {
       Index3 at{};
@@ -160,16 +197,17 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
 ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress) {
-  const PixelGrid pixels = pixel_grid(volume.grid, options);
+  const SliceFrame frame = frame_of(volume.grid, options, certificate.epsilon_abs);
+  const SlicePlace place = place_of(frame, options);
+  const PixelGrid pixels = pixel_grid(volume.grid, options, place);
   const ReconstructOptions exact{certificate.field, 16,
                                  scan.cone ? Interpolation::linear : Interpolation::cubic};
   const Volume f = reconstruct(device, scan, pixels.grid, exact, progress);
-  ErrorSlice result = empty_slice(options);
+  ErrorSlice result = empty_slice(place);
   compare(result, pixels, axes_of(options.axis), f, scan, volume, certificate);
-  draw_caption(result.image, certificate.epsilon_abs,
-               fmt::format("largest |V - F| = {} = {:.1f} % of epsilon, at {} = {}", number(result.max_error),
-                           100 * result.max_error / certificate.epsilon_abs, "xyz"[options.axis],
-                           number(options.position)));
+  put_in_frame(result, frame, place, options,
+               fmt::format("Largest |V − F| here = {} = {:.1f} % of epsilon", number(result.max_error),
+                           100 * result.max_error / certificate.epsilon_abs));
   return result;
 }
 
@@ -191,7 +229,7 @@ Colour bound_colour(float bound, double epsilon) {
 }
 
 std::string share_text(double bound, double epsilon) {
-  return fmt::format("|V - F| <= {} = {:.1f} % of epsilon", number(bound), 100 * bound / epsilon);
+  return fmt::format("|V − F| ≤ {} = {:.1f} % of epsilon", number(bound), 100 * bound / epsilon);
 }
 
 }  // namespace
@@ -200,11 +238,13 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
                        const ErrorSliceOptions& options) {
   const std::vector<float> bounds = bounds_of(volume, c, image3d);
   const Index3 n = volume.bricks();
-  const PixelGrid pixels = pixel_grid(volume.grid, options);
+  const SliceFrame frame = frame_of(volume.grid, options, c.epsilon_abs);
+  const SlicePlace place = place_of(frame, options);
+  const PixelGrid pixels = pixel_grid(volume.grid, options, place);
   const Axes axes = axes_of(options.axis);
-  ErrorSlice result = empty_slice(options);
+  ErrorSlice result = empty_slice(place);
   const std::int64_t left = (result.image.width - pixels.width) / 2;
-  const std::int64_t top = (result.image.height - kCaption - pixels.height) / 2;
+  const std::int64_t top = (result.image.height - pixels.height) / 2;
   for (std::int64_t y = 0; y < pixels.height; ++y)
     for (std::int64_t x = 0; x < pixels.width; ++x) {
       Index3 at{};
@@ -223,16 +263,14 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
       result.max_error = std::max(result.max_error, static_cast<double>(bound));
       result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = bound;
     }
-  draw_caption(result.image, c.epsilon_abs,
-               fmt::format("{} where covered, {}", share_text(result.max_error, c.epsilon_abs),
+  put_in_frame(result, frame, place, options,
+               fmt::format("{} where covered, sampler {}", share_text(result.max_error, c.epsilon_abs),
                            image3d ? "image3d" : "buffer"));
   return result;
 }
 
 Image bound_picture(const FloatImage& bounds, double epsilon) {
-  Image image{bounds.width, bounds.height + kCaption, {}};
-  image.rgb.resize(static_cast<std::size_t>(image.width * image.height * 3));
-  for (std::int64_t i = 0; i < image.width * image.height; ++i) put(image, i, 0, kPaper);
+  Image image = blank(bounds.width, bounds.height + kErrorCaption, kPaper);
   double most = 0;
   for (std::int64_t i = 0; i < bounds.width * bounds.height; ++i) {
     const float bound = bounds.values[static_cast<std::size_t>(i)];

@@ -4,69 +4,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
-#include "host/picture/bitmap_font.hpp"
+#include "host/picture/canvas.hpp"
+#include "host/picture/text.hpp"
 
 namespace vdvr::figure {
 namespace {
 
-using Colour = std::array<std::uint8_t, 3>;
 constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kGrid{215, 215, 215}, kFrame{255, 255, 255};
 // Apart in lightness as well as in hue.
 constexpr std::array<Colour, 4> kCurves{{{0, 0, 0}, {0, 90, 180}, {215, 80, 20}, {150, 160, 0}}};
 
-constexpr int kText = 2;  // scale of the font: 14 pixels
-constexpr std::int64_t kGlyph = kFontAdvance * kText, kLine = kFontHeight * kText + 8;
+constexpr double kText = 16;  // size of the font; its capitals have 12 pixels
+constexpr std::int64_t kCapital = 12, kLine = 22;
 constexpr std::int64_t kEdge = 14, kLeft = 104, kTop = kLine + 4, kBottom = 2 * kLine + 12;
-constexpr std::int64_t kBarGap = 12, kBar = 18, kRight = kBarGap + kBar + 8 + 8 * kGlyph;
+constexpr std::int64_t kBarGap = 12, kBar = 18, kRight = kBarGap + kBar + 80;
 
-std::int64_t width_of(const std::string& text) { return static_cast<std::int64_t>(text.size()) * kGlyph; }
 std::string number(double v, int digits = 3) { return v == 0 ? "0" : fmt::format("{:.{}g}", v, digits); }
 
-/// Words into lines of at most `width` characters; a longer word has a line to itself.
-std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, std::size_t width) {
-  std::vector<std::string> lines;
-  for (const auto& paragraph : paragraphs) {
-    std::istringstream words(paragraph);
-    std::string line;
-    for (std::string word; words >> word; line += word) {
-      if (line.empty()) continue;
-      if (line.size() + 1 + word.size() <= width) {
-        line += ' ';
-      } else {
-        lines.push_back(std::move(line));
-        line.clear();
-      }
-    }
-    lines.push_back(line);
-  }
-  return lines;
-}
-
-Image blank(std::int64_t width, std::int64_t height) {
-  return {width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height * 3), kPaper[0])};
-}
-void put(Image& image, std::int64_t x, std::int64_t y, const Colour& c) {
-  if (x < 0 || y < 0 || x >= image.width || y >= image.height) return;
-  std::copy(c.begin(), c.end(), image.rgb.begin() + (y * image.width + x) * 3);
-}
-void fill(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c) {
-  for (std::int64_t j = y; j < y + h; ++j)
-    for (std::int64_t i = x; i < x + w; ++i) put(image, i, j, c);
-}
-void frame(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c) {
-  fill(image, x, y, w, 1, c);
-  fill(image, x, y + h - 1, w, 1, c);
-  fill(image, x, y, 1, h, c);
-  fill(image, x + w - 1, y, 1, h, c);
-}
 enum class Align { left, centre, right };
 void text(Image& image, std::int64_t x, std::int64_t y, const std::string& s, Align align,
           const Colour& c = kInk) {
-  if (align == Align::centre) x -= width_of(s) / 2;
-  if (align == Align::right) x -= width_of(s);
-  draw_text(image, x, y, s, kText, c);
+  const double width = text_width(s, kText), left = static_cast<double>(x);
+  draw_text(image,
+            align == Align::left     ? left
+            : align == Align::centre ? left - width / 2
+                                     : left - width,
+            static_cast<double>(y), s, kText, c);
 }
 
 /// A place for one panel: the plot's own square lies at (x, y).
@@ -105,8 +69,7 @@ void draw_bar(Image& image, const Place& p, const Scale& scale) {
   for (const double v : marks(scale)) {
     const auto y = p.y + std::lround((1 - scale.fraction(v)) * static_cast<double>(p.side - 1));
     fill(image, x + kBar, y, 4, 1, kInk);
-    text(image, x + kBar + 8,
-         std::clamp<std::int64_t>(y - kFontHeight * kText / 2, p.y, p.y + p.side - kFontHeight * kText),
+    text(image, x + kBar + 8, std::clamp<std::int64_t>(y - kCapital / 2, p.y, p.y + p.side - kCapital),
          scale.logarithmic && v == scale.low ? "<" + number(v) : number(v, scale.logarithmic ? 3 : 4),
          Align::left);
   }
@@ -116,8 +79,8 @@ void draw_raster(Image& image, const Place& p, const Raster& r) {
   text(image, p.x + p.side / 2, p.y - kLine, r.title, Align::centre);
   for (std::int64_t y = 0; y < r.side; ++y)
     for (std::int64_t x = 0; x < r.side; ++x)
-      put(image, p.x + x, p.y + y,
-          colour(r.scale.fraction(r.values[static_cast<std::size_t>(y * r.side + x)])));
+      fill(image, p.x + x, p.y + y, 1, 1,
+           colour(r.scale.fraction(r.values[static_cast<std::size_t>(y * r.side + x)])));
   if (r.box > 0) {
     const auto half = std::lround(r.box * static_cast<double>(r.side) / 2);
     for (std::int64_t grow = 0; grow < 2; ++grow)
@@ -129,10 +92,12 @@ void draw_raster(Image& image, const Place& p, const Raster& r) {
   for (double f = -0.5; f <= 0.5; f += 0.25) {
     const auto y = p.y + std::lround((0.5 - f) * static_cast<double>(p.side - 1));
     fill(image, p.x - 6, y, 6, 1, kInk);
-    text(image, p.x - 9, y - kFontHeight * kText / 2, number(f), Align::right);
+    text(image, p.x - 9, y - kCapital / 2, number(f), Align::right);
   }
-  // No upright letters in this font: the axis has its name between two of its numbers.
-  text(image, p.x - 9, p.y + p.side * 3 / 8 - kFontHeight * kText / 2, r.y_label, Align::right);
+  draw_text_upwards(
+      image, static_cast<double>(p.x - kLeft + 12),
+      static_cast<double>(p.y) + (static_cast<double>(p.side) + text_width(r.y_label, kText)) / 2, r.y_label,
+      kText, kInk);
   draw_bar(image, p, r.scale);
 }
 
@@ -161,13 +126,13 @@ void draw_chart(Image& image, const Place& p, const Chart& chart) {
   for (const double v : marks(chart.scale)) {
     const auto y = p.y + std::lround((1 - chart.scale.fraction(v)) * static_cast<double>(p.side - 1));
     fill(image, p.x, y, p.side, 1, kGrid);
-    text(image, p.x - 6, y - kFontHeight * kText / 2, number(v), Align::right);
+    text(image, p.x - 6, y - kCapital / 2, number(v), Align::right);
   }
   for (std::size_t i = 0; i < chart.curves.size(); ++i) {
     const Colour& c = kCurves[i % kCurves.size()];
     draw_curve(image, p, chart.curves[i], chart.scale, c);
     const std::int64_t y = p.y + kLine * static_cast<std::int64_t>(i), x = p.x + p.side + 8;
-    fill(image, x, y + kFontHeight * kText / 2 - 1, 16, 4, c);
+    fill(image, x, y + kCapital / 2 - 1, 16, 4, c);
     text(image, x + 22, y, chart.curves[i].label, Align::left);
   }
   frame(image, p.x - 1, p.y - 1, p.side + 2, p.side + 2, kInk);
@@ -180,10 +145,11 @@ Image layout(const std::string& title, const std::vector<std::vector<Panel>>& ro
   std::size_t most = 1;
   for (const auto& row : rows) most = std::max(most, row.size());
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
-  const auto caption = wrapped(paragraphs, static_cast<std::size_t>(count(most) * cell_width(side) / kGlyph));
+  const auto caption = wrapped(paragraphs, static_cast<double>(count(most) * cell_width(side)), kText);
   const std::int64_t head = kEdge + kLine + 10;
-  Image image = blank(2 * kEdge + count(most) * cell_width(side),
-                      head + count(rows.size()) * cell_height(side) + count(caption.size()) * kLine + kEdge);
+  Image image =
+      blank(2 * kEdge + count(most) * cell_width(side),
+            head + count(rows.size()) * cell_height(side) + count(caption.size()) * kLine + kEdge, kPaper);
   text(image, kEdge, kEdge, title, Align::left);
   std::int64_t top = head;
   for (const auto& row : rows) {

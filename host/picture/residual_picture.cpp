@@ -6,18 +6,19 @@
 #include <array>
 #include <cmath>
 
-#include "host/picture/bitmap_font.hpp"
+#include "host/picture/canvas.hpp"
+#include "host/picture/text.hpp"
+#include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/residual.hpp"
 
 namespace vdvr {
 namespace {
 
-using Colour = std::array<std::uint8_t, 3>;
-
 constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kAside{150, 150, 150}, kGrid{215, 215, 215},
     kCurve{0, 90, 180};
-constexpr std::int64_t kEdge = 14, kLine = kFontHeight * 2 + 8, kBar = 14, kCurves = 90, kTicks = 74;
+constexpr std::int64_t kEdge = 14, kLine = 22, kCapital = 12, kBar = 14, kCurves = 90, kTicks = 74;
+constexpr double kText = 16;
 
 /// Blue below, white at 0, red above; -1 to 1.
 Colour signed_colour(double x) {
@@ -31,10 +32,8 @@ Colour signed_colour(double x) {
   return c;
 }
 
-void fill(Image& image, std::int64_t x, std::int64_t y, std::int64_t w, std::int64_t h, const Colour& c) {
-  for (std::int64_t j = std::max<std::int64_t>(0, y); j < std::min(image.height, y + h); ++j)
-    for (std::int64_t i = std::max<std::int64_t>(0, x); i < std::min(image.width, x + w); ++i)
-      std::copy(c.begin(), c.end(), image.rgb.begin() + (j * image.width + i) * 3);
+void write(Image& image, std::int64_t x, std::int64_t y, const std::string& text) {
+  draw_text(image, static_cast<double>(x), static_cast<double>(y), text, kText, kInk);
 }
 
 struct Layout {
@@ -84,13 +83,13 @@ void draw_scale(Image& image, const Layout& l, double scale, const std::string& 
     fill(image, x, l.top + y, kBar, 1,
          signed_colour(1 - 2 * static_cast<double>(y) / static_cast<double>(l.height() - 1)));
   const auto label = [&](std::int64_t y, double value) {
-    draw_text(image, x + kBar + 6, y, fmt::format("{:+.3g}", value), 2, kInk);
+    write(image, x + kBar + 6, y, fmt::format("{:+.3g}", value));
   };
   label(l.top, scale);
-  draw_text(image, x + kBar + 6, l.top + l.height() / 2 - kFontHeight, "0", 2, kInk);
-  label(l.top + l.height() - 2 * kFontHeight, -scale);
-  draw_text(image, x, l.top + l.height() + kEdge, "density", 2, kInk);
-  draw_text(image, x, l.top + l.height() + kEdge + kLine, "x " + unit, 2, kInk);
+  write(image, x + kBar + 6, l.top + l.height() / 2 - kCapital / 2, "0");
+  label(l.top + l.height() - kCapital, -scale);
+  write(image, x, l.top + l.height() + kEdge, "density");
+  write(image, x, l.top + l.height() + kEdge + kLine, "× " + unit);
 }
 
 /// Curves of rms from 0: by view to the right of the rays, by column below.
@@ -107,18 +106,17 @@ void draw_curves(Image& image, const Layout& l, const ResidualSummary& s) {
   for (std::int64_t i = 0; i < l.columns; ++i)
     fill(image, l.left + i * l.zoom_x, below, l.zoom_x,
          length(s.columns[static_cast<std::size_t>(i)].rms, s.worst_column.rms), kCurve);
-  draw_text(image, right, l.top - kLine, fmt::format("rms, {:.2g}", s.worst_view.rms), 2, kInk);
-  draw_text(image, kEdge, below, "rms", 2, kInk);
-  draw_text(image, kEdge, below + kLine, fmt::format("{:.2g}", s.worst_column.rms), 2, kInk);
+  write(image, right, l.top - kLine, fmt::format("rms, {:.2g}", s.worst_view.rms));
+  write(image, kEdge, below, "rms");
+  write(image, kEdge, below + kLine, fmt::format("{:.2g}", s.worst_column.rms));
 }
 
 void draw_ticks(Image& image, const Layout& l) {
-  draw_text(image, kEdge, l.top, "view 0", 2, kInk);
-  draw_text(image, kEdge, l.top + l.height() - 2 * kFontHeight, fmt::format("{}", l.views - 1), 2, kInk);
-  draw_text(image, l.left, l.top - kLine, "column 0", 2, kInk);
+  write(image, kEdge, l.top, "view 0");
+  write(image, kEdge, l.top + l.height() - kCapital, fmt::format("{}", l.views - 1));
+  write(image, l.left, l.top - kLine, "column 0");
   const std::string last = fmt::format("{}", l.columns - 1);
-  draw_text(image, l.left + l.width() - static_cast<std::int64_t>(last.size()) * 2 * kFontAdvance,
-            l.top - kLine, last, 2, kInk);
+  write(image, l.left + l.width() - std::lround(text_width(last, kText)), l.top - kLine, last);
 }
 
 }  // namespace
@@ -141,21 +139,19 @@ Image residual_picture(const Residual& r, const ResidualSummary& s, std::int64_t
                   s.worst_view.index, s.median_view_rms > 0 ? s.worst_view.rms / s.median_view_rms : 0,
                   s.worst_column.index,
                   s.median_column_rms > 0 ? s.worst_column.rms / s.median_column_rms : 0)};
-  std::size_t longest = title.size();
-  for (const std::string& line : caption) longest = std::max(longest, line.size());
-  Image image{std::max(l.left + l.width() + 4 * kEdge + kCurves + kBar + numbers,
-                       static_cast<std::int64_t>(longest) * 2 * kFontAdvance + 2 * kEdge),
-              l.top + l.height() + 3 * kEdge + kCurves + 3 * kLine,
-              {}};
-  image.rgb.assign(static_cast<std::size_t>(image.width * image.height * 3), kPaper[0]);
-  draw_text(image, kEdge, kEdge, title, 2, kInk);
+  double longest = text_width(title, kText);
+  for (const std::string& line : caption) longest = std::max(longest, text_width(line, kText));
+  Image image = blank(
+      std::max(l.left + l.width() + 4 * kEdge + kCurves + kBar + numbers, std::lround(longest) + 2 * kEdge),
+      l.top + l.height() + 3 * kEdge + kCurves + 3 * kLine, kPaper);
+  write(image, kEdge, kEdge, title);
   draw_rays(image, l, r, row, scale);
   draw_curves(image, l, s);
   draw_scale(image, l, scale, r.geometry.unit);
   draw_ticks(image, l);
   std::int64_t y = l.top + l.height() + 2 * kEdge + kCurves;
   for (const std::string& line : caption) {
-    draw_text(image, kEdge, y, line, 2, kInk);
+    write(image, kEdge, y, line);
     y += kLine;
   }
   return image;

@@ -18,15 +18,17 @@ namespace vdvr {
 struct ErrorSliceOptions {
   int axis = 2;                            ///< 0 x, 1 y, 2 z
   double position = 0;                     ///< world
-  std::int64_t width = 512, height = 512;  ///< of the picture with its caption
+  std::int64_t width = 512, height = 512;  ///< of the picture
+  /// With axes, colour bar and caption (slice_frame.hpp) where there is room; else the slice is all of it.
+  bool framed = true;
 };
 
-/// Height of the caption below the slice, in pixels.
+/// Height of the caption below bound_picture(), in pixels.
 inline constexpr std::int64_t kErrorCaption = 44;
 
 struct ErrorSlice {
   Image image;
-  FloatImage errors;  ///< of the picture without its caption; NaN where not compared
+  FloatImage errors;  ///< of the slice without its frame; NaN where not compared
   double max_error = 0;
   Vec3 worst_at{0, 0, 0};
   std::int64_t pixels = 0;  ///< compared: covered and, where there is a region of interest, inside it
@@ -34,8 +36,7 @@ struct ErrorSlice {
 
 /// Cost: views * pixels updates, twice (a reconstruction has at least one cell across the slice). F by
 /// `reconstruct` with cubic 16x upsampling, whose own error is far below any tolerance that a volume can be
-/// certified to. Throws InputError when the slice misses the volume or the picture is too small for its
-/// caption.
+/// certified to. Throws InputError when the slice misses the volume.
 VDVR_API ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                                 const Certificate& certificate, const ErrorSliceOptions& options,
                                 const Progress& progress = {});

@@ -194,18 +194,19 @@ BOOST_AUTO_TEST_CASE(axes_point_where_the_camera_sees_them) {
   const Image before = plain(400, 400, 0);
   Image image = before;
   draw_axes(image, orbit_camera(grid, 0, 0, 1), 0);
-  // Azimuth 0: x to the right in red, z down in blue, from a foot 56 = 28 + 28 pixels inside the corner.
+  // Azimuth 0: x to the right in red, z down in blue, from a foot 47 = 28 + 1.6 times 12 pixels inside the
+  // corner.
   const auto at = [&](std::int64_t x, std::int64_t y) {
     return &image.rgb[static_cast<std::size_t>(3 * (y * 400 + x))];
   };
-  BOOST_TEST(at(66, 344)[0] > at(66, 344)[2]);
-  BOOST_TEST(at(56, 356)[2] > at(56, 356)[0]);
+  BOOST_TEST(at(57, 352)[0] > at(57, 352)[2]);
+  BOOST_TEST(at(47, 362)[2] > at(47, 362)[0]);
 }
 
 BOOST_AUTO_TEST_CASE(a_long_caption_leaves_the_picture_to_be_seen) {
   Image brief = plain(512, 512, 60), wordy = brief;
-  // One line of the large letters: twice 7 pixels between margins of twice 4.
-  BOOST_TEST(draw_caption(brief, {"a caption"}) == 2 * (7 + 2 * 4));
+  // One line: capitals of 11 pixels between margins of 9.
+  BOOST_TEST(draw_caption(brief, {"a caption"}) == 11 + 2 * 9);
   BOOST_TEST(draw_caption(wordy, {std::string(70, 'x'), std::string(84, 'y') + " " + std::string(40, 'z')}) <=
              512 / 8);
 }

@@ -253,9 +253,9 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   const Grid& g = scene.volume.grid;
   const auto axis = static_cast<std::size_t>(o.slice_axis);
   const double middle = g.origin[axis] + 0.5 * static_cast<double>(g.cells[axis]) * g.spacing[axis];
-  // Values have no caption: the slice alone has the size asked for.
-  const std::int64_t height = o.height + (kind == OutputKind::values ? kErrorCaption : 0);
-  const ErrorSliceOptions options{o.slice_axis, o.slice_position.value_or(middle), o.width, height};
+  // Values have no frame: the slice alone has the size asked for.
+  const bool framed = kind == OutputKind::picture && !args.has("plain");
+  const ErrorSliceOptions options{o.slice_axis, o.slice_position.value_or(middle), o.width, o.height, framed};
   if (!args.has("projections")) return render_bound(common, o, output, kind, scene, options);
   const auto projections = args.path("projections");
   const ProjectionSet scan = load_certified_scan(projections, args, *scene.certificate, progress.callback());
@@ -390,7 +390,7 @@ int render_command(Arguments& args) {
   const std::int64_t frames = args.integer_or("turntable", 1, 1, 9999);
   const OutputKind kind = output_kind(output, turntable);
   if (kind == OutputKind::values)
-    refuse(args, {"axes", "box", "colorbar", "caption"}, "is drawn over pictures, not into values");
+    refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 

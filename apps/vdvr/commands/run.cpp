@@ -10,6 +10,7 @@
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/report.hpp"
 #include "apps/vdvr/verification.hpp"
@@ -65,8 +66,16 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
     report(progress, "render", 0);
-    const RenderResult r = renderer.render(o);
-    write_png(folder.file(name), r.image);
+    RenderOptions drawn = o;
+    const bool slice = o.mode == RenderMode::slice;
+    const SliceFrame frame = frame_of_slice(o, volume.grid, out.built.certificate);
+    if (slice) {
+      const SlicePlace place = slice_place(frame, o.width, o.height);
+      drawn.width = place.width;
+      drawn.height = place.height;
+    }
+    const RenderResult r = renderer.render(drawn);
+    write_png(folder.file(name), slice ? framed_slice(frame, r.image, o.width, o.height) : r.image);
     out.files.emplace_back(name, what);
     out.outside[name] = outside_certificate(o);
     out.sampler = sampler_name(r.sampler);
