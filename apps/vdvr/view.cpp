@@ -11,13 +11,6 @@ namespace {
 
 using Range = std::pair<double, double>;
 
-/// Where a preset lies by itself.
-Range preset_range(const std::string& name, const Brightness& b) {
-  if (name != "iso" && name != "marschner-lobb") return {b.lo, b.hi};
-  const double reach = std::min(b.threshold - b.lo, b.hi - b.threshold);
-  return {b.threshold - reach, b.threshold + reach};
-}
-
 bool is_file(const std::string& name) {
   const std::filesystem::path path(name);
   std::error_code error;
@@ -65,8 +58,7 @@ TransferFunction transfer_for(const Arguments& args, const Brightness& b, const 
   }
   const std::string name = args.text("tf");
   if (!is_file(name)) {
-    const Range r = range.value_or(preset_range(name, b));
-    return transfer_preset(name, r.first, r.second);
+    return range ? transfer_preset(name, range->first, range->second) : preset_for(name, b);
   }
   TransferFunction f = read_transfer_function(name);
   if (range) f = stretched(std::move(f), range->first, range->second);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "vdvr/error.hpp"
 #include "vdvr/framing.hpp"
 
 namespace vdvr {
@@ -100,6 +101,32 @@ TransferFunction two_material_transfer(const Brightness& b) {
            {b.threshold, {0.95, 0.70, 0.45}, 0.1},
            {b.threshold + 0.4 * dense, {0.99, 0.88, 0.70}, 0.6},
            {b.hi, {1.00, 1.00, 0.98}, 0.9}}};
+}
+
+TransferFunction preset_for(const std::string& name, const Brightness& b) {
+  if (name != "iso" && name != "marschner-lobb") return transfer_preset(name, b.lo, b.hi);
+  const double reach = std::min(b.threshold - b.lo, b.hi - b.threshold);
+  return transfer_preset(name, b.threshold - reach, b.threshold + reach);
+}
+
+std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densities,
+                                     const std::optional<std::vector<double>>& opacities) {
+  if (opacities && opacities->size() != densities.size())
+    throw InputError(
+        fmt::format("surfaces: {} opacities for {} densities", opacities->size(), densities.size()));
+  constexpr std::array<std::array<double, 3>, 4> kVeils{
+      {{0.55, 0.72, 0.90}, {0.90, 0.62, 0.50}, {0.60, 0.82, 0.58}, {0.86, 0.62, 0.86}}};
+  std::vector<IsoSurface> surfaces;
+  for (std::size_t i = 0; i < densities.size(); ++i) {
+    // How many are lighter gives the place in the row of colours.
+    const auto place = static_cast<std::size_t>(
+        std::count_if(densities.begin(), densities.end(), [&](double v) { return v < densities[i]; }));
+    const bool densest = densities[i] == *std::max_element(densities.begin(), densities.end());
+    IsoSurface s{densities[i], opacities ? (*opacities)[i] : (densest ? 1 : 0.3)};
+    if (!densest) s.rgb = kVeils[place % kVeils.size()];
+    surfaces.push_back(s);
+  }
+  return surfaces;
 }
 
 SamplerKind safe_sampler(SamplerKind asked, const std::optional<Certificate>& certificate) {

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/export.hpp"
@@ -26,6 +27,15 @@ VDVR_API Brightness brightness_of(const MixedVolume& volume);
 
 /// Background clear, soft material a veil, dense material solid, each where the volume's own samples part.
 VDVR_API TransferFunction two_material_transfer(const Brightness& brightness);
+
+/// A preset by name where it suits a volume: over the bulk of its samples, those with a surface in the middle
+/// around the threshold. Throws InputError for a name that is none.
+VDVR_API TransferFunction preset_for(const std::string& name, const Brightness& brightness);
+
+/// Iso-surfaces of these densities, from flesh to bone by their rank. Opacities by default 1 of the densest
+/// and 0.3 of the others. Throws InputError where there are not as many opacities as densities.
+VDVR_API std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densities,
+                                              const std::optional<std::vector<double>>& opacities = {});
 
 /// The sampler to render with: `automatic` becomes `buffer` where the certificate does not hold for image3d.
 /// One that was asked for by name stays.

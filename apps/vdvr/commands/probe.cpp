@@ -10,14 +10,13 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/certified_points.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/output_file.hpp"
-#include "vdvr/region_of_interest.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
@@ -109,22 +108,17 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
   if (!scan)
     throw InputError(
         fmt::format("{}: does not say which points are covered; give --projections", path.string()));
-  const CertifiedRegion region(*scan, c.field);
-  const Index3 bricks = volume.bricks();
-  std::vector<Probe> probes;
-  probes.reserve(points.size());
-  for (const Vec3& p : points) {
-    Probe& probe = probes.emplace_back();
-    probe.covered = in_box(volume.grid, p) && region.contains(p);
+  const CertifiedPoints at(volume, c, scan);
+  std::vector<float> values(points.size());
+  at.values(points, values, progress);
+  std::vector<Probe> probes(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Probe& probe = probes[i];
+    probe.covered = at.covered(points[i]);
     if (!probe.covered) continue;
-    const Index3 b = brick_at(volume, p);
-    probe.value = static_cast<double>(sample_at(volume, p));
-    probe.level =
-        level_text(volume.level[static_cast<std::size_t>((b[2] * bricks[1] + b[1]) * bricks[0] + b[0])]);
-    // Outside the region of interest nothing is promised. With a window, what is promised depends on F, which
-    // V alone does not tell: where nothing was tested V may lie in the window by mistake.
-    const bool promised = !c.window && is_inside(c.roi, p);
-    if (promised) probe.bound = c.total_buffer;
+    probe.value = static_cast<double>(values[i]);
+    probe.level = level_text(at.level(points[i]));
+    if (at.promised(points[i])) probe.bound = c.total_buffer;
   }
   return probes;
 }

@@ -1,9 +1,6 @@
 // vdvr render: a picture, the values behind it, or a turntable.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
@@ -130,23 +127,10 @@ void set_light(const Arguments& args, RenderOptions& o) {
   }
 }
 
-/// Flesh to bone, from the lightest surface to the densest; the last for one alone.
+/// One at the threshold, unless others are asked for.
 std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
   const std::vector<double> values = args.numbers("iso", 0).value_or(std::vector<double>{threshold});
-  const auto opacities = args.numbers("iso-opacity", args.has("iso-opacity") ? values.size() : 0);
-  constexpr std::array<std::array<double, 3>, 4> kVeils{
-      {{0.55, 0.72, 0.90}, {0.90, 0.62, 0.50}, {0.60, 0.82, 0.58}, {0.86, 0.62, 0.86}}};
-  std::vector<IsoSurface> surfaces;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    // How many are lighter gives the place in the row of colours.
-    const auto place = static_cast<std::size_t>(
-        std::count_if(values.begin(), values.end(), [&](double v) { return v < values[i]; }));
-    const bool densest = values[i] == *std::max_element(values.begin(), values.end());
-    IsoSurface s{values[i], opacities ? (*opacities)[i] : (densest ? 1 : 0.3)};
-    if (!densest) s.rgb = kVeils[place % kVeils.size()];
-    surfaces.push_back(s);
-  }
-  return surfaces;
+  return iso_surfaces(values, args.numbers("iso-opacity", args.has("iso-opacity") ? values.size() : 0));
 }
 
 /// Steps adapt where they can.

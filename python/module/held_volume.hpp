@@ -1,0 +1,44 @@
+// A certified volume as Python holds it: the file's contents, and what pictures of it keep on a device.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "vdvr/automatic_view.hpp"
+#include "vdvr/certified_points.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/raycast.hpp"
+#include "vdvr/resident_volume.hpp"
+#include "vdvr/vdvr_file.hpp"
+
+namespace vdvr::python {
+
+class HeldVolume {
+ public:
+  explicit HeldVolume(VdvrFile file) : file_(std::move(file)) {}
+
+  [[nodiscard]] const VdvrFile& file() const { return file_; }
+  /// Made once.
+  const Brightness& brightness();
+  const CertifiedPoints& points();
+  /// One picture; threads take turns.
+  RenderResult render(const std::shared_ptr<Device>& device, const RenderOptions& options);
+  [[nodiscard]] SamplerKind sampler(SamplerKind asked) const { return safe_sampler(asked, certificate()); }
+  /// None of a comparison, which certifies nothing.
+  [[nodiscard]] std::optional<Certificate> certificate() const;
+  /// Gives back what pictures keep on the device.
+  void release();
+
+ private:
+  VdvrFile file_;
+  std::mutex lock_;
+  std::optional<Brightness> brightness_;
+  std::optional<CertifiedPoints> points_;
+  std::shared_ptr<Device> device_;
+  std::optional<ResidentVolume> resident_;  // before the renderer, which uses it
+  std::optional<Renderer> renderer_;
+  bool has_bounds_ = false;
+};
+
+}  // namespace vdvr::python

@@ -1,0 +1,19 @@
+// Work that takes long, called from Python: without the interpreter's lock, with progress, and ended by
+// Ctrl-C.
+#pragma once
+
+#include <functional>
+
+#include <nanobind/nanobind.h>
+
+#include "vdvr/progress.hpp"
+
+namespace vdvr::python {
+
+/// Does `work` in a thread of its own. Meanwhile the calling thread lets other threads of Python run, looks
+/// for signals every 50 ms, and hands progress to `progress(stage, fraction)` unless that is None. What a
+/// signal handler or `progress` raises ends the work and comes out here; so does what the work throws. The
+/// wish to stop is the process's: other long work that goes on at that time ends with Interrupted.
+void run_long(nanobind::handle progress, const std::function<void(const Progress&)>& work);
+
+}  // namespace vdvr::python

@@ -1,0 +1,14 @@
+// The parts of the extension module, each of which puts its classes and functions into it.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace vdvr::python {
+
+void add_errors(nanobind::module_& m);
+void add_scans(nanobind::module_& m);
+void add_pictures(nanobind::module_& m);
+void add_volumes(nanobind::module_& m);
+void add_viewers(nanobind::module_& m);
+
+}  // namespace vdvr::python

@@ -1,0 +1,241 @@
+"""Scans: projections with their geometry, from files and from arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _core
+from ._choices import Path, choice, number, numbers
+from ._devices import DeviceLike, device as open_device
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Called with the name of the work and how much of it is done, 0 to 1. What it raises ends the work.
+Progress = Callable[[str, float], Any]
+
+#: tomopy's names of filters, beside ours.
+_TOMOPY_FILTERS = {"ramlak": "ram-lak", "shepp": "shepp-logan"}
+
+
+def _projections(array: "ArrayLike") -> "NDArray[np.float32]":
+    data = np.asarray(array)
+    if data.ndim != 3:
+        raise _core.InputError(f"projections: an array of {data.ndim} axes; give [view, row, column]")
+    if data.dtype.kind not in "fiu":
+        raise _core.InputError(f"projections: elements of type {data.dtype}; give numbers")
+    # No copy where the layout is C's and the type float32 already.
+    return np.ascontiguousarray(data, dtype=np.float32)
+
+
+class Scan:
+    """Line integrals of a parallel-beam scan that are in memory.
+
+    Parameters
+    ----------
+    projections : array [view, row, column], line integrals (after -log), row 0 on top. float32 as it is, any
+        other type of number rounded to float32.
+    angles_deg : one angle a view, degrees.
+    center : column onto which the axis of rotation projects; columns' middles are integers. By default it is
+        found from the views, and where they do not tell it is the detector's middle.
+    pitch : width of a column, or (width, height) of a pixel, in `unit`.
+    unit : of length; densities are per `unit`.
+
+    Raises
+    ------
+    InputError : sizes that do not fit, numbers that are not finite, angles that leave too little to
+        reconstruct from.
+    """
+
+    _core: "_core.ProjectionSet"
+
+    def __init__(
+        self,
+        projections: "ArrayLike",
+        angles_deg: "ArrayLike",
+        *,
+        center: Optional[float] = None,
+        pitch: Union[float, Tuple[float, float]] = 1.0,
+        unit: str = "pixel",
+        name: str = "array",
+    ) -> None:
+        described = _core.ArrayScan()
+        described.angles_deg = [float(a) for a in np.asarray(angles_deg, dtype=np.float64).ravel()]
+        described.center = None if center is None else number(center, "center")
+        pitches = (pitch, pitch) if isinstance(pitch, (int, float)) else numbers(pitch, 2, "pitch")
+        described.pitch_u, described.pitch_v = (number(p, "pitch") for p in pitches)
+        described.unit = unit
+        described.name = name
+        self._core = _core.scan_of(_projections(projections), described)
+
+    @classmethod
+    def _of(cls, core: "_core.ProjectionSet") -> "Scan":
+        scan = cls.__new__(cls)
+        scan._core = core
+        return scan
+
+    @property
+    def data(self) -> "NDArray[np.float32]":
+        """Line integrals [view, row, column]; the scan's own memory, read-only."""
+        return _core.data_of(self._core)
+
+    @property
+    def shape(self) -> Tuple[int, int, int]:
+        """Views, rows, columns."""
+        return (len(self._core.theta_rad), self._core.rows, self._core.columns)
+
+    @property
+    def angles_deg(self) -> "NDArray[np.float64]":
+        """One angle a view, degrees."""
+        return np.array(self._core.angles_deg)
+
+    @property
+    def center(self) -> float:
+        """Column onto which the axis projects."""
+        return self._core.center
+
+    @property
+    def center_source(self) -> str:
+        """Who said so: "option", "file", "found" or "default"."""
+        return self._core.center_source
+
+    @property
+    def pitch(self) -> Tuple[float, float]:
+        """Width and height of a detector pixel, in `unit`."""
+        return tuple(self._core.pitch)  # type: ignore[return-value]
+
+    @property
+    def unit(self) -> str:
+        """Of length."""
+        return self._core.unit
+
+    @property
+    def name(self) -> str:
+        """What certificates call the scan."""
+        return self._core.name
+
+    @property
+    def sha256(self) -> str:
+        """Of the file, or of the array and its description."""
+        return self._core.sha256
+
+    @property
+    def notes(self) -> List[str]:
+        """What was noticed, a line each."""
+        return self._core.notes
+
+    def save(self, path: Path) -> None:
+        """Writes a Data Exchange file (HDF5) that `vdvr build` and `read_scan` read."""
+        _core.write_data_exchange(path, self._core)
+
+    def __repr__(self) -> str:
+        views, rows, columns = self.shape
+        return f"<vdvr.Scan {self.name}: {views} views, {rows} rows, {columns} columns, axis at {self.center:g}>"
+
+
+def read_scan(
+    path: Path,
+    *,
+    center: Optional[float] = None,
+    angles_file: Optional[Path] = None,
+    beam: Optional[str] = None,
+    binning: int = 1,
+    median: int = 1,
+    gaussian: Tuple[float, float] = (0.0, 0.0),
+    stripes: bool = False,
+    outliers: Optional[float] = None,
+    follow_links: bool = False,
+    max_memory: Optional[int] = None,
+    progress: Optional[Progress] = None,
+) -> Scan:
+    """Reads a scan: Data Exchange or NXtomo HDF5, a folder with scan.json, an MHA or NRRD stack.
+
+    What the options do to projections, docs/preparation.md says; certificates record it.
+
+    Parameters
+    ----------
+    center : column of the axis, in columns of the prepared projections; by default the file's, else found.
+    angles_file : of an MHA or NRRD stack: degrees, one a view.
+    beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
+    binning : columns and rows that become one.
+    median, gaussian : side of the median's window; standard deviations in columns and rows.
+    stripes : takes stripes of sinograms (rings of slices) out.
+    outliers : takes out pixels whose transmission is above their neighbours' median by more than this fraction
+        of the open beam.
+    max_memory : bytes; by default half of what is free.
+    """
+    options = _core.ScanOptions()
+    options.center = None if center is None else number(center, "center")
+    options.angles_file = None if angles_file is None else angles_file
+    options.beam = None if beam is None else choice(_core.Beam, beam, "beam")
+    options.follow_links = follow_links
+    options.max_memory_bytes = _core.half_of_free_memory() if max_memory is None else int(max_memory)
+    preparation = _core.Preparation()
+    preparation.binning = int(binning)
+    preparation.median = int(median)
+    preparation.gaussian = list(numbers(gaussian, 2, "gaussian"))
+    if stripes:
+        preparation.stripes = _core.Stripes()
+    if outliers is not None:
+        wanted = _core.Outliers()
+        wanted.threshold = number(outliers, "outliers")
+        preparation.outliers = wanted
+    options.preparation = preparation
+    return Scan._of(_core.read_scan(path, options, progress))
+
+
+def find_center(scan: Scan) -> Optional["_core.CenterEstimate"]:
+    """The column of the axis from the data, and how sure that is; None where no method applies.
+
+    `scan.center` is not looked at. An estimate that is not `sure` may be off by any number of columns.
+    """
+    return _core.find_center(scan._core)
+
+
+def recon(
+    tomo: "ArrayLike",
+    theta: "ArrayLike",
+    center: Optional[float] = None,
+    filter_name: str = "ramlak",
+    *,
+    sinogram_order: bool = False,
+    upsampling: int = 8,
+    device: DeviceLike = None,
+    progress: Optional[Progress] = None,
+) -> "NDArray[np.float32]":
+    """Filtered back-projection in tomopy's order and units. Nothing is certified; `build` does that.
+
+    Parameters
+    ----------
+    tomo : line integrals [view, row, column], or with `sinogram_order` [row, view, column].
+    theta : one angle a view, radians.
+    center : where the axis lies, from the detector's left edge, in columns: column i reaches from i to i + 1,
+        as in tomopy. By default columns / 2, the middle. Our `Scan(center=)` is this less 1/2.
+    filter_name : "ramlak", "shepp", "cosine", "hamming" or "hann".
+    upsampling : of the filtered projections before they are interpolated linearly; 1 is the usual FBP.
+
+    Returns
+    -------
+    float32 [row, y, x] of shape (rows, columns, columns), density per column width; the axis goes through the
+    middle. As in tomopy, a point at column x and row y of a slice, both from its middle, is seen at
+    x cos(theta) - y sin(theta). Outside of the circle that all views see values mean nothing.
+    """
+    data = np.asarray(tomo)
+    if data.ndim == 3 and sinogram_order:
+        data = data.transpose(1, 0, 2)
+    described = _core.ArrayScan()
+    described.angles_deg = _core.degrees_of([float(a) for a in np.asarray(theta, dtype=np.float64).ravel()])
+    projections = _projections(data)
+    middle = 0.5 * projections.shape[2]
+    described.center = (middle if center is None else number(center, "center")) - 0.5
+    options = _core.ReconstructOptions()
+    options.upsampling = int(upsampling)
+    field = _core.FieldOptions()
+    field.filter = choice(_core.RampWindow, _TOMOPY_FILTERS.get(filter_name, filter_name), "filter_name")
+    options.field = field
+    scan = _core.scan_of(projections, described)
+    slices = _core.slices(open_device(device), scan, options, progress)
+    # Our y points against the rows of tomopy's slices.
+    return np.ascontiguousarray(slices[: projections.shape[1], ::-1, :])
