@@ -450,15 +450,15 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const Room room = room_for(state, scan, options);
   const Inputs in{state, units, plan, selected, journalled, gold.arithmetic(), room, progress, watch};
   const double underflow = from_world(sampler_underflow(device.info()), units);
+  std::optional<BrickRefinement> refinement;
+  if (options.refinement) refinement.emplace(*options.refinement, units);
+  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   const auto sampler_of = [&](const FieldSlopes& of, std::int64_t atlas) {
-    return sampler_terms(of, plan.grid, probe, atlas, plan.epsilon_abs, plan.rates.gold, underflow);
+    return sampler_terms(of, plan.grid, probe, atlas, epsilon_abs, plan.rates.gold, underflow);
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
   // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
   const SamplerTerms reserved = with_reserve(sampler_of(slopes, longest_atlas(device.info())));
-  std::optional<BrickRefinement> refinement;
-  if (options.refinement) refinement.emplace(*options.refinement, units);
-  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   const double tolerance = node_tolerance(in, epsilon_abs, reserved);
   if (options.journal)
     options.journal->begin(journal_head(device, scan, plan, digest, options, gold.fine(), tolerance));
