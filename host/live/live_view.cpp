@@ -126,6 +126,8 @@ RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int6
   o.slice_range = view.slice_range;
   o.shading = view.shading;
   o.gradient = GradientKind::automatic;
+  // As `render` takes them.
+  if (o.mode == RenderMode::dvr) o.step_mode = StepMode::adaptive;
   o.sampler = scene.sampler;
   return o;
 }
@@ -147,7 +149,7 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
       add("--tf-range", fmt::format("{},{}", v.slice_range.first, v.slice_range.second));
     return words;
   }
-  if (v.mode == RenderMode::dvr) add("--step-mode", "fixed");
+  if (v.mode == RenderMode::dvr) add("--step-mode", "adaptive");
   if (v.mode == RenderMode::iso) add("--iso", fmt::format("{}", v.iso));
   if (!v.shading && v.mode != RenderMode::mip) words.emplace_back("--no-shading");
   // In full, so that nothing depends on what `render` frames by itself.

@@ -16,7 +16,7 @@ namespace vdvr {
 
 struct LiveFrame {
   Image image;
-  bool full = false;   ///< of the size asked for: nothing finer is to come
+  bool full = false;   ///< at rest: nothing finer is to come
   double seconds = 0;  ///< that it took, first use of a kernel included
 };
 

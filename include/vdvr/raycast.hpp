@@ -40,8 +40,8 @@ enum class GradientKind { automatic, central, stored, analytic };
 /// taken as linear: no transfer function is then too sharp for a step.
 enum class Classification { post, preintegrated };
 /// Mode dvr, with opacities corrected for it: one step throughout; step / 2^l in bricks of level l; or step
-/// / 2^l where the transfer function changes much along a step, l up to 4, so that steep ones draw no lines. Other
-/// modes and D2VR take adaptive for fixed.
+/// / 2^l where the transfer function changes much along a step, l up to 4, so that steep ones draw no lines.
+/// Other modes and D2VR take adaptive for fixed.
 enum class StepMode { fixed, level, adaptive };
 
 struct RenderOptions {

@@ -108,9 +108,12 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
          fmt::format("slice at {} = {:.4g}, through the dense part", "xyz"[axis], *o.slice_position));
   }
   if (thin) {
-    o.mode = RenderMode::mip;
+    // Gradients of a slab of two samples are noise.
+    o.mode = RenderMode::dvr;
+    o.step_mode = StepMode::adaptive;
+    o.shading = false;
     o.camera = orbit_camera(frame_view(volume, o, 0, 89), 0, 89, 1);
-    draw("dvr.png", "maximum along rays nearly parallel to the axis");
+    draw("dvr.png", "direct volume rendering without light, nearly along the axis");
   }
   out.error = error_slice(device, out.planned.scan, volume, out.built.certificate,
                           {2, out.built.certificate.worst_at[2], kPictureSide, kPictureSide}, progress);
