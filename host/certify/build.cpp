@@ -390,18 +390,18 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   double arithmetic = gold.arithmetic();
   for (const Crew::Kind& kind : kinds) arithmetic = std::max(arithmetic, kind.arithmetic);
   const Inputs in{state, units, plan, selected, journalled, gold, others, arithmetic, room, progress, watch};
+  std::optional<BrickRefinement> refinement;
+  if (options.refinement) refinement.emplace(*options.refinement, units);
+  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   const auto sampler_of = [&](const FieldSlopes& of, const auto& atlas) {
     return worst_terms(kinds, [&](const Crew::Kind& kind) {
-      return sampler_terms(of, plan.grid, kind.probe, atlas(kind.info), plan.epsilon_abs, plan.rates.gold,
+      return sampler_terms(of, plan.grid, kind.probe, atlas(kind.info), epsilon_abs, plan.rates.gold,
                            from_world(sampler_underflow(kind.info), units));
     });
   };
   // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
   // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
   const SamplerTerms reserved = with_reserve(sampler_of(slopes, longest_atlas));
-  std::optional<BrickRefinement> refinement;
-  if (options.refinement) refinement.emplace(*options.refinement, units);
-  const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   const double tolerance = node_tolerance(in, epsilon_abs, reserved);
   records.begin(journal_head(kinds, scan, plan, digest, options, gold.fine(), tolerance));
   int times = 0;
