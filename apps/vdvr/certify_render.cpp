@@ -55,8 +55,10 @@ CertifyPictureOptions certify_options(const Arguments& args) {
 
 /// The steps in which the picture is drawn are a part of its bound, so they are fine unless they were chosen.
 void refine_drawing(const Arguments& args, RenderOptions& o) {
-  if (!args.has("step") && !args.has("classification") && !args.has("step-mode"))
+  if (!args.has("step") && !args.has("classification") && !args.has("step-mode")) {
     o.classification = Classification::preintegrated;
+    o.step_mode = StepMode::fixed;  // a pre-integrated table is of one step
+  }
   o.termination = 1 - CertifyPictureOptions{}.theta;
   if (o.gradient == GradientKind::automatic) o.gradient = GradientKind::central;
 }
