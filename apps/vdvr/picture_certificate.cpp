@@ -18,6 +18,10 @@ constexpr const char* kFormat = "vdvr picture certificate 1";
 Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 double number_or(const Json& j, double none) { return j.is_null() ? none : j.get<double>(); }
 
+const char* text_of_steps(StepMode mode) {
+  return mode == StepMode::level ? "level" : mode == StepMode::adaptive ? "adaptive" : "fixed";
+}
+
 Json camera_json(const Camera& c) {
   return {{"position", c.position},
           {"focal_point", c.focal_point},
@@ -74,7 +78,7 @@ Json picture_json(const CertifiedPicture& picture) {
           {"background_bottom", o.background_bottom},
           {"step", o.step},
           {"classification", o.classification == Classification::post ? "post" : "preintegrated"},
-          {"step_mode", o.step_mode == StepMode::fixed ? "fixed" : "level"},
+          {"step_mode", text_of_steps(o.step_mode)},
           {"termination", o.termination},
           {"shading", o.shading},
           {"gradient", o.gradient == GradientKind::analytic ? "analytic" : "central"},
@@ -106,7 +110,10 @@ void read_picture(const Json& j, CertifiedPicture& picture) {
   o.step = j.at("step").get<double>();
   o.classification = j.at("classification").get<std::string>() == "post" ? Classification::post
                                                                          : Classification::preintegrated;
-  o.step_mode = j.at("step_mode").get<std::string>() == "fixed" ? StepMode::fixed : StepMode::level;
+  const auto steps = j.at("step_mode").get<std::string>();
+  o.step_mode = steps == "level"      ? StepMode::level
+                : steps == "adaptive" ? StepMode::adaptive
+                                      : StepMode::fixed;
   o.termination = j.at("termination").get<double>();
   o.shading = j.at("shading").get<bool>();
   o.gradient =
