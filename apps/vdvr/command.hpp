@@ -24,6 +24,7 @@ int render_command(Arguments& args);
 int export_command(Arguments& args);
 int convert_geometry_command(Arguments& args);
 int run_command(Arguments& args);
+int serve_command(Arguments& args);
 int bench_command(Arguments& args);
 
 }  // namespace vdvr::cli

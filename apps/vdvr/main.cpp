@@ -28,6 +28,7 @@ const std::vector<Command>& commands() {
       {"residual", "SCAN FILE -o OUT", "where no interpolation can explain the measured rays",
        residual_command},
       {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
+      {"serve", "FILE", "a volume in the browser, to be turned with the mouse", serve_command},
       {"export", "OUT.vdvr -o VOL", "a certified volume in the format of other programs", export_command},
       {"convert-geometry", "IN -o geometry.xml", "RTK's geometry file of a cone-beam scan",
        convert_geometry_command},

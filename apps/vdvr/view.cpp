@@ -69,11 +69,11 @@ TransferFunction transfer_for(const Arguments& args, const Brightness& b, const 
   return per_base_cell(std::move(f), grid);
 }
 
-void add_orbit(Arguments& args, const Orbit& fallback) {
+void add_orbit(Arguments& args, const Orbit& fallback, const std::string& what) {
   args.value("azimuth", "DEG",
              fmt::format("about z; 0 looks along -y with x to the right (default {})", fallback.azimuth))
       .value("elevation", "DEG", fmt::format("towards view-up, -z (default {})", fallback.elevation))
-      .value("zoom", "Z", fmt::format("1 fits the volume (default {})", fallback.zoom));
+      .value("zoom", "Z", fmt::format("1 fits {} (default {})", what, fallback.zoom));
 }
 
 Orbit orbit_options(const Arguments& args, const Orbit& fallback) {
@@ -83,7 +83,7 @@ Orbit orbit_options(const Arguments& args, const Orbit& fallback) {
 
 void add_free_camera(Arguments& args) {
   args.value("camera-position", "X,Y,Z", "the eye, instead of azimuth, elevation and zoom (default theirs)")
-      .value("camera-focal-point", "X,Y,Z", "default: the volume's centre")
+      .value("camera-focal-point", "X,Y,Z", "default: the middle of what is framed")
       .value(
           "camera-view-up", "X,Y,Z",
           "default 0,0,-1: detector row 0 is up; looking along z the y direction that leaves x to the right")
@@ -101,8 +101,25 @@ bool has_free_camera(const Arguments& args) {
   return std::any_of(names.begin(), names.end(), [&](const auto& name) { return args.has(name); });
 }
 
-Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit) {
-  const Camera camera = orbit_camera(grid, orbit.azimuth, orbit.elevation, orbit.zoom);
+void add_frame(Arguments& args) {
+  args.value("frame", "shown|grid",
+             "what zoom 1 fits: what the transfer function or the surfaces show, or the whole grid (default "
+             "shown; with --box grid)");
+}
+
+bool frames_grid(const Arguments& args) {
+  return args.choice("frame", {"shown", "grid"}, args.has("box") ? "grid" : "shown") == "grid";
+}
+
+OrbitFrame frame_for(const Arguments& args, const MixedVolume& volume, const RenderOptions& o,
+                     const Orbit& orbit) {
+  if (frames_grid(args) || o.mode == RenderMode::slice) return frame_grid(volume.grid);
+  return args.has("turntable") ? frame_turn(volume, o, orbit.elevation)
+                               : frame_view(volume, o, orbit.azimuth, orbit.elevation);
+}
+
+Camera camera_for(const Arguments& args, const OrbitFrame& frame, const Orbit& orbit) {
+  const Camera camera = orbit_camera(frame, orbit.azimuth, orbit.elevation, orbit.zoom);
   if (!has_free_camera(args)) return camera;
   return look_at(args.vec3("camera-position").value_or(camera.position),
                  args.vec3("camera-focal-point").value_or(camera.focal_point), args.vec3("camera-view-up"),

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "apps/vdvr/pictures.hpp"
+#include "vdvr/framing.hpp"
 
 namespace vdvr::cli {
 
@@ -28,14 +29,22 @@ const char* gradient_name(GradientKind kind);
 struct Orbit {
   double azimuth = 30, elevation = 20, zoom = 1;
 };
-/// Declares the three with `fallback` in their help.
-void add_orbit(Arguments& args, const Orbit& fallback);
+/// Declares the three with `fallback` in their help; zoom 1 fits `what`.
+void add_orbit(Arguments& args, const Orbit& fallback, const std::string& what);
 Orbit orbit_options(const Arguments& args, const Orbit& fallback);
 /// --camera-position, -focal-point, -view-up, -view-angle.
 void add_free_camera(Arguments& args);
 const std::vector<std::string>& free_camera_options();
 bool has_free_camera(const Arguments& args);
+/// --frame.
+void add_frame(Arguments& args);
+/// Throws InputError for another word than its two.
+bool frames_grid(const Arguments& args);
+/// What zoom 1 fits, by --frame: of one picture what `options` show from there, of a turntable what they show
+/// all around; the grid where that is nothing, and where its edges are drawn.
+OrbitFrame frame_for(const Arguments& args, const MixedVolume& volume, const RenderOptions& options,
+                     const Orbit& orbit);
 /// The free camera where one of its options was given, else the orbit.
-Camera camera_for(const Arguments& args, const Grid& grid, const Orbit& orbit);
+Camera camera_for(const Arguments& args, const OrbitFrame& frame, const Orbit& orbit);
 
 }  // namespace vdvr::cli

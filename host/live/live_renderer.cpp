@@ -97,9 +97,11 @@ struct LiveRenderer::Impl {
   }
 
   /// Mode error is the picture with its frame, as `render --mode error` draws it.
-  Image picture(const LiveView& v, std::int64_t width, std::int64_t height) {
+  Image picture(const LiveView& v, std::int64_t width, std::int64_t height, bool moving) {
     if (v.mode == RenderMode::error) return bounds_of_slice(v, width, height, true).image;
     RenderOptions o = options_of(v, scene, width, height);
+    // What steep transfer functions draw between even steps is gone when the picture rests.
+    if (moving) o.step_mode = StepMode::fixed;
     Image image = renderer.render(o).image;
     if (!v.bound) return image;
     if (is_flat(v)) {
@@ -132,15 +134,15 @@ LiveFrame LiveRenderer::draw(const LiveView& view, std::int64_t width, std::int6
         fmt::format("`size` {}x{}: each side must be 1 to {} pixels", width, height, kMostLivePixels));
   Impl::Kind& kind = impl_->kind_of(view);
   std::pair<std::int64_t, std::int64_t> size{width, height};
-  // A bound's slice is looked up on the host in no time, and its caption needs its size.
-  const bool looked_up = view.mode == RenderMode::error || (is_flat(view) && view.bound);
-  if (moving && !looked_up) size = kind.pace.size(width, height);
+  // A bound's slice is looked up on the host in no time, and its frame needs its size.
+  if (moving && view.mode != RenderMode::error) size = kind.pace.size(width, height);
   const auto start = std::chrono::steady_clock::now();
   LiveFrame frame;
-  frame.image = impl_->picture(view, size.first, size.second);
+  frame.image = impl_->picture(view, size.first, size.second, moving);
   frame.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  frame.full = size.first == width && size.second == height;
-  if (kind.seen++ > 0) kind.pace.observe(size.first * size.second, frame.seconds);
+  frame.full = !moving && size.first == width && size.second == height;
+  // Of a still frame steps are others, and so is its pace.
+  if (moving && kind.seen++ > 0) kind.pace.observe(size.first * size.second, frame.seconds);
   return frame;
 }
 

@@ -126,6 +126,8 @@ RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int6
   o.slice_range = view.slice_range;
   o.shading = view.shading;
   o.gradient = GradientKind::automatic;
+  // As `render` takes them.
+  if (o.mode == RenderMode::dvr) o.step_mode = StepMode::adaptive;
   o.sampler = scene.sampler;
   return o;
 }
@@ -139,20 +141,18 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
     words.push_back(value);
   };
   if (v.mode == RenderMode::slice || v.mode == RenderMode::error) {
+    // A viewer's controls stand around its slices.
+    if (v.mode == RenderMode::slice) words.emplace_back("--plain");
     add("--slice-axis", std::string(1, "xyz"[v.slice_axis]));
     add("--slice-position", fmt::format("{}", v.slice_position));
     if (v.mode == RenderMode::slice && v.slice_range.first < v.slice_range.second)
       add("--tf-range", fmt::format("{},{}", v.slice_range.first, v.slice_range.second));
     return words;
   }
+  if (v.mode == RenderMode::dvr) add("--step-mode", "adaptive");
   if (v.mode == RenderMode::iso) add("--iso", fmt::format("{}", v.iso));
   if (!v.shading && v.mode != RenderMode::mip) words.emplace_back("--no-shading");
-  if (v.pan[0] == 0 && v.pan[1] == 0) {
-    add("--azimuth", fmt::format("{}", v.azimuth_deg));
-    add("--elevation", fmt::format("{}", v.elevation_deg));
-    add("--zoom", fmt::format("{}", v.zoom));
-    return words;
-  }
+  // In full, so that nothing depends on what `render` frames by itself.
   const Camera c = camera_of(v, scene.grid);
   const auto vec = [](const Vec3& p) { return fmt::format("{},{},{}", p[0], p[1], p[2]); };
   add("--camera-position", vec(c.position));

@@ -16,6 +16,8 @@ void write_png(const std::filesystem::path& path, const Image& image) {
   io::write_file(path, encode_png(path, image));
 }
 
+std::string png_bytes(const Image& image) { return encode_png("a picture", image); }
+
 void write_npy(const std::filesystem::path& path, const FloatImage& image) {
   if (image.width < 1 || image.height < 1 || image.channels < 1 ||
       image.values.size() != static_cast<std::size_t>(image.width * image.height * image.channels))

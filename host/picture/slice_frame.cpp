@@ -69,19 +69,37 @@ std::string bar_label(const SliceFrame& f, const Layout& l) {
   return unit.empty() ? f.quantity : fmt::format("{} ({})", f.quantity, unit);
 }
 
-std::string title(const SliceFrame& f, const ShownUnit& unit) {
-  return fmt::format("{} = {} {}", "xyz"[f.axis], number_text(f.position * unit.factor), unit.name);
+std::string title(const SliceFrame& f, const Layout& l) {
+  return fmt::format("{} = {} {}", "xyz"[f.axis], number_text(f.position * l.across.factor), l.unit);
+}
+
+/// Round values between the ends of the window, which stand there as they are.
+Ticks values_of(const SliceFrame& f, int most) {
+  const double lo = f.colours.front().value, hi = f.colours.back().value;
+  const Ticks round = round_ticks(lo, hi, most);
+  if (!(hi > lo)) return round;
+  const double power = std::pow(10.0, round.exponent), near = 0.7 * (hi - lo) / most;
+  Ticks t{{{lo, number_text(lo / power)}}, round.exponent};
+  for (const Tick& tick : round.ticks)
+    if (tick.value - lo >= near && hi - tick.value >= near) t.ticks.push_back(tick);
+  t.ticks.push_back({hi, number_text(hi / power)});
+  return t;
 }
 
 /// The largest slice of its own proportions in the room that is left.
 SlicePlace fit(double left, double top, double room_x, double room_y, const Axis& across, const Axis& down) {
+  room_x = std::max(1.0, std::floor(room_x));
+  room_y = std::max(1.0, std::floor(room_y));
   const double pixel = std::max(across.length / room_x, down.length / room_y);
   SlicePlace p;
   p.framed = true;
-  p.width =
-      std::clamp<std::int64_t>(std::llround(across.length / pixel), 1, static_cast<std::int64_t>(room_x));
-  p.height =
-      std::clamp<std::int64_t>(std::llround(down.length / pixel), 1, static_cast<std::int64_t>(room_y));
+  // Rounded up: no row or column of the place has its middle outside of the grid.
+  const auto count = [&](double length, double room) {
+    const double pixels = std::ceil(length / pixel * (1 - 1e-12));
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(pixels), 1, static_cast<std::int64_t>(room));
+  };
+  p.width = count(across.length, room_x);
+  p.height = count(down.length, room_y);
   p.left = std::llround(left + (room_x - static_cast<double>(p.width)) / 2);
   p.top = std::llround(top + (room_y - static_cast<double>(p.height)) / 2);
   return p;
@@ -101,7 +119,7 @@ Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
   l.across = world_axis(f.grid, axes[0]);
   l.down = world_axis(f.grid, axes[1]);
   const ShownUnit unit = shown_unit(f.grid.unit, std::max(l.across.length, l.down.length));
-  l.unit = unit.name;
+  l.unit = fitted(unit.name, 6 * l.size, l.size);  // a file may call it anything
   l.bar_width = std::llround(0.9 * size);
   l.caption = wrapped(f.caption, w - 2 * size, 0.85 * size);
   if (f.caption_lines > 0) l.caption.resize(static_cast<std::size_t>(f.caption_lines));
@@ -111,15 +129,14 @@ Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
   // Labels take room, and room says how many labels there are: once with a guess, once with its outcome.
   double left = 6 * size, right = 7 * size;
   for (int pass = 0; pass < 2; ++pass) {
-    l.place = fit(left, top, std::max(1.0, w - left - right), std::max(1.0, room_y), l.across, l.down);
+    l.place = fit(left, top, w - left - right, room_y, l.across, l.down);
     set_ticks(l.across, unit, static_cast<double>(l.place.width), 4.5 * size);
     set_ticks(l.down, unit, static_cast<double>(l.place.height), 2.2 * size);
-    l.values = round_ticks(f.colours.front().value, f.colours.back().value,
-                           std::clamp(static_cast<int>(room_y / (2.2 * size)), 2, 7));
+    l.values = values_of(f, std::clamp(static_cast<int>(room_y / (2.2 * size)), 2, 7));
     left = size + cap + l.gap + widest(l.down.ticks, size) + l.gap + l.tick;
     right = size + static_cast<double>(l.bar_width) + l.tick + l.gap + widest(l.values, size) + 0.6 * size;
   }
-  l.place = fit(left, top, std::max(1.0, w - left - right), std::max(1.0, room_y), l.across, l.down);
+  l.place = fit(left, top, w - left - right, room_y, l.across, l.down);
   l.bar_left = l.place.left + l.place.width + std::llround(size);
   l.caption_top = h - caption - 0.4 * size;
   return l;
@@ -133,15 +150,23 @@ void draw_axes_around(Image& image, const Layout& l) {
   const auto along = [](const Axis& a, const Tick& t, std::int64_t pixels) {
     return (t.value / a.factor - a.low) / a.length * static_cast<double>(pixels);
   };
+  // A number that would touch the one before is left out; its tick stays.
+  double free_from = 0;
   for (const Tick& t : l.across.ticks.ticks) {
-    const double x = static_cast<double>(p.left) + along(l.across, t, p.width);
+    const double x = static_cast<double>(p.left) + along(l.across, t, p.width),
+                 wide = text_width(t.label, size);
     fill(image, std::llround(x - 0.5), p.top + p.height + 1, 1, tick, kInk);
-    draw_text(image, x - text_width(t.label, size) / 2,
-              static_cast<double>(p.top + p.height) + 1 + l.tick + l.gap, t.label, size, kInk);
+    if (x - wide / 2 < free_from) continue;
+    draw_text(image, x - wide / 2, static_cast<double>(p.top + p.height) + 1 + l.tick + l.gap, t.label, size,
+              kInk);
+    free_from = x + wide / 2 + 0.5 * size;
   }
+  free_from = 0;
   for (const Tick& t : l.down.ticks.ticks) {
     const double y = static_cast<double>(p.top) + along(l.down, t, p.height);
     fill(image, p.left - 1 - tick, std::llround(y - 0.5), tick, 1, kInk);
+    if (y - cap / 2 < free_from) continue;
+    free_from = y + cap / 2 + 0.3 * size;
     draw_text(image, static_cast<double>(p.left) - 1 - l.tick - l.gap - text_width(t.label, size),
               y - cap / 2, t.label, size, kInk);
   }
@@ -198,9 +223,11 @@ void draw_bar(Image& image, const SliceFrame& f, const Layout& l, std::int64_t w
     fill(image, x, std::llround(y - 0.5), static_cast<std::int64_t>(l.tick), 1, kInk);
     draw_text(image, static_cast<double>(x) + l.tick + l.gap, y - cap / 2, t.label, size, kInk);
   }
-  const std::string label = fitted(bar_label(f, l), 0.5 * static_cast<double>(width), size);
+  // Beside the title.
+  const double room = static_cast<double>(width - l.place.left) - text_width(title(f, l), size) - 2 * size;
+  const std::string label = fitted(bar_label(f, l), room, size);
   draw_text(image, static_cast<double>(width) - 0.6 * size - text_width(label, size),
-            std::max(0.4 * size, static_cast<double>(top) - line_height(size)), label, size, kInk);
+            std::max(0.4 * size, static_cast<double>(top) - line_height(size) - l.gap), label, size, kInk);
 }
 
 }  // namespace
@@ -219,10 +246,9 @@ Image framed_slice(const SliceFrame& f, const Image& slice, std::int64_t width, 
   draw_axes_around(image, l);
   draw_scale_bar(image, l);
   draw_bar(image, f, l, width);
-  const ShownUnit unit = shown_unit(f.grid.unit, std::max(l.across.length, l.down.length));
   draw_text(image, static_cast<double>(l.place.left),
-            std::max(0.4 * l.size, static_cast<double>(l.place.top) - line_height(l.size)), title(f, unit),
-            l.size, kInk);
+            std::max(0.4 * l.size, static_cast<double>(l.place.top) - line_height(l.size) - l.gap),
+            title(f, l), l.size, kInk);
   for (std::size_t i = 0; i < l.caption.size(); ++i)
     draw_text(image, l.size, l.caption_top + static_cast<double>(i) * line_height(0.85 * l.size),
               l.caption[i], 0.85 * l.size, kInk);

@@ -203,17 +203,14 @@ void draw_text_upwards(Image& image, double left, double bottom, std::string_vie
 
 std::string fitted(const std::string& text, double width, double size) {
   if (text_width(text, size) <= width) return text;
-  std::string kept = text;
-  while (!kept.empty()) {
-    // A whole character at a time.
-    do {
-      const bool inside = (static_cast<unsigned char>(kept.back()) & 0xc0) == 0x80;
-      kept.pop_back();
-      if (!inside) break;
-    } while (!kept.empty());
-    if (const std::string shown = kept + "…"; text_width(shown, size) <= width) return shown;
-  }
-  return "";
+  // Where characters begin; the widest part that fits is found by halving.
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if ((static_cast<unsigned char>(text[i]) & 0xc0) != 0x80) starts.push_back(i);
+  const auto shown = [&](std::size_t from) { return text.substr(0, from) + "…"; };
+  const auto fits = [&](std::size_t from) { return text_width(shown(from), size) <= width; };
+  const auto end = std::partition_point(starts.begin(), starts.end(), fits);
+  return end == starts.begin() ? "" : shown(*(end - 1));
 }
 
 std::vector<std::string> wrapped(const std::vector<std::string>& paragraphs, double width, double size) {

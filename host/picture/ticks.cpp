@@ -118,6 +118,12 @@ std::string per_unit(const std::string& unit) { return unit + "⁻¹"; }
 
 std::string times_power(int exponent) { return exponent == 0 ? "" : "×10" + superscript(exponent); }
 
-std::string number_text(double value) { return with_minus(fmt::format("{:.4g}", value)); }
+std::string number_text(double value) {
+  std::string text = with_minus(fmt::format("{:.4g}", value));
+  const std::size_t e = text.find('e');
+  if (e == std::string::npos) return text;
+  const int exponent = exponent_of(std::abs(value));
+  return with_minus(fmt::format("{:.4g}", value / std::pow(10.0, exponent))) + " " + times_power(exponent);
+}
 
 }  // namespace vdvr

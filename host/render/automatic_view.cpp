@@ -7,6 +7,7 @@
 #include <array>
 
 #include "vdvr/error.hpp"
+#include "vdvr/framing.hpp"
 
 namespace vdvr {
 
@@ -141,7 +142,8 @@ RenderOptions automatic_view(const MixedVolume& volume, const std::optional<Cert
   o.surfaces = {{bright.threshold}};
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.slice_position = bright.dense_center[static_cast<std::size_t>(o.slice_axis)];
-  o.camera = orbit_camera(volume.grid, 30, 20, 1);
+  o.camera = orbit_camera(frame_view(volume, o, 30, 20), 30, 20, 1);
+  o.step_mode = StepMode::adaptive;
   o.sampler = safe_sampler(o.sampler, certificate);
   return o;
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "shared/raycast_params.h"
+
 namespace vdvr {
 namespace {
 
@@ -37,12 +39,14 @@ void append_opacities(std::vector<cl_float4>& rows, const std::vector<float>& op
 template <class Shows>
 std::vector<std::uint8_t> stretches(int size, Shows&& shows) {
   std::vector<std::uint8_t> result;
-  std::uint8_t number = 1;
+  int number = 1;
+  bool was_empty = false;
   for (int i = 0; i < size; ++i) {
     const bool empty = !shows(i);
-    // At most every other entry starts one: 128.
-    if (!empty && !result.empty() && result.back() != 0) ++number;
-    result.push_back(empty ? number : std::uint8_t{0});
+    if (!empty && was_empty) ++number;
+    was_empty = empty;
+    // There may be more than a byte counts; the others are looked into as if they showed something.
+    result.push_back(static_cast<std::uint8_t>(empty && number < 256 ? number : 0));
   }
   return result;
 }
@@ -131,6 +135,28 @@ BakedTransfer bake(const TransferFunction& transfer, double step, int levels) {
   // One number for all: samples are single values.
   for (int i = 0; i < kTableSize; ++i)
     t.stretch.push_back(opacities[static_cast<std::size_t>(i)] > 0 ? 0 : 1);
+  return t;
+}
+
+BakedTransfer bake_adaptive(const TransferFunction& transfer, double step) {
+  BakedTransfer t = bake(transfer, step, VDVR_ADAPTED_LEVELS);
+  const auto entry = [&](int i) {
+    const cl_float4& e = t.rows[static_cast<std::size_t>(i)];
+    return std::array<float, 4>{e.s[3] * e.s[0], e.s[3] * e.s[1], e.s[3] * e.s[2], e.s[3]};
+  };
+  std::vector<float> sums{0};
+  for (int i = 1; i < t.size; ++i) {
+    const auto a = entry(i - 1), b = entry(i);
+    float change = 0;
+    for (std::size_t c = 0; c < 4; ++c) change = std::max(change, std::abs(b[c] - a[c]));
+    sums.push_back(sums.back() + change);
+  }
+  append_opacities(t.rows, sums);
+  // Between two clear stretches lies something that a step may pass.
+  t.stretch = stretches(t.size, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    return entry(i)[3] > 0 || (i + 1 < t.size && sums[k + 1] > sums[k]);
+  });
   return t;
 }
 

@@ -75,12 +75,14 @@ void check_options(const RenderOptions& o) {
     throw InputError(fmt::format("termination opacity {} must lie in (0, 1]", o.termination));
   if (o.mode == RenderMode::iso) check_surfaces(o.surfaces);
   check_lights(o.lights);
+  // Adaptive steps are a default, which the other modes have no use for.
   if (o.mode != RenderMode::dvr &&
-      (o.classification != Classification::post || o.step_mode != StepMode::fixed))
+      (o.classification != Classification::post || o.step_mode == StepMode::level))
     throw InputError("`classification` and `step_mode` apply to `mode` dvr");
-  if (o.classification == Classification::preintegrated && o.step_mode == StepMode::level)
+  if (o.classification == Classification::preintegrated && o.step_mode != StepMode::fixed)
     throw InputError(
-        "`step_mode` level does not apply to `classification` preintegrated, whose table is of one step");
+        "`step_mode` level or adaptive does not apply to `classification` preintegrated, whose table is of "
+        "one step");
   if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
     throw InputError("`show` normal does not apply to `mode` mip: a maximum has no surface");
   if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);

@@ -314,7 +314,7 @@ void check_dvr(const RenderOptions& o) {
   if (o.mode != RenderMode::dvr) refuse("`method` d2vr does not draw this `mode`");
   if (o.classification != Classification::post)
     refuse("`classification` preintegrated does not apply to `method` d2vr");
-  if (o.step_mode != StepMode::fixed) refuse("`step_mode` level does not apply to `method` d2vr");
+  if (o.step_mode == StepMode::level) refuse("`step_mode` level does not apply to `method` d2vr");
   if (o.gradient == GradientKind::stored)
     refuse("`gradient` stored does not apply to `method` d2vr, which has no stored samples");
   if (o.sampler == SamplerKind::image3d) refuse("`sampler` image3d does not apply to `method` d2vr");

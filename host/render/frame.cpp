@@ -85,14 +85,16 @@ void Frame::fit_picture(const RenderOptions& o) {
 void Frame::bake_table(const RenderOptions& o) {
   const bool dvr = o.mode == RenderMode::dvr;
   const bool square = dvr && o.classification == Classification::preintegrated;
+  const bool adaptive = dvr && o.step_mode == StepMode::adaptive;
   const int levels = dvr && o.step_mode == StepMode::level ? field_.highest_level + 1 : 1;
-  std::vector<double> key{square ? 1.0 : 0.0, static_cast<double>(levels), o.step};
+  std::vector<double> key{square ? 1.0 : adaptive ? 2.0 : 0.0, static_cast<double>(levels), o.step};
   for (const TransferPoint& p : o.transfer.points)
     key.insert(key.end(), {p.value, p.rgb[0], p.rgb[1], p.rgb[2], p.opacity});
   if (key == table_key_) return;
   table_key_.clear();  // should what follows throw
-  baked_ =
-      square ? bake_preintegrated(o.transfer, o.step, field_.value_range) : bake(o.transfer, o.step, levels);
+  baked_ = square     ? bake_preintegrated(o.transfer, o.step, field_.value_range)
+           : adaptive ? bake_adaptive(o.transfer, o.step)
+                      : bake(o.transfer, o.step, levels);
   if (table_.size() != baked_.rows.size()) {
     table_ = {};
     table_ = DeviceArray<cl_float4>(*field_.state, baked_.rows.size(), "transfer function");

@@ -1,6 +1,6 @@
 // Launches the ray-caster over resident volumes: chooses sampler, gradients and packets. Called by
-// renderer.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_iso, raycast_mip, slice
-// of kernels/render/raycast.cl.
+// renderer.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive,
+// raycast_iso, raycast_mip, slice of kernels/render/raycast.cl.
 #include "host/render/raycast.hpp"
 
 #include <fmt/format.h>
@@ -98,6 +98,7 @@ KernelName kernel_of(const RenderOptions& o) {
   if (o.classification == Classification::preintegrated)
     return {"raycast_preintegrated", "VDVR_KERNEL_PREINTEGRATED"};
   if (o.step_mode == StepMode::level) return {"raycast_level", "VDVR_KERNEL_LEVEL"};
+  if (o.step_mode == StepMode::adaptive) return {"raycast_adaptive", "VDVR_KERNEL_ADAPTIVE"};
   return {"raycast_dvr", "VDVR_KERNEL_DVR"};
 }
 

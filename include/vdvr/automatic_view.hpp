@@ -42,8 +42,9 @@ VDVR_API std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densiti
 VDVR_API SamplerKind safe_sampler(SamplerKind asked, const std::optional<Certificate>& certificate);
 
 /// All of it: two materials, an iso-surface at the threshold, the grey window and the middle of the dense
-/// part for slices, the whole volume seen at azimuth 30 and elevation 20 degrees, the safe sampler.
-/// Everything else as RenderOptions has it. Cost: brightness_of.
+/// part for slices, all that the transfer function shows seen at azimuth 30 and elevation 20 degrees
+/// (framing.hpp), steps adapted to the picture, the safe sampler. Everything else as RenderOptions has it.
+/// Cost: brightness_of and shown_points.
 VDVR_API RenderOptions automatic_view(const MixedVolume& volume,
                                       const std::optional<Certificate>& certificate = {});
 

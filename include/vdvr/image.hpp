@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "vdvr/export.hpp"
@@ -25,6 +26,8 @@ struct FloatImage {
 /// Each is written whole or not at all. Throws InputError (size), ResourceError (disk) or FileError (folder
 /// missing, not writable).
 VDVR_API void write_png(const std::filesystem::path& path, const Image& image);
+/// The bytes of the same file. Throws InputError (size) or ResourceError (memory).
+VDVR_API std::string png_bytes(const Image& image);
 /// NumPy's format 1.0: float32, little-endian, shape (height, width) or, of several channels,
 /// (height, width, channels), C order.
 VDVR_API void write_npy(const std::filesystem::path& path, const FloatImage& image);

@@ -16,7 +16,7 @@ namespace vdvr {
 
 struct LiveFrame {
   Image image;
-  bool full = false;   ///< of the size asked for: nothing finer is to come
+  bool full = false;   ///< at rest: nothing finer is to come
   double seconds = 0;  ///< that it took, first use of a kernel included
 };
 
@@ -51,8 +51,9 @@ class VDVR_API LiveRenderer {
   [[nodiscard]] const LiveScene& scene() const;
   /// One frame. Moving: as many pixels of the shape width x height as measured times allow within the budget.
   /// At rest: all of them, and but for the bound's colours the picture that `vdvr render` draws (options_of),
-  /// to the bit. With the bound's colours each pixel is the mean of that picture and of bound_picture() of
-  /// the same view. Throws InputError (check_view, sides of 1 to kMostLivePixels) and as Renderer::render.
+  /// to the bit. With the bound's colours each pixel is the mean of that picture and of bound_picture() or
+  /// bound_slice() of the same view. Throws InputError (check_view, sides of 1 to kMostLivePixels) and as
+  /// Renderer::render.
   LiveFrame draw(const LiveView& view, std::int64_t width, std::int64_t height, bool moving);
 
  private:

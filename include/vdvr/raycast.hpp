@@ -39,8 +39,10 @@ enum class GradientKind { automatic, central, stored, analytic };
 /// Mode dvr: colour and opacity of each sample, or of the path between two samples, along which the field is
 /// taken as linear: no transfer function is then too sharp for a step.
 enum class Classification { post, preintegrated };
-/// Mode dvr: one step throughout, or step / 2^l in bricks of level l, with opacities corrected for it.
-enum class StepMode { fixed, level };
+/// Mode dvr, with opacities corrected for it: one step throughout; step / 2^l in bricks of level l; or step
+/// / 2^l where the transfer function changes much along a step, l up to 4, so that steep ones draw no lines.
+/// Other modes and D2VR take adaptive for fixed.
+enum class StepMode { fixed, level, adaptive };
 
 struct RenderOptions {
   RenderMode mode = RenderMode::dvr;
@@ -50,7 +52,7 @@ struct RenderOptions {
   TransferFunction transfer;
   double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it; iso needs none
   Classification classification = Classification::post;
-  StepMode step_mode = StepMode::fixed;                  ///< level not with preintegrated
+  StepMode step_mode = StepMode::fixed;                  ///< the others not with preintegrated
   std::vector<IsoSurface> surfaces;                      ///< of mode iso, in any order
   int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;                  ///< world; default the middle

@@ -38,6 +38,8 @@
 #include "device/raycast_preintegrated.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_LEVEL
 #include "device/raycast_level.h"
+#elif VDVR_KERNEL == VDVR_KERNEL_ADAPTIVE
+#include "device/raycast_adaptive.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_ISO
 #include "device/raycast_iso.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_MIP

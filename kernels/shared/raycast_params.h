@@ -13,6 +13,14 @@
 #define VDVR_KERNEL_MIP 5
 #define VDVR_KERNEL_SLICE 6
 #define VDVR_KERNEL_POINTS 7
+#define VDVR_KERNEL_ADAPTIVE 8
+
+// A step adapted to the picture has 2^l parts, l below this.
+#define VDVR_ADAPTED_LEVELS 5
+// What a part may change of a pixel, full opacity and full colour being 1, before there are twice as many.
+#ifndef VDVR_PART_CHANGE
+#define VDVR_PART_CHANGE 0.03125f
+#endif
 
 #define VDVR_SURFACES 8
 

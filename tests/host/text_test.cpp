@@ -174,6 +174,8 @@ BOOST_AUTO_TEST_CASE(lengths_are_round_and_units_are_read_easily) {
   BOOST_TEST(shown_unit("um", 2500).factor == 1e-3);
   BOOST_TEST(times_power(-12) == "×10⁻¹²");
   BOOST_TEST(times_power(0) == "");
+  BOOST_TEST(number_text(-1.2346e10) == "−1.235 ×10¹⁰");
+  BOOST_TEST(number_text(0.0456) == "0.0456");
 }
 
 BOOST_AUTO_TEST_CASE(a_frame_keeps_every_pixel_of_its_slice_and_draws_around_it) {
@@ -188,13 +190,13 @@ BOOST_AUTO_TEST_CASE(a_frame_keeps_every_pixel_of_its_slice_and_draws_around_it)
         BOOST_REQUIRE(p.framed);
         BOOST_REQUIRE((p.width >= 1 && p.height >= 1 && p.left > 1 && p.top > 1));
         BOOST_REQUIRE((p.left + p.width < width && p.top + p.height < height));
-        // Square pixels, to the rounding of a side.
+        // Square pixels, to the rounding up of a side.
         const std::size_t a = axis == 0 ? 1 : 0, d = axis == 2 ? 1 : 2;
         const double sides = static_cast<double>(grid.cells[a]) * grid.spacing[a] /
                              (static_cast<double>(grid.cells[d]) * grid.spacing[d]);
-        BOOST_TEST((std::abs(static_cast<double>(p.width) - sides * static_cast<double>(p.height)) <=
-                        0.5 * (1 + sides) ||
-                    p.height == 1 || p.width == 1));
+        BOOST_TEST(
+            (std::abs(static_cast<double>(p.width) - sides * static_cast<double>(p.height)) <= 1 + sides ||
+             p.height == 1 || p.width == 1));
         Image slice = blank(p.width, p.height, {200, 10, 90});
         const Image image = framed_slice(frame, slice, width, height);
         BOOST_REQUIRE((image.width == width && image.height == height));
@@ -211,6 +213,34 @@ BOOST_AUTO_TEST_CASE(a_frame_keeps_every_pixel_of_its_slice_and_draws_around_it)
         BOOST_TEST(around > 100);
         BOOST_TEST(edge == 0);  // nothing is cut off
       }
+}
+
+BOOST_AUTO_TEST_CASE(every_row_and_column_of_the_place_lies_in_the_grid) {
+  for (const auto& [x, y] :
+       {std::pair<std::int64_t, std::int64_t>{8, 75}, {75, 8}, {1000, 7}, {3, 1000}, {96, 95}})
+    for (std::int64_t height = 300; height < 700; height += 17) {
+      const Grid grid = grid_of({x, y, 4}, {1, 1, 1}, {0, 0, 0}, "pixel");
+      const SlicePlace p = slice_place(frame_of(grid, 2), 512, height);
+      // As the slice is drawn: square pixels, centred.
+      const double a = static_cast<double>(x), b = static_cast<double>(y), w = static_cast<double>(p.width),
+                   h = static_cast<double>(p.height), pixel = std::max(a / w, b / h);
+      BOOST_TEST((a / 2 + (0.5 - w / 2) * pixel >= -tolerance::fp64_sum(8, a + b)));
+      BOOST_TEST((b / 2 + (0.5 - h / 2) * pixel >= -tolerance::fp64_sum(8, a + b)));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(absurd_units_and_values_stay_within_the_picture) {
+  const Grid grid = grid_of({96, 96, 60}, {1e-3, 1e-3, 1e-3}, {12345678, -96, -60}, std::string(90, 'w'));
+  SliceFrame frame = frame_of(grid, 2);
+  frame.unit = std::string(300, 'q');
+  frame.colours = grey_window({-1.2345e19, 3.3e20});
+  const SlicePlace p = slice_place(frame, 512, 512);
+  const Image image = framed_slice(frame, blank(p.width, p.height, {90, 90, 90}), 512, 512);
+  std::int64_t edge = 0;
+  for (std::int64_t i = 0; i < 512; ++i)
+    for (const std::int64_t at : {i, 511 * 512 + i, 512 * i, 512 * i + 511})
+      edge += image.rgb[static_cast<std::size_t>(3 * at)] != 255;
+  BOOST_TEST(edge == 0);
 }
 
 BOOST_AUTO_TEST_CASE(a_small_picture_is_the_slice_alone) {

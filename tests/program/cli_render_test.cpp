@@ -45,6 +45,7 @@ BOOST_AUTO_TEST_CASE(projections_are_drawn_only_as_d2vr_can) {
   for (const char* mode : {"iso", "mip", "slice"}) d2vr({"--mode", mode}, "--mode dvr");
   d2vr({"--classification", "preintegrated"}, "--classification");
   d2vr({"--step-mode", "level"}, "--step-mode");
+  d2vr({"--step-mode", "adaptive"}, "--step-mode");
   d2vr({"--gradient", "stored"}, "--gradient");
   d2vr({"--sampler", "image3d"}, "--sampler");
   check_refused({"render", "x.vdvr", "-o", at("d2vr.png"), "--cells", "4x4x4"}, "--method d2vr");
@@ -67,6 +68,8 @@ BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
   render("x.npy", {"--axes"}, "--axes");
   render("x.png", {"--mode", "slice", "--box"}, "--box");
   render("x.png", {"--mode", "slice", "--azimuth", "3"}, "--azimuth");
+  render("x.png", {"--mode", "slice", "--frame", "grid"}, "--frame");
+  render("x.png", {"--frame", "all"}, "--frame");
   render("x.png", {"--mode", "iso", "--colorbar"}, "--colorbar");
   render("x.png", {"--mode", "iso", "--tf", "bone"}, "--tf");
   render("x.png", {"--mode", "mip", "--no-shading"}, "--no-shading");
@@ -82,6 +85,7 @@ BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
   render("x.png", {"--mode", "iso", "--step-mode", "level"}, "--step-mode");
   render("x.png", {"--mode", "slice", "--classification", "post"}, "--classification");
   render("x.png", {"--classification", "preintegrated", "--step-mode", "level"}, "--step-mode");
+  render("x.png", {"--classification", "preintegrated", "--step-mode", "adaptive"}, "--step-mode");
   render("x.png", {"--background", "0.5,0.5"}, "--background");
 }
 
@@ -119,6 +123,7 @@ BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
   draw("ramp.png",
        {"--light", "head", "--light", "1,0,-1", "--gradient", "analytic", "--step-mode", "level"});
   draw("ramp.png", {"--classification", "preintegrated"});
+  draw("ramp.png", {"--step-mode", "fixed", "--frame", "grid"});
   draw("ramp.apng", {"--turntable", "3", "--tf", "grey", "--tf-range", "0,63"});
   draw("ramp.gif", {"--turntable", "3"});
   BOOST_TEST(bytes_of(at("ramp.gif")).rfind("GIF89a", 0) == 0);

@@ -73,6 +73,13 @@ for name, words in {
 }.items():
     run("render", "theirs.vdvr", "-o", "picture.png", *size, *words)
     assert np.array_equal(np.asarray(Image.open("picture.png").convert("RGB")), space[name]), name
+for words in (["--mode", "slice", "--plain"], ["--mode", "error"]):
+    run("render", "theirs.vdvr", "-o", "picture.png", "--size", "512x512", *words)
+    drawn = volume.render(size=(512, 512), mode=words[1])
+    assert np.array_equal(np.asarray(Image.open("picture.png").convert("RGB")), drawn), words
+run("render", "theirs.vdvr", "-o", "bounds.npy", *size, "--mode", "error")
+drawn = volume.render(size=(320, 240), mode="error", values=True)
+assert np.array_equal(np.load("bounds.npy"), drawn, equal_nan=True)
 assert space["picture"].std() > 5, "the picture shows nothing"
 run("render", "theirs.vdvr", "-o", "errors.npy", *size, "--show", "error")
 assert np.array_equal(np.load("errors.npy"), space["errors"], equal_nan=True)

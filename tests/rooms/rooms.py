@@ -20,6 +20,7 @@ KERNEL_HEADERS = {"shared", "device"}
 SEVERAL_SOURCES = {
     "host/opencl/state.hpp": ["device.cpp", "program.cpp", "codes.cpp"],
     "host/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
+    "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
     "host/opencl/device_end.hpp": ["device.cpp"],
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)

@@ -231,7 +231,7 @@ int bench_render(Arguments& args) {
   args.value("frames", "60", "over a full turn (default 60)").value("size", "512x512", "pixels");
   constexpr Orbit first{0, 20, 1};
   add_transfer(args);
-  add_orbit(args, first);
+  add_orbit(args, first, "the volume");
   args.value("sampler", "auto|image3d|buffer", "default auto");
   args.value("step", "S", "in base cells (default 1)");
   args.value("gradient", "auto|central|stored|analytic", "as `render` takes it (default auto)")

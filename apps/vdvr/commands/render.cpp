@@ -45,7 +45,10 @@ void add_options(Arguments& args) {
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
       .value("step", "S", "of dvr and mip, in base cells (default 1); iso goes from cell to cell")
-      .value("step-mode", "fixed|level", "of dvr; level: step / 2^l in bricks of level l (default fixed)")
+      .value(
+          "step-mode", "adaptive|fixed|level",
+          "of dvr; adaptive: finer steps where the transfer function changes much along one; level: step / "
+          "2^l in bricks of level l (default adaptive; of preintegrated and d2vr fixed)")
       .value("classification", "post|preintegrated",
              "of dvr; post: colour of each sample; preintegrated: of the path between two (default post)")
       .value(
@@ -62,7 +65,8 @@ void add_options(Arguments& args) {
   add_scan(args);
   add_projection_options(args);
   args.group("Camera");
-  add_orbit(args, kOrbit);
+  add_orbit(args, kOrbit, "what is shown");
+  add_frame(args);
   add_free_camera(args);
   add_overlay(args);
 }
@@ -120,6 +124,15 @@ std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
   return iso_surfaces(values, args.numbers("iso-opacity", args.has("iso-opacity") ? values.size() : 0));
 }
 
+/// Steps adapt where they can.
+StepMode step_mode_option(const Arguments& args, const RenderOptions& o) {
+  const bool can =
+      o.mode == RenderMode::dvr && o.classification == Classification::post && method_option(args) != "d2vr";
+  const std::string asked =
+      args.choice("step-mode", {"adaptive", "fixed", "level"}, can ? "adaptive" : "fixed");
+  return asked == "adaptive" ? StepMode::adaptive : asked == "level" ? StepMode::level : StepMode::fixed;
+}
+
 /// Everything that the words alone decide; what depends on the volume is filled in by `complete`.
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
@@ -135,11 +148,10 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
-  o.step_mode =
-      args.choice("step-mode", {"fixed", "level"}, "fixed") == "level" ? StepMode::level : StepMode::fixed;
   o.classification = args.choice("classification", {"post", "preintegrated"}, "post") == "preintegrated"
                          ? Classification::preintegrated
                          : Classification::post;
+  o.step_mode = step_mode_option(args, o);
   const std::string output = args.choice("show", kOutputs, "colour");
   o.output = output == "depth"    ? RenderOutput::depth
              : output == "normal" ? RenderOutput::normal
@@ -175,12 +187,13 @@ void check_d2vr(const Arguments& args, const RenderOptions& o) {
 void check_combination(const Arguments& args, const RenderOptions& o) {
   if (method_option(args) == "d2vr") check_d2vr(args, o);
   const bool flat = o.mode == RenderMode::slice || o.mode == RenderMode::error;
+  frames_grid(args);
   if (has_free_camera(args))
     refuse(args, {"azimuth", "elevation", "zoom", "turntable"}, "excludes the --camera- options");
   if (flat) refuse(args, free_camera_options(), "a slice has no camera");
   if (flat)
     refuse(args,
-           {"azimuth", "elevation", "zoom", "turntable", "tf", "iso", "step", "no-shading", "show",
+           {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading", "show",
             "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
   // What a slice takes of it is the window; an error picture's colours always run to epsilon.
@@ -189,9 +202,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (o.mode == RenderMode::mip)
     refuse(args, {"no-shading", "gradient", "light"}, "does not apply to --mode mip, which has no light");
   if (o.mode != RenderMode::dvr) refuse(args, {"step-mode", "classification"}, "applies to --mode dvr");
-  if (o.step_mode == StepMode::level && o.classification == Classification::preintegrated)
+  if (o.step_mode != StepMode::fixed && o.classification == Classification::preintegrated)
     throw InputError(
-        "--step-mode level does not apply to --classification preintegrated, whose table is of one step");
+        fmt::format("--step-mode {} does not apply to --classification preintegrated, whose table is of one "
+                    "step",
+                    args.text("step-mode")));
   if (o.mode != RenderMode::iso) refuse(args, {"iso", "iso-opacity"}, "applies to --mode iso");
   if (o.output != RenderOutput::colour)
     refuse(args, {"axes", "box", "colorbar", "background", "no-shading", "light"},
@@ -284,6 +299,7 @@ struct Stage {
   Source& source;
   const Overlay& overlay;
   bool certified;
+  OrbitFrame frame;
 
   [[nodiscard]] RenderResult draw(const RenderOptions& o) const {
     return render_with_overlay(source, o, overlay, certified);
@@ -299,7 +315,7 @@ RenderResult turn(const Arguments& args, const Stage& stage, RenderOptions o, st
     report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
     Orbit orbit = orbit_options(args, kOrbit);
     orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
-    o.camera = camera_for(args, stage.source.scene().volume.grid, orbit);
+    o.camera = camera_for(args, stage.frame, orbit);
     last = stage.draw(o);
     take(f, last.image);
   }
@@ -403,12 +419,14 @@ int render_command(Arguments& args) {
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   o.slice_range = given_range(args).value_or(std::pair{bright.grey_lo, bright.grey_hi});
   o.sampler = safe_sampler(o.sampler, scene.certificate);
-  o.camera = camera_for(args, scene.volume.grid, orbit_options(args, kOrbit));
+  const Orbit orbit = orbit_options(args, kOrbit);
+  const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
+  o.camera = camera_for(args, frame, orbit);
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr";
   o.skip_empty = !args.has("no-skip");
 
-  const Stage stage{source, overlay, certified};
+  const Stage stage{source, overlay, certified, frame};
   const RenderResult result =
       kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
       : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())

@@ -16,6 +16,7 @@
 #include "apps/vdvr/verification.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
+#include "vdvr/framing.hpp"
 #include "vdvr/output_file.hpp"
 
 namespace vdvr::cli {
@@ -63,7 +64,6 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   o.transfer = two_material_transfer(bright);
   o.surfaces = {{bright.threshold}};
   o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
-  o.camera = orbit_camera(volume.grid, 40, 15, 1.5);
   const auto draw = [&](const std::string& name, const std::string& what) {
     report(progress, "render", 0);
     RenderOptions drawn = o;
@@ -86,8 +86,9 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   const bool thin = is_thin(volume.grid);
   if (!thin) {
     o.mode = RenderMode::dvr;
-    o.step = 0.25;  // at a step of a cell surfaces in noise show the grain of the samples
-    draw("dvr.png", "direct volume rendering, four samples a cell");
+    o.step_mode = StepMode::adaptive;
+    o.camera = orbit_camera(frame_view(volume, o, 40, 15), 40, 15, 1);
+    draw("dvr.png", "direct volume rendering");
     RenderOptions bound = o;
     bound.output = RenderOutput::error;
     bound.height -= kErrorCaption;
@@ -96,6 +97,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
               bound_picture(renderer.render(bound).values, out.built.certificate.epsilon_abs));
     out.files.emplace_back("bound.png", "how far the samples behind each pixel of dvr.png can lie from F");
     o.mode = RenderMode::iso;
+    o.camera = orbit_camera(frame_view(volume, o, 40, 15), 40, 15, 1);
     draw("iso.png", fmt::format("iso-surface at {:.4g}", bright.threshold));
   }
   o.mode = RenderMode::slice;
@@ -106,9 +108,12 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
          fmt::format("slice at {} = {:.4g}, through the dense part", "xyz"[axis], *o.slice_position));
   }
   if (thin) {
-    o.mode = RenderMode::mip;
-    o.camera = orbit_camera(volume.grid, 0, 89, 1.4);
-    draw("dvr.png", "maximum along rays nearly parallel to the axis");
+    // Gradients of a slab of two samples are noise.
+    o.mode = RenderMode::dvr;
+    o.step_mode = StepMode::adaptive;
+    o.shading = false;
+    o.camera = orbit_camera(frame_view(volume, o, 0, 89), 0, 89, 1);
+    draw("dvr.png", "direct volume rendering without light, nearly along the axis");
   }
   out.error = error_slice(device, out.planned.scan, volume, out.built.certificate,
                           {2, out.built.certificate.worst_at[2], kPictureSide, kPictureSide}, progress);

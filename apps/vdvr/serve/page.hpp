@@ -1,0 +1,11 @@
+// The page of `vdvr serve`, embedded by cmake/EmbedPage.cmake.
+#pragma once
+
+#include <string_view>
+
+namespace vdvr::cli {
+
+/// The text of "page.html", "page.js" or "page.css"; empty for any other name.
+std::string_view page_file(std::string_view name);
+
+}  // namespace vdvr::cli

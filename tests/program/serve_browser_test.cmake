@@ -1,0 +1,16 @@
+# vdvr serve in headless Chromium, driven by websocket-client, which is fetched into the build.
+# cmake -DVENV=... -DVDVR=... -P serve_browser_test.cmake
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_program(CHROMIUM chromium)
+if(NOT CHROMIUM)
+  message("serve_browser_test skipped: no chromium")
+  return()
+endif()
+find_python_with(serve_browser_test 120 websocket-client)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/serve_browser.py" "${VDVR}" "${CHROMIUM}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "serve_browser.py failed")
+endif()
