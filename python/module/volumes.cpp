@@ -135,8 +135,8 @@ nb::object error_picture(HeldVolume& held, const RenderOptions& o, bool values) 
   const MixedVolume& v = held.file().volume;
   ErrorSlice slice;
   run_long(nb::none(), [&](const Progress&) {
-    const ErrorSliceOptions options{o.slice_axis, o.slice_position.value(), o.width,
-                                    o.height + (values ? kErrorCaption : 0)};
+    // Values have no frame.
+    const ErrorSliceOptions options{o.slice_axis, o.slice_position.value(), o.width, o.height, !values};
     slice = bound_slice(v, held.file().certificate, false, options);
   });
   return values ? values_of(std::move(slice.errors)) : picture_of(std::move(slice.image));

@@ -141,7 +141,8 @@ class Volume:
         values: bool = False,
         device: DeviceLike = None,
     ) -> "NDArray[Any]":
-        """One picture: uint8 [y, x, 3], sRGB, row 0 on top. That of `vdvr render` with the same options.
+        """One picture: uint8 [y, x, 3], sRGB, row 0 on top. That of `vdvr render` with the same options;
+        a slice that of `--plain`, without a frame.
 
         Parameters
         ----------

@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+"""What users of the module rely on beside the page: recon, errors, interruption, threads.
+
+  module.py
+"""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import vdvr
+from skimage.transform import iradon
+
+rng = np.random.default_rng(1)
+
+
+def raises(kind, text, call):
+    try:
+        call()
+    except kind as error:
+        assert text in str(error), f"'{text}' is not in: {error}"
+        return
+    raise SystemExit(f"{kind.__name__} was not raised")
+
+
+# --- recon against iradon: an object without symmetry, on an odd detector ---
+views, columns = 90, 41
+theta = np.linspace(0, np.pi, views, endpoint=False)
+u = np.arange(columns) - 20.0
+sinogram = np.zeros((views, columns))
+for x, y, radius, density in ((6, 3, 5, 1.0), (-7, 4, 3, 0.6), (2, -9, 4, 0.8)):
+    away = u[None, :] - (x * np.cos(theta) - y * np.sin(theta))[:, None]
+    sinogram += 2 * density * np.sqrt(np.maximum(0, radius**2 - away**2))
+tomo = np.repeat(sinogram[:, None, :], 2, axis=1)
+theirs = iradon(sinogram.T, theta=np.rad2deg(theta), filter_name="ramp", interpolation="linear", circle=True)
+ys, xs = np.mgrid[:columns, :columns] - 20
+inside = xs**2 + ys**2 <= 19**2
+plain = vdvr.recon(tomo, theta, upsampling=1)[1]
+# float32 of `views` terms, each at most the largest filtered value: u = 2^-24 a term, and its sum; 8 for
+# the filter's own sums of up to 41 products, whose rounding error grows as their square root.
+largest = np.abs(sinogram).max() * np.pi / 4
+rounding = 8 * (views + columns) * 2.0**-24 * largest
+difference = np.abs(plain - theirs)[inside].max()
+print(f"recon(upsampling=1) - iradon: at most {difference:.3g}; rounding allows {rounding:.3g}")
+assert difference <= rounding
+fine = vdvr.recon(tomo, theta)[1]
+print(f"recon() - iradon: at most {np.abs(fine - theirs)[inside].max():.3g} of {theirs.max():.3g}, "
+      f"rms {np.sqrt(np.mean((fine - theirs)[inside]**2)):.3g}: iradon's interpolation")
+assert np.array_equal(vdvr.recon(tomo, theta, columns / 2), vdvr.recon(tomo, theta))
+assert np.array_equal(vdvr.recon(tomo.swapaxes(0, 1), theta, sinogram_order=True), vdvr.recon(tomo, theta))
+
+# --- layouts: any of them is the same scan ---
+noise = rng.random((12, 3, 13)).astype(np.float32)
+angles = np.arange(12) * 15.0
+scan = vdvr.Scan(noise, angles, center=6.0)
+for other in (noise.astype(np.float64), np.asfortranarray(noise), noise[::-1][::-1], noise.astype(">f4")):
+    assert vdvr.Scan(other, angles, center=6.0).sha256 == scan.sha256
+assert not scan.data.flags.writeable and np.shares_memory(scan.data, scan.data)
+
+# --- errors ---
+bad = noise.copy()
+bad[3, 1, 2] = np.nan
+raises(vdvr.InputError, "view 3, row 1, column 2", lambda: vdvr.Scan(bad, angles, center=6.0))
+raises(vdvr.InputError, "12 views", lambda: vdvr.Scan(noise[:11], angles, center=6.0))
+raises(vdvr.InputError, "pitch", lambda: vdvr.Scan(noise, angles, center=6.0, pitch=-1))
+raises(vdvr.InputError, "center", lambda: vdvr.Scan(noise, angles, center=99.0))
+raises(vdvr.InputError, "300%", lambda: vdvr.build(scan, "300%"))
+raises(vdvr.ToleranceError, "out of reach", lambda: vdvr.build(scan, 1e-9))
+raises(vdvr.FileError, "no-such.h5", lambda: vdvr.read_scan("no-such.h5"))
+raises(vdvr.DeviceError, "no-such-device", lambda: vdvr.build(scan, "20%", device="no-such-device"))
+volume = vdvr.build(scan, "20%")
+raises(vdvr.InputError, "none of dvr", lambda: volume.render(mode="sideways"))
+raises(vdvr.InputError, "box", lambda: volume.to_numpy(box=(90, 90, 90, 99, 99, 99)))
+raises(vdvr.InputError, "[..., 3]", lambda: volume([1.0, 2.0]))
+volume.save("noise.vdvr", overwrite=True)
+raises(vdvr.InputError, "exists already", lambda: volume.save("noise.vdvr"))
+no_driver = subprocess.run([sys.executable, "-c", "import vdvr; vdvr.device()"], capture_output=True, text=True,
+                           env={**os.environ, "OCL_ICD_VENDORS": "/nonexistent"})
+assert "vdvr[cpu]" in no_driver.stderr and "pocl-opencl-icd" in no_driver.stderr, no_driver.stderr
+
+# --- progress, and what it raises ---
+stages = []
+vdvr.build(scan, "20%", progress=lambda stage, fraction: stages.append((stage, fraction)))
+assert stages and all(0 <= f <= 1 for _, f in stages)
+
+
+class Enough(Exception):
+    pass
+
+
+def stop(stage, fraction):
+    raise Enough
+
+
+raises(Enough, "", lambda: vdvr.build(scan, "20%", progress=stop))
+assert vdvr.build(scan, "20%").content_sha256 == volume.content_sha256, "a stop has left something behind"
+
+# --- Ctrl-C, and the interpreter's lock: other threads run meanwhile ---
+large = vdvr.Scan(rng.random((180, 96, 129)).astype(np.float32), np.arange(180.0), center=64.0)
+counted, sent = [0], [0.0]
+
+
+def count():
+    # The build is well on its way after a second.
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        counted[0] += 1
+        time.sleep(0.01)
+    sent[0] = time.monotonic()
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+thread = threading.Thread(target=count)
+thread.start()
+try:
+    vdvr.build(large, "10%")
+    raise SystemExit("the build ended before it was interrupted")
+except KeyboardInterrupt:
+    waited = time.monotonic() - sent[0]
+thread.join()
+print(f"interrupted after {waited:.2f} s; another thread ran {counted[0]} times meanwhile")
+assert counted[0] > 10, "the interpreter's lock was held"
+# A second, as promised; five where this machine has other work, which a test cannot know.
+assert waited < 5, f"Ctrl-C took {waited} s"
+print("module: recon, layouts, errors, progress and interruption are as documented")
