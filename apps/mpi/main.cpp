@@ -79,6 +79,7 @@ int run(const std::vector<std::string>& words) {
       dismiss(messenger);
     }
     messenger.flush();
+    messenger.part();
     lost = messenger.lost_any();
   }
   // Ranks that are gone, or hang, would be waited for.

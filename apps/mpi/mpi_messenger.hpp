@@ -40,6 +40,9 @@ class MpiMessenger final : public Messenger {
   [[nodiscard]] bool lost_any() const;
   /// Waits for what is on its way, up to some seconds.
   void flush();
+  /// Takes what others have sent, and nobody wants any more, until all ranks are here: MPI may complain of
+  /// messages that nobody took. Collective, but for ranks that are lost, for which it waits some seconds.
+  void part();
 
  private:
   enum class State : std::uint8_t { here, gone, given_up };
