@@ -127,9 +127,10 @@ __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict 
       pick_coefficients(active, &rest, &s);
     }
   }
-  const V error = q.part_error * TO_V(parts);
-  hi = least3(widened(hi, error), c_most);
-  lo = most3(widened(lo, -error), c_least);
+  // One more for the background, which is interpolated in fp32; the extremes hold it.
+  const V error = q.part_error * TO_V(parts + 1), once = (V)(q.part_error);
+  hi = least3(widened(hi, error), widened(c_most, once));
+  lo = most3(widened(lo, -error), widened(c_least, -once));
   put_interval(&p, &q, least, most, px, py, lo, hi, parts, flags);
 }
 
@@ -204,9 +205,9 @@ __kernel VDVR_HINT void certify_fast(CERTIFY_ARGUMENTS) {
   V3 hi = pick3(ended, above.at_most, end_above.at_least),
      lo = pick3(ended, below.at_least, end_below.at_least);
   // A part costs two steps of each bound here, and a sum of three roundings more.
-  const V error = 2.0f * q.part_error * TO_V(parts + 1);
-  hi = least3(widened(hi, error), c_most);
-  lo = most3(widened(lo, -error), c_least);
+  const V error = 2.0f * q.part_error * TO_V(parts + 1), once = (V)(q.part_error);
+  hi = least3(widened(hi, error), widened(c_most, once));
+  lo = most3(widened(lo, -error), widened(c_least, -once));
   put_interval(&p, &q, least, most, px, py, lo, hi, parts, flags);
 }
 
