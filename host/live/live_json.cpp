@@ -57,7 +57,8 @@ bool truth(const std::string& member, const Json& value) {
 
 template <std::size_t N>
 std::array<double, N> numbers(const std::string& member, const Json& value) {
-  if (!value.is_array() || value.size() != N) refuse(member, value, N == 2 ? "two numbers" : "three numbers");
+  if (!value.is_array() || value.size() != N)
+    refuse(member, value, N == 2 ? "two numbers" : N == 3 ? "three numbers" : "six numbers");
   std::array<double, N> all{};
   for (std::size_t i = 0; i < N; ++i) all[i] = number(member, value[i]);
   return all;
@@ -110,6 +111,11 @@ const std::map<std::string, Setter, std::less<>>& setters() {
        [](LiveState& s, M m, J j) {
          const auto range = numbers<2>(m, j);
          s.view.slice_range = {range[0], range[1]};
+       }},
+      {"clip",
+       [](LiveState& s, M m, J j) {
+         if (j.is_null()) s.view.clip.reset();
+         else s.view.clip = numbers<6>(m, j);
        }},
       {"shading", [](LiveState& s, M m, J j) { s.view.shading = truth(m, j); }},
       {"bound", [](LiveState& s, M m, J j) { s.view.bound = truth(m, j); }},
@@ -233,6 +239,7 @@ std::string to_json(const LiveState& s) {
                      {"slice_axis", v.slice_axis},
                      {"slice_position", v.slice_position},
                      {"slice_range", v.slice_range},
+                     {"clip", v.clip ? Json(*v.clip) : Json()},
                      {"shading", v.shading},
                      {"bound", v.bound},
                      {"width", s.width},

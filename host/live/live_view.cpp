@@ -2,6 +2,7 @@
 #include "vdvr/live_view.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -93,6 +94,12 @@ void check_view(const LiveView& v, const LiveScene& scene) {
   const auto [black, white] = v.slice_range;
   require(std::isfinite(black) && std::isfinite(white) && black <= white,
           fmt::format("`slice_range` {}, {} must be finite and in order", black, white));
+  if (v.clip)
+    for (std::size_t i = 0; i < 3; ++i)
+      require(
+          std::isfinite((*v.clip)[i]) && std::isfinite((*v.clip)[i + 3]) && (*v.clip)[i] < (*v.clip)[i + 3],
+          fmt::format("`clip` {} to {} along {} must be finite and in order", (*v.clip)[i], (*v.clip)[i + 3],
+                      "xyz"[i]));
   require(scene.has_bounds || (!v.bound && v.mode != RenderMode::error),
           "the volume has no certificate to take a bound from");
 }
@@ -125,6 +132,10 @@ RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int6
   o.slice_position = view.slice_position;
   o.slice_range = view.slice_range;
   o.shading = view.shading;
+  if (view.clip) {
+    const auto& c = *view.clip;
+    o.clip = Clip{{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
+  }
   o.gradient = GradientKind::automatic;
   // As `render` takes them.
   if (o.mode == RenderMode::dvr) o.step_mode = StepMode::adaptive;
@@ -152,6 +163,7 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
   if (v.mode == RenderMode::dvr) add("--step-mode", "adaptive");
   if (v.mode == RenderMode::iso) add("--iso", fmt::format("{}", v.iso));
   if (!v.shading && v.mode != RenderMode::mip) words.emplace_back("--no-shading");
+  if (v.clip) add("--clip", fmt::format("{}", fmt::join(*v.clip, ",")));
   // In full, so that nothing depends on what `render` frames by itself.
   const Camera c = camera_of(v, scene.grid);
   const auto vec = [](const Vec3& p) { return fmt::format("{},{},{}", p[0], p[1], p[2]); };

@@ -20,7 +20,7 @@ inline constexpr std::size_t kMostLiveText = 65536, kMostLiveEvents = 256, kMost
 VDVR_API LiveState live_request(std::string_view text, const LiveScene& scene, const LiveState& from);
 
 /// {"mode", "azimuth", "elevation", "zoom", "pan", "transfer", "iso", "slice_axis", "slice_position",
-/// "slice_range", "shading", "bound", "width", "height", "drag", "pointer"}.
+/// "slice_range", "clip", "shading", "bound", "width", "height", "drag", "pointer"}.
 VDVR_API std::string to_json(const LiveState& state);
 /// What a page must know of the volume: {"grid", "range", "bulk", "histogram", "threshold", "has_bounds",
 /// "epsilon_abs", "unit"}.

@@ -42,6 +42,8 @@ struct LiveView {
   int slice_axis = 2;                           ///< 0 x, 1 y, 2 z
   double slice_position = 0;                    ///< world
   std::pair<double, double> slice_range{0, 1};  ///< grey window
+  /// Of every mode but slices: the box that is drawn, world, x0, y0, z0, x1, y1, z1; nothing: all of it.
+  std::optional<std::array<double, 6>> clip;
   bool shading = true;
   bool bound = false;  ///< mixes the colours of the bound of |V - F| into the picture
 };

@@ -62,6 +62,21 @@ BOOST_AUTO_TEST_CASE(still_frames_are_the_renderers_to_the_bit) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(a_clip_box_cuts_the_volume) {
+  LiveRenderer live(device(), volume());
+  const ResidentVolume resident(device(), volume());
+  LiveView view = first_view(live.scene(), 90, 80);
+  const Image whole = live.draw(view, 90, 80, false).image;
+  view.clip = {-20, -20, -20, 0, 20, 20};
+  RenderOptions o = options_of(view, live.scene(), 90, 80);
+  BOOST_TEST(o.clip->high[0] == 0);
+  const Image half = live.draw(view, 90, 80, false).image;
+  BOOST_TEST(same(half, raycast(device(), resident, o).image));
+  BOOST_TEST(!same(half, whole));
+  view.clip.reset();
+  BOOST_TEST(same(live.draw(view, 90, 80, false).image, whole));
+}
+
 BOOST_AUTO_TEST_CASE(the_bounds_colours_are_mixed_in_where_something_is_seen) {
   LiveRenderer live(device(), volume(), certificate());
   const ResidentVolume resident(device(), volume());

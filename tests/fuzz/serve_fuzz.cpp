@@ -31,7 +31,8 @@ std::string post(const std::string& body) {
 }
 
 constexpr const char* kEvents =
-    R"({"state": {"mode": "slice", "slice_axis": 0, "slice_range": [0.25, 0.5], "pan": [0.1, -1]},
+    R"({"state": {"mode": "slice", "slice_axis": 0, "slice_range": [0.25, 0.5], "pan": [0.1, -1],
+ "clip": [-5, -5, -5, 5, 6.5, 7]},
  "events": [{"event_type": "pointer_down", "x": 10, "y": 20.5, "button": 1, "modifiers": ["Shift"]},
  {"event_type": "pointer_move", "x": 40, "y": 25}, {"event_type": "wheel", "dx": 0, "dy": -120.5},
  {"event_type": "key_down", "key": "x"}, {"event_type": "resize", "width": 640, "height": 480}]})";

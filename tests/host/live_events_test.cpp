@@ -253,11 +253,14 @@ BOOST_AUTO_TEST_CASE(numbers_that_are_not_finite_do_nothing) {
 BOOST_AUTO_TEST_CASE(a_state_comes_back_from_its_text) {
   LiveState s = dragged(rolled(start(), -333), 1, 17, 19, true);
   s.view.iso = 0.1;
+  s.view.clip = {-1, -2, -3.25, 4, 5, 6};
   s.view.transfer.points = {{0.1, {0.25, 0.5, 1}, 0}, {0.7, {1, 1, 1}, 0.3}};
   s = after_event(s, pointer(LiveEventKind::pointer_down, 5, 6.5, 3), scene());
   const LiveState back = live_request(R"({"state": )" + to_json(s) + "}", scene(), start());
   BOOST_TEST(to_json(back) == to_json(s));
   BOOST_TEST(back.view.iso == 0.1);
+  BOOST_TEST((back.view.clip == s.view.clip));
+  BOOST_TEST(!live_request(R"({"state": {"clip": null}})", scene(), back).view.clip);
   BOOST_TEST((back.drag == LiveDrag::pan));
 }
 
@@ -301,6 +304,8 @@ BOOST_AUTO_TEST_CASE(requests_that_are_none_are_refused_in_one_line) {
       {R"({"state": {"slice_axis": 1.5}})", "`slice_axis` 1.5"},
       {R"({"state": {"slice_position": 21}})", "`slice_position` 21"},
       {R"({"state": {"slice_range": [2, 1]}})", "`slice_range` 2, 1"},
+      {R"({"state": {"clip": [1, 0, 0, 0, 1, 1]}})", "`clip` 1 to 0 along x"},
+      {R"({"state": {"clip": [1, 0]}})", "`clip` [1,0] is not six numbers"},
       {R"({"state": {"width": 100000}})", "`width` 100000"},
       {R"({"state": {"transfer": []}})", "1 to 64 points"},
       {R"({"state": {"transfer": [{"value": 0, "rgb": [0, 0, 2], "opacity": 0}]}})", "`rgb`"},

@@ -49,6 +49,8 @@ STATES = [
     {"mode": "iso", "azimuth": 200.5},
     {"mode": "iso", "shading": False, "pan": [-0.2, 0.1]},
     {"mode": "mip", "elevation": -90},
+    {"clip": [-9.5, -20, -30, 4.25, 20, 30]},
+    {"mode": "iso", "clip": [-30, -30, 1, 30, 30, 30], "pan": [0.05, 0]},
     {"mode": "slice", "slice_axis": 0, "slice_position": 3.3},
     {"mode": "error", "slice_axis": 1, "slice_position": -2.125},
     {"shading": False, "transfer": [{"value": 0.2, "rgb": [0.1, 0.4, 1], "opacity": 0},

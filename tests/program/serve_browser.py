@@ -108,6 +108,11 @@ def on_a_desk(vdvr, volume, browser, page, folder):
         check(browser.value("state.mode") == mode, f"key {name} shows {browser.value('state.mode')}")
         check_still_is_that_of_render(vdvr, volume, browser, folder)
     page.changes(lambda: browser.value("document.querySelector('[data-mode=dvr]').click()"), "button")
+    browser.value("document.getElementById('cut').open = true")
+    page.changes(lambda: browser.value("(() => { const c = document.getElementById('cut3'); c.value = 0;"
+                                       " c.dispatchEvent(new Event('input')); })()"), "cut")
+    check(abs(browser.value("state.clip[3]")) < 1, f"the cut is {browser.value('state.clip')}")
+    check_still_is_that_of_render(vdvr, volume, browser, folder)
     page.changes(lambda: browser.value("document.getElementById('bound').click()"), "bound")
     browser.value("document.querySelectorAll('details').forEach(d => d.open = true)")
     words = browser.value("document.getElementById('certificate').innerText")

@@ -242,7 +242,30 @@ function span(axis) {
 // Rounding of a slider's steps must not leave the volume.
 const within = (x, [lo, hi]) => Math.min(hi, Math.max(lo, x));
 
+// The box that is drawn; nothing while it holds the whole volume.
+const wholeBox = () => [0, 1, 2].map((a) => span(a)[0]).concat([0, 1, 2].map((a) => span(a)[1]));
+function cutTo(i, x) {
+  const box = [...(shown().clip || wholeBox())];
+  box[i] = within(x, span(i % 3));
+  // Something is left between the two.
+  const least = (span(i % 3)[1] - span(i % 3)[0]) / 500;
+  if (i < 3) box[i] = Math.min(box[i], box[i + 3] - least);
+  else box[i] = Math.max(box[i], box[i - 3] + least);
+  return { clip: box.every((v, k) => v === wholeBox()[k]) ? null : box };
+}
+for (const [i, name] of [[0, "x from"], [3, "x to"], [1, "y from"], [4, "y to"], [2, "z from"], [5, "z to"]]) {
+  const label = document.createElement("label");
+  label.className = "slide";
+  label.append(name + " ");
+  label.append(Object.assign(document.createElement("output"), { id: `cut${i}-text` }));
+  label.append(Object.assign(document.createElement("input"), { id: `cut${i}`, type: "range" }));
+  $("cuts").append(label);
+}
+$("uncut").addEventListener("click", () => change({ clip: null }));
+
 const sliders = [
+  ...[0, 3, 1, 4, 2, 5].map((i) =>
+    slider(`cut${i}`, (s) => [...span(i % 3), (s.clip || wholeBox())[i]], (x) => cutTo(i, x))),
   slider("iso", (s) => [...scene.bulk, s.iso], (iso) => ({ iso })),
   slider("position", (s) => [...span(s.slice_axis), s.slice_position],
     (x) => ({ slice_position: within(x, span(shown().slice_axis)) })),
