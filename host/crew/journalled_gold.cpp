@@ -68,8 +68,10 @@ void JournalledGold::run(BlockPass pass, const DeviceField* field,
   pass.lattice = gold_.settings().lattice;
   if (std::find(pass.selected.begin(), pass.selected.end(), 1) == pass.selected.end()) return;
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));
+  Works works = unknown(*shared, apply);
+  if (works.empty()) report(progress, stage, 1);  // all of it was in the journal
   run_blocks(
-      crew_, gold_, shared, field, unknown(*shared, apply),
+      crew_, gold_, shared, field, std::move(works),
       [&](const Bytes& record) {
         if (records_) records_->add(record);
         ByteReader in(record);

@@ -128,7 +128,9 @@ BOOST_AUTO_TEST_CASE(fog_of_f_where_v_is_clear_is_in_the_interval) {
   const PixelBounds clear = certify_pixels(device(), resident, all(v, 0.04f), o),
                     fog = certify_pixels(device(), resident, all(v, 0.06f), o);
   const std::size_t centre = 3 * (12 * 24 + 12);
-  BOOST_TEST(clear.lo.values[centre] == clear.hi.values[centre]);
+  // The background and what rounds it, as of one part, to either side; and the subtraction.
+  BOOST_TEST(static_cast<double>(clear.hi.values[centre]) - static_cast<double>(clear.lo.values[centre]) <=
+             30 * support::u);
   BOOST_TEST(fog.hi.values[centre] > 0.99f);  // the colour beside the jump, through 16 cells of 0.8
   BOOST_TEST(clear.parts[12 * 24 + 12] == 0);
 }
