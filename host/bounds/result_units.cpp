@@ -52,6 +52,7 @@ Plan to_world(Plan plan, const Units& units) {
 }
 
 Certificate to_world(Certificate c, const Units& units) {
+  // `covered` was taken from the scan as it is, in world units.
   const int density = units.density();
   for (double* value :
        {&c.epsilon_abs, &c.reference_range, &c.total_buffer, &c.measured_max, &c.measured_total})
@@ -72,11 +73,6 @@ Certificate to_world(Certificate c, const Units& units) {
     c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
   }
   c.worst_at = to_world(c.worst_at, units);
-  if (c.covered) {
-    const Vec3 low = to_world(Vec3{c.covered->radius, 0, c.covered->z.first}, units),
-               high = to_world(Vec3{c.covered->radius, 0, c.covered->z.second}, units);
-    c.covered = CoveredCylinder{low[0], {low[2], high[2]}};
-  }
   if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
   if (c.roi) c.roi = to_world(*c.roi, units);
   return c;
