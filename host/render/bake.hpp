@@ -31,8 +31,8 @@ struct BakedTransfer {
 /// 1024 entries over the transfer function's own values; colours once, opacities of step / 2^l for each level
 /// l up to `levels` - 1.
 BakedTransfer bake(const TransferFunction& transfer, double step, int levels);
-/// The same for VDVR_ADAPTED_LEVELS levels, and behind them by entry the total variation, from the first entry
-/// on, of what a step adds to a pixel: its opacity, or opacity times colour, whichever changes most.
+/// The same for VDVR_ADAPTED_LEVELS levels, and behind them by entry the total variation, from the first
+/// entry on, of what a step adds to a pixel: its opacity, or opacity times colour, whichever changes most.
 BakedTransfer bake_adaptive(const TransferFunction& transfer, double step);
 /// 256 x 256 entries by front and back value over `range`, which holds every value of the field: what a path
 /// of one step emits and absorbs along which the field is linear. About 20 ms, 1.25 MiB.

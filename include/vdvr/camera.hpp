@@ -19,8 +19,8 @@ struct Camera {
 VDVR_API void check_camera(const Camera& camera);
 /// Azimuth 0 looks along -y with +x to the right, view-up -z (docs/geometry.md); the azimuth turns about z.
 /// Positive azimuth moves the camera to its right, positive elevation towards view-up, as in VTK. zoom 1 fits
-/// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError. framing.hpp
-/// has orbits about what is shown.
+/// the grid's bounding sphere; another divides the tangent of the half view angle. Throws InputError.
+/// framing.hpp has orbits about what is shown.
 VDVR_API Camera orbit_camera(const Grid& grid, double azimuth_deg, double elevation_deg, double zoom);
 /// Without `view_up` it is -z, and where that is (within 1e-6) the direction of view, the y direction that
 /// leaves +x to the right. Throws as check_camera().

@@ -292,8 +292,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                         __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
                         __global const float* gold, __global const float* addend,
                         __global const float* tolerances, __global const float* margin,
-                        __global const int4* first_brick,
-                        __global const uchar* selected, VdvrGoldShape s, VdvrCellTest test) {
+                        __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
+                        VdvrCellTest test) {
   const int begin = (int)get_global_id(0) * VDVR_LANES;
   const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
   Place p;
@@ -401,8 +401,8 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
             WRITE(above, aboves);
             for (int i = 0; i < VDVR_LANES; ++i)
               if (totals[i] > tolerance)
-                parts |= failing_parts(&p, samples, grid, s, test, tolerance, ix - 1, iy - 1, begin + i, belows[i],
-                                       aboves[i]);
+                parts |= failing_parts(&p, samples, grid, s, test, tolerance, ix - 1, iy - 1, begin + i,
+                                       belows[i], aboves[i]);
           }
           largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));
         }

@@ -184,7 +184,6 @@ __kernel VDVR_HINT void certify_fast(CERTIFY_ARGUMENTS) {
     const V length = s.length / MOST(TO_V(n), one);
     parts += n;
     for (int j = most_lane(n); j > 0; --j) {
-
       const I active = j <= n;
       Piece first, rest;
       cut_piece(&s, 1.0f / (float)j, &first, &rest);

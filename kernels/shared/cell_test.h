@@ -8,7 +8,7 @@ typedef struct {
   int counted;          // whether slack counts: 0 tests |V - gold| alone
   int windowed;         // whether cells outside the window do not count
   float window_low, window_high;
-  int parts;  // whether to say which parts of bricks are over the tolerance
+  int parts;        // whether to say which parts of bricks are over the tolerance
   float curvature;  // of the second differences: an eighth, or what finer gold would have of these
 } VdvrCellTest;
 

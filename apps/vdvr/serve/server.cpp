@@ -35,16 +35,16 @@ constexpr double kRequestsPerSecond = 400, kBurst = 800;
 constexpr std::size_t kMostBody = 65536;
 
 const httplib::Headers& safe_headers() {
-  static const httplib::Headers headers{
-      {"Content-Security-Policy",
-       "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
-       "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
-      {"X-Content-Type-Options", "nosniff"},
-      {"X-Frame-Options", "DENY"},
-      {"Referrer-Policy", "no-referrer"},  // the address is the key
-      {"Cross-Origin-Resource-Policy", "same-origin"},
-      {"Cross-Origin-Opener-Policy", "same-origin"},
-      {"Cache-Control", "no-store"}};
+  static const httplib::Headers headers{{"Content-Security-Policy",
+                                         "default-src 'none'; script-src 'self'; style-src 'self'; img-src "
+                                         "'self' blob: data:; connect-src 'self'; "
+                                         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+                                        {"X-Content-Type-Options", "nosniff"},
+                                        {"X-Frame-Options", "DENY"},
+                                        {"Referrer-Policy", "no-referrer"},  // the address is the key
+                                        {"Cross-Origin-Resource-Policy", "same-origin"},
+                                        {"Cross-Origin-Opener-Policy", "same-origin"},
+                                        {"Cache-Control", "no-store"}};
   return headers;
 }
 
