@@ -3,7 +3,7 @@
 
 usage: crew.py devices|shares|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
 
-`kills` kills N ranks that work and N times the one that leads (3 and 2 by default; scripts/crew-kills is the
+`kills` kills N ranks that work and N times the one that leads (1 and 1 by default; scripts/crew-kills is the
 long form), at moments that a seed chooses. Without a launcher `mpi` and `kills` are skipped by name.
 """
 import argparse
@@ -222,8 +222,8 @@ def main():
     parser.add_argument("what", choices=["devices", "shares", "mpi", "kills"])
     parser.add_argument("vdvr")
     parser.add_argument("--mpi", nargs=2, action="append", default=[])
-    parser.add_argument("--workers", type=int, default=3)
-    parser.add_argument("--leaders", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--leaders", type=int, default=1)
     args = parser.parse_args()
     if args.what in ("mpi", "kills") and not args.mpi:
         print(f"crew_{args.what}_test skipped: vdvr-mpi is not built, no MPI was found")
