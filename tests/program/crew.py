@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -108,8 +109,8 @@ def shares(work, _):
 
 def launch(mpi, ranks):
     launcher, program = mpi
-    more = ["--oversubscribe"] if "ompi" in pathlib.Path(launcher).resolve().name or "orte" in str(
-        pathlib.Path(launcher).resolve()) else []
+    place = pathlib.Path(shutil.which(launcher) or launcher).resolve()
+    more = ["--oversubscribe"] if "ompi" in place.name or "orte" in str(place) else []
     return [launcher, *more, "-n", str(ranks), program]
 
 
