@@ -26,7 +26,7 @@ if(BUILD_SHARED_LIBS)
 endif()
 # Its man page says where the options are: on those of `vdvr`.
 if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
-  set(VDVR_MPI_MANUAL "${CMAKE_BINARY_DIR}/manuals-mpi")
+  set(VDVR_MPI_MANUAL "${CMAKE_BINARY_DIR}/mpi-manuals")
   add_custom_command(OUTPUT "${VDVR_MPI_MANUAL}/written"
     COMMAND "${CMAKE_COMMAND}" "-DOUTPUT=${VDVR_MPI_MANUAL}" "-DMPI=$<TARGET_FILE:vdvr_mpi>" "-DEPOCH=${VDVR_EPOCH}"
             -P "${CMAKE_SOURCE_DIR}/cmake/WriteManuals.cmake"
