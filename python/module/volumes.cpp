@@ -21,6 +21,7 @@
 #include "vdvr/error_slice.hpp"
 #include "vdvr/export_vtk.hpp"
 #include "vdvr/framing.hpp"
+#include "vdvr/journal.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -53,9 +54,26 @@ Held build(Device& device, const ProjectionSet& scan, const Tolerance& tolerance
   return held;
 }
 
+/// The same into a file, with a journal of what is finished beside it, as `vdvr build` has them.
+Held build_into(Device& device, const ProjectionSet& scan, const Tolerance& tolerance, CertifyOptions options,
+                const std::filesystem::path& path, bool deflate, bool resume, nb::handle progress) {
+  Held held;
+  run_long(progress, [&](const Progress& report) {
+    Journal journal(path.string() + ".journal", resume);
+    options.build.journal = &journal;
+    held = held_of(certify(device, scan, tolerance, options, report));
+    const std::lock_guard turn(hdf5_turn());
+    write_vdvr(path, held->file().volume, held->file().certificate,
+               deflate ? Compression::deflate : Compression::none);
+    journal.remove();
+  });
+  return held;
+}
+
 Held open(const std::filesystem::path& path, std::uint64_t max_memory_bytes, bool unverified) {
   Held held;
   run_long(nb::none(), [&](const Progress&) {
+    const std::lock_guard turn(hdf5_turn());
     held = std::make_shared<HeldVolume>(unverified ? read_vdvr(path, max_memory_bytes, Altered::report)
                                                    : read_certified(path, max_memory_bytes));
   });
@@ -246,12 +264,15 @@ void add_volumes(nb::module_& m) {
           "save",
           [](HeldVolume& h, const std::filesystem::path& path, bool deflate) {
             run_long(nb::none(), [&](const Progress&) {
+              const std::lock_guard turn(hdf5_turn());
               write_vdvr(path, h.file().volume, h.file().certificate,
                          deflate ? Compression::deflate : Compression::none);
             });
           },
           "path"_a, "deflate"_a);
   m.def("build", &build, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "progress"_a.none());
+  m.def("build_into", &build_into, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "path"_a, "deflate"_a,
+        "resume"_a, "progress"_a.none());
   m.def("open", &open, "path"_a, "max_memory_bytes"_a, "unverified"_a);
   add_verification(m);
 }
