@@ -4,11 +4,13 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -31,13 +33,23 @@ namespace {
 
 using Projections = nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
+/// Holds a Python object until the last copy is gone, in whatever thread that is.
+std::shared_ptr<const void> kept_alive(nb::object object) {
+  return {object.release().ptr(), [](PyObject* held) {
+            if (!Py_IsInitialized()) return;
+            const nb::gil_scoped_acquire interpreter;
+            Py_DECREF(held);
+          }};
+}
+
 std::shared_ptr<ProjectionSet> scan_of(const Projections& array, ArrayScan described) {
   described.rows = static_cast<std::int64_t>(array.shape(1));
   described.columns = static_cast<std::int64_t>(array.shape(2));
   auto scan = std::make_shared<ProjectionSet>();
-  run_long(nb::none(), [&](const Progress&) {
-    *scan = scan_of_array(std::vector<float>(array.data(), array.data() + array.size()), described);
-  });
+  // The array itself: nothing writes to a scan's samples, though their type has no const.
+  const std::span<float> samples(const_cast<float*>(array.data()), array.size());
+  SampleArray data(samples, kept_alive(nb::find(array)));
+  run_long(nb::none(), [&](const Progress&) { *scan = scan_of_array(std::move(data), described); });
   return scan;
 }
 
@@ -47,6 +59,28 @@ nb::object data_of(const std::shared_ptr<ProjectionSet>& scan) {
                              static_cast<std::size_t>(g.columns)};
   return nb::cast(
       nb::ndarray<nb::numpy, const float>(std::as_const(scan->data).data(), 3, shape, nb::find(scan)));
+}
+
+/// float [z][y][x] of so many samples x, y, z. A grid has a cell at least along each axis: of one sample the
+/// second is dropped.
+nb::object on_grid(Device& device, const ProjectionSet& scan, const Index3& samples, double spacing,
+                   double spacing_z, const Vec3& origin, const ReconstructOptions& options,
+                   nb::handle progress) {
+  GridOptions wanted;
+  wanted.size.emplace();
+  for (std::size_t a = 0; a < 3; ++a) (*wanted.size)[a] = std::max<std::int64_t>(1, samples[a] - 1);
+  wanted.spacing = spacing;
+  wanted.spacing_z = spacing_z;
+  wanted.origin = origin;
+  Volume volume;
+  run_long(progress, [&](const Progress& report) {
+    volume = reconstruct(device, scan, make_grid(scan.geometry, wanted), options, report);
+  });
+  const Index3 n = volume.grid.samples();
+  const nb::object all = nb::cast(as_array(
+      std::move(volume.samples),
+      {static_cast<std::size_t>(n[2]), static_cast<std::size_t>(n[1]), static_cast<std::size_t>(n[0])}));
+  return all[nb::make_tuple(nb::slice(samples[2]), nb::slice(samples[1]), nb::slice(samples[0]))];
 }
 
 nb::object slices(Device& device, const ProjectionSet& scan, const ReconstructOptions& options,
@@ -167,6 +201,7 @@ void add_projections(nb::module_& m) {
       [](const std::filesystem::path& path, const ScanOptions& options, nb::handle progress) {
         auto scan = std::make_shared<ProjectionSet>();
         run_long(progress, [&](const Progress& report) {
+          const std::lock_guard turn(hdf5_turn());
           *scan = read_scan(path, options, report);
           for (auto& note : check_scan(*scan)) scan->report.notes.push_back(std::move(note));
         });
@@ -176,7 +211,10 @@ void add_projections(nb::module_& m) {
   m.def(
       "write_data_exchange",
       [](const std::filesystem::path& path, const ProjectionSet& scan) {
-        run_long(nb::none(), [&](const Progress&) { write_data_exchange(path, scan); });
+        run_long(nb::none(), [&](const Progress&) {
+          const std::lock_guard turn(hdf5_turn());
+          write_data_exchange(path, scan);
+        });
       },
       "path"_a, "scan"_a);
   m.def(
@@ -204,6 +242,8 @@ void add_projections(nb::module_& m) {
       .def_rw("field", &ReconstructOptions::field)
       .def_rw("upsampling", &ReconstructOptions::upsampling)
       .def_rw("interpolation", &ReconstructOptions::interpolation);
+  m.def("on_grid", &on_grid, "device"_a, "scan"_a, "samples"_a, "spacing"_a, "spacing_z"_a, "origin"_a,
+        "options"_a, "progress"_a.none());
   m.def("slices", &slices, "device"_a, "scan"_a, "options"_a, "progress"_a.none());
 }
 
@@ -216,6 +256,20 @@ void add_plans(nb::module_& m) {
       .value("f32", StorageChoice::f32)
       .value("u16", StorageChoice::u16)
       .value("u8", StorageChoice::u8);
+  nb::enum_<Coefficients>(m, "Coefficients")
+      .value("midrange", Coefficients::midrange)
+      .value("sampled", Coefficients::sampled);
+  nb::enum_<Terms>(m, "Terms").value("all", Terms::all).value("grid", Terms::grid);
+  nb::enum_<Closing>(m, "Closing")
+      .value("coarse", Closing::coarse)
+      .value("paper", Closing::paper)
+      .value("none", Closing::none);
+  nb::class_<Comparison>(m, "Comparison")
+      .def(nb::init<>())
+      .def_rw("coefficients", &Comparison::coefficients)
+      .def_rw("terms", &Comparison::terms)
+      .def_rw("closing", &Comparison::closing)
+      .def_rw("epsilon_of_max", &Comparison::epsilon_of_max);
   nb::class_<Tolerance>(m, "Tolerance")
       .def(nb::init<>())
       .def_rw("relative", &Tolerance::relative)
@@ -256,6 +310,16 @@ void add_plans(nb::module_& m) {
       .def_prop_rw(
           "granularity", [](const CertifyOptions& o) { return o.plan.granularity; },
           [](CertifyOptions& o, int n) { o.plan.granularity = n; })
+      .def_prop_rw(
+          "comparison", [](const CertifyOptions& o) { return o.plan.comparison; },
+          [](CertifyOptions& o, const Comparison& c) { o.plan.comparison = c; })
+      .def_prop_rw(
+          "coarsening", [](const CertifyOptions& o) { return o.plan.coarsening; },
+          [](CertifyOptions& o, std::optional<LevelTriple> c) { o.plan.coarsening = c; }, nb::arg().none())
+      .def_prop_rw(
+          "window", [](const CertifyOptions& o) { return o.build.window; },
+          [](CertifyOptions& o, std::optional<std::pair<double, double>> w) { o.build.window = w; },
+          nb::arg().none())
       .def_prop_rw(
           "storage", [](const CertifyOptions& o) { return o.build.storage; },
           [](CertifyOptions& o, StorageChoice s) { o.build.storage = s; })

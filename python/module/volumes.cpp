@@ -20,6 +20,8 @@
 #include "vdvr/certify.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/export_vtk.hpp"
+#include "vdvr/framing.hpp"
+#include "vdvr/journal.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -52,9 +54,26 @@ Held build(Device& device, const ProjectionSet& scan, const Tolerance& tolerance
   return held;
 }
 
+/// The same into a file, with a journal of what is finished beside it, as `vdvr build` has them.
+Held build_into(Device& device, const ProjectionSet& scan, const Tolerance& tolerance, CertifyOptions options,
+                const std::filesystem::path& path, bool deflate, bool resume, nb::handle progress) {
+  Held held;
+  run_long(progress, [&](const Progress& report) {
+    Journal journal(path.string() + ".journal", resume);
+    options.build.journal = &journal;
+    held = held_of(certify(device, scan, tolerance, options, report));
+    const std::lock_guard turn(hdf5_turn());
+    write_vdvr(path, held->file().volume, held->file().certificate,
+               deflate ? Compression::deflate : Compression::none);
+    journal.remove();
+  });
+  return held;
+}
+
 Held open(const std::filesystem::path& path, std::uint64_t max_memory_bytes, bool unverified) {
   Held held;
   run_long(nb::none(), [&](const Progress&) {
+    const std::lock_guard turn(hdf5_turn());
     held = std::make_shared<HeldVolume>(unverified ? read_vdvr(path, max_memory_bytes, Altered::report)
                                                    : read_certified(path, max_memory_bytes));
   });
@@ -121,6 +140,15 @@ nb::object values_of(FloatImage&& image) {
     return nb::cast(as_array(std::move(image.values), {size(image.height), size(image.width)}));
   return nb::cast(
       as_array(std::move(image.values), {size(image.height), size(image.width), size(image.channels)}));
+}
+
+OrbitFrame frame_of(HeldVolume& held, const RenderOptions& options, double azimuth_deg,
+                    double elevation_deg) {
+  OrbitFrame frame;
+  run_long(nb::none(), [&](const Progress&) {
+    frame = frame_view(held.file().volume, options, azimuth_deg, elevation_deg);
+  });
+  return frame;
 }
 
 nb::object render(HeldVolume& held, const std::shared_ptr<Device>& device, const RenderOptions& options,
@@ -227,6 +255,7 @@ void add_volumes(nb::module_& m) {
           "spacing"_a.none(), "box"_a.none())
       .def("on_lattice", &on_lattice, "lattice"_a, "bounds"_a)
       .def("sampler", &HeldVolume::sampler, "asked"_a)
+      .def("frame_view", &frame_of, "options"_a, "azimuth_deg"_a, "elevation_deg"_a)
       .def("render", &render, "device"_a, "options"_a, "values"_a)
       .def("error_picture", &error_picture, "options"_a, "values"_a)
       .def("vtk_boxes", &vtk_boxes, "most_blocks"_a)
@@ -235,12 +264,15 @@ void add_volumes(nb::module_& m) {
           "save",
           [](HeldVolume& h, const std::filesystem::path& path, bool deflate) {
             run_long(nb::none(), [&](const Progress&) {
+              const std::lock_guard turn(hdf5_turn());
               write_vdvr(path, h.file().volume, h.file().certificate,
                          deflate ? Compression::deflate : Compression::none);
             });
           },
           "path"_a, "deflate"_a);
   m.def("build", &build, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "progress"_a.none());
+  m.def("build_into", &build_into, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "path"_a, "deflate"_a,
+        "resume"_a, "progress"_a.none());
   m.def("open", &open, "path"_a, "max_memory_bytes"_a, "unverified"_a);
   add_verification(m);
 }
