@@ -196,6 +196,63 @@ void print_explained(const Explained& e, const Scene& scene, const RenderOptions
              p.opacity);
 }
 
+/// What of it is written as the picture.
+struct Show {
+  std::string what;
+  bool slice = false, framed = false;
+  SliceFrame frame;
+  std::int64_t width = 0, height = 0;  ///< asked for; a slice in a frame is smaller
+};
+
+void write_picture(const Outputs& out, Show& show, Made& made, const PictureBound& bound, const Scene& scene,
+                   const RenderOptions& o, const Overlay& overlay) {
+  if (show.what != "colour") {
+    write_shown(out, show.what, made.bounds, bound);
+    return;
+  }
+  const auto caption = caption_of(bound, made.bounds, *scene.certificate, show.slice);
+  if (show.framed) {
+    show.frame.caption = caption;
+    write_png(out.picture, framed_slice(show.frame, made.drawn.image, show.width, show.height));
+    return;
+  }
+  if (!show.slice) draw_overlay(made.drawn, scene, o, overlay, true, caption);
+  write_png(out.picture, made.drawn.image);
+}
+
+/// Prints what was found. Throws MismatchError where --picture-tolerance is not met.
+int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
+        const Outputs& out, const Made& made, const PictureBound& bound, const Json& json) {
+  const Scene& scene = source.scene();
+  const auto why = explained(args, scene, o, made.bounds.sampler);
+  std::string pixels;
+  const std::optional<double> tolerance = args.number("picture-tolerance");
+  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
+  Json printed = json;
+  printed["output"] = out.picture.string();
+  printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
+  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
+  if (why) printed["explain"] = explained_json(*why);
+  print_result(common, printed, [&] {
+    const bool slice = o.mode == RenderMode::slice;
+    fmt::print("{}\n", bound_line(bound, *scene.certificate));
+    fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", out.picture.string(), o.width, o.height,
+               slice ? "" : fmt::format(", light {}", text_of(made.bounds.light)), out.bound.string(),
+               out.certificate.string());
+    if (!slice)
+      fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
+                 made.drawn.seconds, made.bounds.seconds, source.device().info().name);
+    if (why)
+      print_explained(
+          *why, scene, o,
+          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
+    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
+  });
+  if (over == 0) return 0;
+  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", out.picture.string(),
+                                  over, *tolerance, pixels));
+}
+
 void check_file(const Arguments& args, const Scene& scene, const RenderOptions& o) {
   const std::string name = args.path("FILE").string();
   if (!scene.certificate || !scene.verified)
@@ -286,70 +343,34 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
-  const std::string show = args.text_or("show", "colour");
-  const bool slice = o.mode == RenderMode::slice, framed = slice && !overlay.plain && show == "colour";
-  const std::int64_t width = o.width, height = o.height;
-  SliceFrame frame;
-  if (slice) {
-    frame = set_slice(o, scene, !framed);
+  Show show{args.text_or("show", "colour"), o.mode == RenderMode::slice, false, {}, o.width, o.height};
+  show.framed = show.slice && !overlay.plain && show.what == "colour";
+  if (show.slice) {
+    show.frame = set_slice(o, scene, !show.framed);
   } else {
     o.clip = certified_clip(args, scene, o, progress);
     refine_drawing(args, o);
   }
   const CertifyPictureOptions options = certify_options(args, certificate);
-  auto [drawn, bounds] = draw_and_certify(source, o, options, progress);
-  o.sampler = drawn.sampler;
-  const PictureBound bound = bound_of_picture(bounds, drawn.image);
+  Made made = draw_and_certify(source, o, options, progress);
+  o.sampler = made.drawn.sampler;
+  const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
   CertifiedPicture picture{o,
                            options,
                            {covered.radius, {covered.low[2], covered.high[2]}},
                            certificate.content_sha256,
                            output.filename().string(),
-                           sha256_of_pixels(drawn.image),
+                           sha256_of_pixels(made.drawn.image),
                            "",
                            source.device().info().name,
                            source.device().info().driver,
-                           framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
-  if (show == "colour" && slice) {
-    frame.caption = caption_of(bound, bounds, certificate, true);
-    write_png(out.picture, framed ? framed_slice(frame, drawn.image, width, height) : drawn.image);
-  } else if (show == "colour") {
-    draw_overlay(drawn, scene, o, overlay, true, caption_of(bound, bounds, certificate, false));
-    write_png(out.picture, drawn.image);
-  } else {
-    write_shown(out, show, bounds, bound);
-  }
-  write_png(out.bound, picture_of_bound(bound, bounds));
+                           show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
+  write_picture(out, show, made, bound, scene, o, overlay);
+  write_png(out.bound, picture_of_bound(bound, made.bounds));
   picture.file_sha256 = sha256_of_file(out.picture);
-  const Json json = picture_certificate_json(picture, bounds, bound, certificate);
+  const Json json = picture_certificate_json(picture, made.bounds, bound, certificate);
   io::write_file(out.certificate, json.dump(2) + "\n");
-
-  const auto why = explained(args, scene, o, bounds.sampler);
-  std::string pixels;
-  const std::optional<double> tolerance = args.number("picture-tolerance");
-  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
-  Json printed = json;
-  printed["output"] = output.string();
-  printed["seconds"] = {{"draw", drawn.seconds}, {"certify", bounds.seconds}};
-  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
-  if (why) printed["explain"] = explained_json(*why);
-  print_result(common, printed, [&] {
-    fmt::print("{}\n", bound_line(bound, certificate));
-    fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", output.string(), o.width, o.height,
-               slice ? "" : fmt::format(", light {}", text_of(bounds.light)), out.bound.string(),
-               out.certificate.string());
-    if (!slice)
-      fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
-                 drawn.seconds, bounds.seconds, source.device().info().name);
-    if (why)
-      print_explained(
-          *why, scene, o,
-          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
-    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
-  });
-  if (over == 0) return 0;
-  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", output.string(), over,
-                                  *tolerance, pixels));
+  return say(args, common, source, o, out, made, bound, json);
 }
 
 }  // namespace vdvr::cli

@@ -69,6 +69,14 @@ constexpr std::array<std::pair<const char*, RenderMode>, 4> kModes{{{"dvr", Rend
                                                                     {"mip", RenderMode::mip},
                                                                     {"slice", RenderMode::slice}}};
 
+/// A real number of any size is no count: to convert it is undefined.
+std::int64_t count_of(const Json& j, const char* name, const std::filesystem::path& path) {
+  const Json& member = j.at(name);
+  if (!member.is_number_integer())
+    throw FileError(fmt::format("{}: `{}`: {} is no whole number", path.string(), name, member.dump()));
+  return member.get<std::int64_t>();
+}
+
 /// What a mode has of its own.
 Json mode_json(const RenderOptions& o) {
   Json json = {{"mode", mode_name(o.mode)}};
@@ -96,9 +104,10 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
                    j.at("iso_rgb").get<std::array<double, 3>>()}};
   if (o.mode != RenderMode::slice) return;
   const Json& slice = j.at("slice");
-  o.slice_axis = slice.at("axis").get<int>();
-  if (o.slice_axis < 0 || o.slice_axis > 2)
-    throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), o.slice_axis));
+  const std::int64_t axis = count_of(slice, "axis", path);
+  if (axis < 0 || axis > 2)
+    throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), axis));
+  o.slice_axis = static_cast<int>(axis);
   o.slice_position = slice.at("position").get<double>();
   const auto range = slice.at("range").get<std::array<double, 2>>();
   o.slice_range = std::pair{range[0], range[1]};
@@ -140,8 +149,8 @@ void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPic
   picture.pixels_sha256 = j.at("sha256").get<std::string>();
   picture.file_sha256 = j.at("file_sha256").get<std::string>();
   picture.overlays = j.at("overlays").get<std::vector<std::string>>();
-  o.width = j.at("width").get<std::int64_t>();
-  o.height = j.at("height").get<std::int64_t>();
+  o.width = count_of(j, "width", path);
+  o.height = count_of(j, "height", path);
   const Json& c = j.at("camera");
   o.camera.position = c.at("position").get<Vec3>();
   o.camera.focal_point = c.at("focal_point").get<Vec3>();
@@ -324,7 +333,7 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
              j.at("levels").at("mean").get<double>(),
              j.at("levels").at("max").get<double>(),
              j.at("within").get<std::map<std::string, double>>(),
-             j.at("pixels").at("certified").get<std::int64_t>(),
+             count_of(j.at("pixels"), "certified", path),
              {}}};
   } catch (const Json::exception& e) {
     throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));

@@ -26,7 +26,10 @@ float up(double x) { return -down(-x); }
 /// Grey by value.
 struct Window {
   double low = 0, scale = 0;
-  [[nodiscard]] double grey(double value) const { return std::clamp((value - low) * scale, 0.0, 1.0); }
+  // A window of one value is shown black, as it is drawn.
+  [[nodiscard]] double grey(double value) const {
+    return scale > 0 ? std::clamp((value - low) * scale, 0.0, 1.0) : 0;
+  }
 };
 Window window_of(const RenderOptions& o) {
   if (!o.slice_range)
