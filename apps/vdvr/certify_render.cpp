@@ -74,10 +74,47 @@ std::vector<std::string> overlay_names(const Overlay& overlay) {
 }
 
 std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds& bounds,
-                                    const Certificate& certificate) {
+                                    const Certificate& certificate, bool slice) {
+  if (slice)
+    return {bound_line(bound, certificate), "Certified: F at the middles of pixels, where it is covered."};
   return {bound_line(bound, certificate),
           fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
                       text_of(bounds.light))};
+}
+
+/// What was drawn and what is proved of it: of a slice the picture without its frame.
+struct Made {
+  RenderResult drawn;
+  PixelBounds bounds;
+};
+Made draw_and_certify(Source& source, const RenderOptions& o, const CertifyPictureOptions& options,
+                      const Progress& progress) {
+  report(progress, "draw", 0);
+  Made made{source.draw(o), {}};
+  throw_if_stopped();
+  report(progress, "certify", 0);
+  if (o.mode == RenderMode::slice) {
+    made.bounds = certify_slice(source.scene().volume, *source.scene().certificate, o, progress);
+    clear_absent(made.drawn.image, made.bounds);
+  } else {
+    made.bounds = source.certify(o, options, progress);
+  }
+  return made;
+}
+
+/// The slice alone where there is a frame around it.
+SliceFrame set_slice(RenderOptions& o, const Scene& scene, bool plain) {
+  const Grid& g = scene.volume.grid;
+  const auto axis = static_cast<std::size_t>(o.slice_axis);
+  if (!o.slice_position)
+    o.slice_position = g.origin[axis] + 0.5 * static_cast<double>(g.cells[axis]) * g.spacing[axis];
+  SliceFrame frame = frame_of_slice(o, g, scene.certificate);
+  frame.caption_lines = 3;  // what it says is known later
+  if (plain) return frame;
+  const SlicePlace place = slice_place(frame, o.width, o.height);
+  o.width = place.width;
+  o.height = place.height;
+  return frame;
 }
 
 void write_shown(const Outputs& out, const std::string& show, const PixelBounds& bounds,
@@ -159,14 +196,76 @@ void print_explained(const Explained& e, const Scene& scene, const RenderOptions
              p.opacity);
 }
 
-void check_file(const Arguments& args, const Scene& scene, const TransferFunction& transfer) {
+/// What of it is written as the picture.
+struct Show {
+  std::string what;
+  bool slice = false, framed = false;
+  SliceFrame frame;
+  std::int64_t width = 0, height = 0;  ///< asked for; a slice in a frame is smaller
+};
+
+void write_picture(const Outputs& out, Show& show, Made& made, const PictureBound& bound, const Scene& scene,
+                   const RenderOptions& o, const Overlay& overlay) {
+  if (show.what != "colour") {
+    write_shown(out, show.what, made.bounds, bound);
+    return;
+  }
+  const auto caption = caption_of(bound, made.bounds, *scene.certificate, show.slice);
+  if (show.framed) {
+    show.frame.caption = caption;
+    write_png(out.picture, framed_slice(show.frame, made.drawn.image, show.width, show.height));
+    return;
+  }
+  if (!show.slice) draw_overlay(made.drawn, scene, o, overlay, true, caption);
+  write_png(out.picture, made.drawn.image);
+}
+
+/// Prints what was found. Throws MismatchError where --picture-tolerance is not met.
+int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
+        const Outputs& out, const Made& made, const PictureBound& bound, const Json& json) {
+  const Scene& scene = source.scene();
+  const auto why = explained(args, scene, o, made.bounds.sampler);
+  std::string pixels;
+  const std::optional<double> tolerance = args.number("picture-tolerance");
+  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
+  Json printed = json;
+  printed["output"] = out.picture.string();
+  printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
+  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
+  if (why) printed["explain"] = explained_json(*why);
+  print_result(common, printed, [&] {
+    const bool slice = o.mode == RenderMode::slice;
+    fmt::print("{}\n", bound_line(bound, *scene.certificate));
+    fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", out.picture.string(), o.width, o.height,
+               slice ? "" : fmt::format(", light {}", text_of(made.bounds.light)), out.bound.string(),
+               out.certificate.string());
+    if (!slice)
+      fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
+                 made.drawn.seconds, made.bounds.seconds, source.device().info().name);
+    if (why)
+      print_explained(
+          *why, scene, o,
+          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
+    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
+  });
+  if (over == 0) return 0;
+  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", out.picture.string(),
+                                  over, *tolerance, pixels));
+}
+
+void check_file(const Arguments& args, const Scene& scene, const RenderOptions& o) {
   const std::string name = args.path("FILE").string();
   if (!scene.certificate || !scene.verified)
     throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
   if (scene.certificate->comparison)
     throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
   const auto& window = scene.certificate->window;
-  if (window && !is_clear_outside(transfer, *window))
+  if (window && o.mode == RenderMode::slice)
+    throw InputError(fmt::format(
+        "{}: was certified within --window {:.6g},{:.6g}; where F lies outside of it is unknown, so that no "
+        "pixel of a slice is known: build without --window",
+        name, window->first, window->second));
+  if (window && !is_clear_outside(o.transfer, *window))
     throw InputError(fmt::format(
         "{}: was certified within --window {:.6g},{:.6g}, outside of which F is unknown, and the transfer "
         "function shows values there: name one by --tf whose opacity is 0 below and above the window, or "
@@ -185,8 +284,8 @@ void add_certify(Arguments& args) {
           "certify", "exact|fast", "exact",
           "for every pixel an interval that holds the colour of the ideal picture: writes beside "
           "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
-          "region alone. fast: in one pass, 1.4 to 3 times as wide. Of iso and mip: what is certain "
-          "of F in each pixel, as X.certificate.json; surfaces that F may have or not are striped")
+          "region alone. fast: in one pass, 1.4 to 3 times as wide. Of slices and mip alike; of iso: where "
+          "F has the surface for sure, may have it (striped), or not")
       .value("certify-parts", "K",
              "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
       .value("explain", "X,Y",
@@ -205,14 +304,20 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
     return;
   }
   if (o.mode == RenderMode::iso || o.mode == RenderMode::mip) {  // ray_certificate.hpp
-    refuse(args, {"certify-parts", "explain", "picture-tolerance"}, "is of --mode dvr");
+    refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
+    refuse(args, {"picture-tolerance"}, "is of --mode dvr and slice");
     if (args.choice("certify", {"exact", "fast"}, "exact") == "fast")
       throw InputError("--certify fast is of --mode dvr; iso and mip have the exact one alone");
     return;
   }
-  if (o.mode != RenderMode::dvr)
-    throw InputError(fmt::format("--certify: pictures of --mode dvr, iso and mip are certified, not of {}",
-                                 args.text("mode")));
+  if (o.mode == RenderMode::error)
+    throw InputError("--certify: pictures of --mode dvr, iso, mip and slice are certified, not of error");
+  if (o.mode == RenderMode::slice) {
+    refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
+    refuse(args, {"colorbar", "caption"}, "is part of a certified slice, but for --plain");
+    if (args.choice("certify", {"exact", "fast"}, "exact") == "fast")
+      throw InputError("--certify fast is of --mode dvr; slices have the exact one alone");
+  }
   if (show != "colour" && !of_bounds)
     throw InputError(fmt::format("--certify: --show {} is not certified; colours are", show));
   if (of_bounds) refuse(args, {"axes", "box", "colorbar", "caption"}, "is not drawn over bounds");
@@ -232,70 +337,40 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
 int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions o,
                    const Overlay& overlay, const std::filesystem::path& output, const Progress& progress) {
   const Scene& scene = source.scene();
-  check_file(args, scene, o.transfer);
+  check_file(args, scene, o);
   check_pixel(args, o);
   const Certificate& certificate = *scene.certificate;
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
-  Clip clip = covered;
-  if (o.clip) cut(clip, o.clip->low, o.clip->high);
-  require_some(clip);
-  o.clip = clip;
-  refine_drawing(args, o);
+  Show show{args.text_or("show", "colour"), o.mode == RenderMode::slice, false, {}, o.width, o.height};
+  show.framed = show.slice && !overlay.plain && show.what == "colour";
+  if (show.slice) {
+    show.frame = set_slice(o, scene, !show.framed);
+  } else {
+    o.clip = certified_clip(args, scene, o, progress);
+    refine_drawing(args, o);
+  }
   const CertifyPictureOptions options = certify_options(args, certificate);
-  report(progress, "draw", 0);
-  RenderResult drawn = source.draw(o);
-  throw_if_stopped();
-  report(progress, "certify", 0);
-  const PixelBounds bounds = source.certify(o, options, progress);
-  const PictureBound bound = bound_of_picture(bounds, drawn.image);
+  Made made = draw_and_certify(source, o, options, progress);
+  o.sampler = made.drawn.sampler;
+  const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
   CertifiedPicture picture{o,
                            options,
                            {covered.radius, {covered.low[2], covered.high[2]}},
                            certificate.content_sha256,
                            output.filename().string(),
-                           sha256_of_pixels(drawn.image),
+                           sha256_of_pixels(made.drawn.image),
                            "",
                            source.device().info().name,
                            source.device().info().driver,
-                           overlay_names(overlay)};
-  const std::string show = args.text_or("show", "colour");
-  if (show == "colour") {
-    draw_overlay(drawn, scene, o, overlay, true, caption_of(bound, bounds, certificate));
-    write_png(out.picture, drawn.image);
-  } else {
-    write_shown(out, show, bounds, bound);
-  }
-  write_png(out.bound, picture_of_bound(bound, bounds));
+                           show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
+  write_picture(out, show, made, bound, scene, o, overlay);
+  write_png(out.bound, picture_of_bound(bound, made.bounds));
   picture.file_sha256 = sha256_of_file(out.picture);
-  const Json json = picture_certificate_json(picture, bounds, bound, certificate);
+  const Json json = picture_certificate_json(picture, made.bounds, bound, certificate);
   io::write_file(out.certificate, json.dump(2) + "\n");
-
-  const auto why = explained(args, scene, o, bounds.sampler);
-  std::string pixels;
-  const std::optional<double> tolerance = args.number("picture-tolerance");
-  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
-  Json printed = json;
-  printed["output"] = output.string();
-  printed["seconds"] = {{"draw", drawn.seconds}, {"certify", bounds.seconds}};
-  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
-  if (why) printed["explain"] = explained_json(*why);
-  print_result(common, printed, [&] {
-    fmt::print("{}\n", bound_line(bound, certificate));
-    fmt::print("  {}: {} x {}, light {}; bound in {}, certificate in {}\n", output.string(), o.width,
-               o.height, text_of(bounds.light), out.bound.string(), out.certificate.string());
-    fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
-               drawn.seconds, bounds.seconds, source.device().info().name);
-    if (why)
-      print_explained(
-          *why, scene, o,
-          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
-    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
-  });
-  if (over == 0) return 0;
-  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", output.string(), over,
-                                  *tolerance, pixels));
+  return say(args, common, source, o, out, made, bound, json);
 }
 
 }  // namespace vdvr::cli

@@ -75,6 +75,14 @@ std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Pr
   return clip;
 }
 
+Clip certified_clip(const Arguments& args, const Scene& scene, const RenderOptions& options,
+                    const Progress& progress) {
+  Clip clip = covered_clip(args, scene, progress);
+  if (options.clip) cut(clip, options.clip->low, options.clip->high);
+  require_some(clip);
+  return clip;
+}
+
 void require_some(const Clip& clip) {
   for (std::size_t a = 0; a < 3; ++a) {
     const double reach = a < 2 ? clip.radius : std::numeric_limits<double>::infinity();

@@ -17,6 +17,9 @@ Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& pro
 std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Progress& progress);
 /// Cuts `clip` to what also lies in `box`.
 void cut(Clip& clip, const Vec3& low, const Vec3& high);
+/// What a certified picture draws: of options.clip what is covered. Throws as covered_clip and require_some.
+Clip certified_clip(const Arguments& args, const Scene& scene, const RenderOptions& options,
+                    const Progress& progress);
 /// Throws InputError where nothing of --clip's box can lie in the cylinder of `clip`.
 void require_some(const Clip& clip);
 

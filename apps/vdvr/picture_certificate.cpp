@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -9,6 +10,7 @@
 
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/surface_picture.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -62,40 +64,93 @@ Json light_list(const std::vector<Vec3>& lights) {
   return list;
 }
 
+constexpr std::array<std::pair<const char*, RenderMode>, 4> kModes{{{"dvr", RenderMode::dvr},
+                                                                    {"iso", RenderMode::iso},
+                                                                    {"mip", RenderMode::mip},
+                                                                    {"slice", RenderMode::slice}}};
+
+/// A real number of any size is no count: to convert it is undefined.
+std::int64_t count_of(const Json& j, const char* name, const std::filesystem::path& path) {
+  const Json& member = j.at(name);
+  if (!member.is_number_integer())
+    throw FileError(fmt::format("{}: `{}`: {} is no whole number", path.string(), name, member.dump()));
+  return member.get<std::int64_t>();
+}
+
+/// What a mode has of its own.
+Json mode_json(const RenderOptions& o) {
+  Json json = {{"mode", mode_name(o.mode)}};
+  if (o.mode == RenderMode::iso && !o.surfaces.empty()) {
+    json["iso"] = o.surfaces.front().value;
+    json["iso_rgb"] = o.surfaces.front().rgb;
+    json["iso_opacity"] = o.surfaces.front().opacity;
+  }
+  if (o.mode == RenderMode::slice)
+    json["slice"] = {{"axis", o.slice_axis},
+                     {"position", o.slice_position.value()},
+                     {"range", Json::array({o.slice_range.value().first, o.slice_range.value().second})}};
+  return json;
+}
+
+void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& o) {
+  const auto name = j.at("mode").get<std::string>();
+  const auto mode =
+      std::find_if(kModes.begin(), kModes.end(), [&](const auto& m) { return name == m.first; });
+  if (mode == kModes.end())
+    throw FileError(fmt::format("{}: `picture.mode`: '{}' is none that is certified", path.string(), name));
+  o.mode = mode->second;
+  if (o.mode == RenderMode::iso)
+    o.surfaces = {{j.at("iso").get<double>(), j.at("iso_opacity").get<double>(),
+                   j.at("iso_rgb").get<std::array<double, 3>>()}};
+  if (o.mode != RenderMode::slice) return;
+  const Json& slice = j.at("slice");
+  const std::int64_t axis = count_of(slice, "axis", path);
+  if (axis < 0 || axis > 2)
+    throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), axis));
+  o.slice_axis = static_cast<int>(axis);
+  o.slice_position = slice.at("position").get<double>();
+  const auto range = slice.at("range").get<std::array<double, 2>>();
+  o.slice_range = std::pair{range[0], range[1]};
+}
+
 Json picture_json(const CertifiedPicture& picture) {
   const RenderOptions& o = picture.options;
   Json overlays = Json::array();
   for (const std::string& name : picture.overlays) overlays.push_back(name);
-  return {{"file", picture.file},
-          {"sha256", picture.pixels_sha256},
-          {"file_sha256", picture.file_sha256},
-          {"width", o.width},
-          {"height", o.height},
-          {"mode", "dvr"},
-          {"camera", camera_json(o.camera)},
-          {"transfer", transfer_points(o.transfer)},
-          {"background_top", o.background_top},
-          {"background_bottom", o.background_bottom},
-          {"step", o.step},
-          {"classification", o.classification == Classification::post ? "post" : "preintegrated"},
-          {"step_mode", text_of_steps(o.step_mode)},
-          {"termination", o.termination},
-          {"shading", o.shading},
-          {"gradient", o.gradient == GradientKind::analytic ? "analytic" : "central"},
-          {"head_light", o.head_light},
-          {"lights", light_list(o.lights)},
-          {"clip", clip_json(o.clip.value_or(Clip{}))},
-          {"overlays", overlays}};
+  Json json = {{"file", picture.file},
+               {"sha256", picture.pixels_sha256},
+               {"file_sha256", picture.file_sha256},
+               {"width", o.width},
+               {"height", o.height},
+               {"camera", camera_json(o.camera)},
+               {"transfer", transfer_points(o.transfer)},
+               {"background_top", o.background_top},
+               {"background_bottom", o.background_bottom},
+               {"step", o.step},
+               {"classification", o.classification == Classification::post ? "post" : "preintegrated"},
+               {"step_mode", text_of_steps(o.step_mode)},
+               {"termination", o.termination},
+               {"shading", o.shading},
+               {"gradient", o.gradient == GradientKind::analytic ? "analytic"
+                            : o.gradient == GradientKind::stored ? "stored"
+                                                                 : "central"},
+               {"head_light", o.head_light},
+               {"lights", light_list(o.lights)},
+               {"clip", clip_json(o.clip.value_or(Clip{}))},
+               {"overlays", overlays}};
+  json.update(mode_json(o));
+  return json;
 }
 
-void read_picture(const Json& j, CertifiedPicture& picture) {
+void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPicture& picture) {
   RenderOptions& o = picture.options;
+  read_mode(j, path, o);
   picture.file = j.at("file").get<std::string>();
   picture.pixels_sha256 = j.at("sha256").get<std::string>();
   picture.file_sha256 = j.at("file_sha256").get<std::string>();
   picture.overlays = j.at("overlays").get<std::vector<std::string>>();
-  o.width = j.at("width").get<std::int64_t>();
-  o.height = j.at("height").get<std::int64_t>();
+  o.width = count_of(j, "width", path);
+  o.height = count_of(j, "height", path);
   const Json& c = j.at("camera");
   o.camera.position = c.at("position").get<Vec3>();
   o.camera.focal_point = c.at("focal_point").get<Vec3>();
@@ -116,8 +171,10 @@ void read_picture(const Json& j, CertifiedPicture& picture) {
                                       : StepMode::fixed;
   o.termination = j.at("termination").get<double>();
   o.shading = j.at("shading").get<bool>();
-  o.gradient =
-      j.at("gradient").get<std::string>() == "analytic" ? GradientKind::analytic : GradientKind::central;
+  const auto gradient = j.at("gradient").get<std::string>();
+  o.gradient = gradient == "analytic" ? GradientKind::analytic
+               : gradient == "stored" ? GradientKind::stored
+                                      : GradientKind::central;
   o.head_light = j.at("head_light").get<bool>();
   o.lights = j.at("lights").get<std::vector<Vec3>>();
   o.clip = clip_of(j.at("clip"));
@@ -131,12 +188,34 @@ std::string sha256_of_pixels(const Image& image) {
   return hash.hex();
 }
 
-std::string statement_of(const PixelBounds& bounds) {
+const char* mode_name(RenderMode mode) {
+  return std::find_if(kModes.begin(), kModes.end(), [&](const auto& m) { return m.second == mode; })->first;
+}
+
+std::array<double, 6> box_of(const std::optional<Clip>& clip) {
+  const Clip c = clip.value_or(Clip{});
+  return {c.low[0], c.low[1], c.low[2], c.high[0], c.high[1], c.high[2]};
+}
+
+std::string statement_of(RenderMode mode, CertifiedLight light) {
+  if (mode == RenderMode::slice)
+    return "In every pixel the grey of F at the pixel's middle differs from the drawn one by at most the "
+           "bound "
+           "of that pixel; what is not covered is absent.";
+  if (mode == RenderMode::mip)
+    return "In every pixel and channel the colour of the largest F on the ray through the pixel's middle, "
+           "inside "
+           "the covered region, differs from the drawn one by at most the bound of that pixel.";
+  if (mode == RenderMode::iso)
+    return "F passes the value first, on the ray through a pixel's middle inside the covered region, in the "
+           "pixel's band where the pixel is sure; nowhere where it is none; and not before the band's "
+           "beginning "
+           "where it is possible.";
   return fmt::format(
       "In every pixel and channel the ideal picture, continuous emission and absorption over F inside the "
       "covered region{}, differs from the drawn one by at most the bound of that pixel.",
-      bounds.light == CertifiedLight::unlit ? ", without light"
-                                            : ", under the light that V was drawn with, step by step");
+      light == CertifiedLight::unlit ? ", without light"
+                                     : ", under the light that V was drawn with, step by step");
 }
 
 Json bound_json(const PictureBound& b) {
@@ -152,28 +231,71 @@ Json bound_json(const PictureBound& b) {
         {"untested", b.untested}}}};
 }
 
+Json surface_json(const SurfaceBounds& bounds, const std::string& unit) {
+  double sum = 0;
+  std::int64_t count = 0;
+  for (const float band : band_of(bounds).values)
+    if (!std::isnan(band)) {
+      sum += static_cast<double>(band);
+      ++count;
+    }
+  return {{"sure", bounds.share(2)},
+          {"possible", bounds.share(1)},
+          {"none", bounds.share(0)},
+          {"band_mean", count > 0 ? sum / static_cast<double>(count) : 0},
+          {"band_median", band_quantile(bounds, 0.5)},
+          {"band_p99", band_quantile(bounds, 0.99)},
+          {"unit", unit}};
+}
+
+Json maximum_json(const MaximumBounds& bounds) {
+  double sum = 0, most = 0;
+  std::int64_t count = 0, untested = 0;
+  for (std::size_t i = 0; i < bounds.low.values.size(); ++i) {
+    const double width =
+        static_cast<double>(bounds.high.values[i]) - static_cast<double>(bounds.low.values[i]);
+    if (std::isnan(width)) continue;
+    if (!std::isfinite(width)) {
+      ++untested;
+      continue;
+    }
+    sum += width;
+    most = std::max(most, width);
+    ++count;
+  }
+  return {{"half_width_mean", count > 0 ? 0.5 * sum / static_cast<double>(count) : 0},
+          {"half_width_max", 0.5 * most},
+          {"pixels", count},
+          {"untested", untested}};
+}
+
+Json certificate_head(const CertifiedPicture& picture, const Certificate& certificate,
+                      const std::string& statement) {
+  return {{"format", kFormat},
+          {"statement", statement},
+          {"volume",
+           {{"content_sha256", picture.content_sha256},
+            {"epsilon", certificate.epsilon},
+            {"epsilon_abs", certificate.epsilon_abs}}},
+          {"picture", picture_json(picture)},
+          {"covered",
+           {{"radius", picture.covered.radius},
+            {"z", Json::array({picture.covered.z.first, picture.covered.z.second})}}},
+          {"sampler", picture.options.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
+          {"kappa", picture.certify.kappa},
+          {"theta", picture.certify.theta},
+          {"fast", picture.certify.fast},
+          {"device", picture.device},
+          {"driver", picture.driver},
+          {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
+}
+
 Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,
                               const PictureBound& bound, const Certificate& certificate) {
-  Json json = {{"format", kFormat},
-               {"statement", statement_of(bounds)},
-               {"light", text_of(bounds.light)},
-               {"volume",
-                {{"content_sha256", picture.content_sha256},
-                 {"epsilon", certificate.epsilon},
-                 {"epsilon_abs", certificate.epsilon_abs}}},
-               {"picture", picture_json(picture)},
-               {"covered",
-                {{"radius", picture.covered.radius},
-                 {"z", Json::array({picture.covered.z.first, picture.covered.z.second})}}},
-               {"ray_offset_pixels", bounds.ray_offset_pixels},
-               {"sampler", bounds.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
-               {"parts", bound.parts_mean},
-               {"kappa", picture.certify.kappa},
-               {"theta", picture.certify.theta},
-               {"fast", picture.certify.fast},
-               {"device", picture.device},
-               {"driver", picture.driver},
-               {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
+  Json json = certificate_head(picture, certificate, statement_of(picture.options.mode, bounds.light));
+  json["light"] = text_of(bounds.light);
+  json["ray_offset_pixels"] = bounds.ray_offset_pixels;
+  json["parts"] = bound.parts_mean;
   json.update(bound_json(bound));
   return json;
 }
@@ -191,7 +313,7 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
                       "'{}', not '{}'",
                       path.string(), j.at("format").get<std::string>(), kFormat));
     CertifiedPicture picture;
-    read_picture(j.at("picture"), picture);
+    read_picture(j.at("picture"), path, picture);
     picture.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
     picture.device = j.at("device").get<std::string>();
     picture.driver = j.at("driver").get<std::string>();
@@ -203,11 +325,16 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.covered.z = {z[0], z[1]};
     picture.options.sampler =
         j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
+    if (picture.options.mode == RenderMode::iso)
+      return {std::move(picture), {j.at("statement").get<std::string>(), "", 0, 0, {}, 0, j.at("iso")}};
     return {std::move(picture),
-            {j.at("statement").get<std::string>(), j.at("light").get<std::string>(),
-             j.at("levels").at("mean").get<double>(), j.at("levels").at("max").get<double>(),
+            {j.at("statement").get<std::string>(),
+             j.at("light").get<std::string>(),
+             j.at("levels").at("mean").get<double>(),
+             j.at("levels").at("max").get<double>(),
              j.at("within").get<std::map<std::string, double>>(),
-             j.at("pixels").at("certified").get<std::int64_t>()}};
+             count_of(j.at("pixels"), "certified", path),
+             {}}};
   } catch (const Json::exception& e) {
     throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));
   }

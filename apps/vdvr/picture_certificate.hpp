@@ -2,13 +2,16 @@
 // (docs/pixel-bounds.md, section 8).
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "apps/vdvr/output.hpp"
+#include "vdvr/certified_rays.hpp"
 #include "vdvr/certify_picture.hpp"
 
 namespace vdvr::cli {
@@ -29,10 +32,22 @@ struct PictureClaims {
   double mean = 0, max = 0;              ///< levels
   std::map<std::string, double> within;  ///< shares
   std::int64_t certified = 0;            ///< pixels
+  Json iso;                              ///< of surfaces, which have these shares and depths alone
 };
 
-/// What is proved, in one sentence.
-std::string statement_of(const PixelBounds& bounds);
+/// What is proved, in one sentence. `light` is of mode dvr.
+std::string statement_of(RenderMode mode, CertifiedLight light = CertifiedLight::unlit);
+/// "dvr", "iso", ...
+const char* mode_name(RenderMode mode);
+/// What certificates of all modes have.
+Json certificate_head(const CertifiedPicture& picture, const Certificate& certificate,
+                      const std::string& statement);
+/// Shares of the pixels by class, and the band's depth in world units.
+Json surface_json(const SurfaceBounds& bounds, const std::string& unit);
+/// How well the maxima are known, in units of F.
+Json maximum_json(const MaximumBounds& bounds);
+/// The box that a clip has beside its cylinder.
+std::array<double, 6> box_of(const std::optional<Clip>& clip);
 Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,
                               const PictureBound& bound, const Certificate& certificate);
 /// Throws FileError for what is no certificate of a picture.

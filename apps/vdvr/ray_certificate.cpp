@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/picture_certificate.hpp"
 #include "vdvr/certified_rays.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/stop.hpp"
 #include "vdvr/surface_picture.hpp"
 
 namespace fs = std::filesystem;
@@ -17,104 +20,74 @@ namespace fs = std::filesystem;
 namespace vdvr::cli {
 namespace {
 
-constexpr const char* surface_statement =
-    "F passes the value first, on the ray through a pixel's centre within the covered cylinder, between "
-    "`first` and "
-    "`last` where the pixel is sure; nowhere where it is none; and not before `first` where it is possible";
-constexpr const char* maximum_statement =
-    "the largest F on the ray through a pixel's centre, within the covered cylinder, lies between `lo` and "
-    "`hi`";
-
 bool is_values(const fs::path& output) { return output.extension() == ".npy"; }
 
-Json camera_json(const Camera& c) {
-  return {{"position", c.position},
-          {"focal_point", c.focal_point},
-          {"view_up", c.view_up},
-          {"view_angle", c.view_angle_deg}};
+/// All that the picture follows from; its file's hash comes when it is written.
+CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
+                           const fs::path& output) {
+  const Scene& scene = source.scene();
+  CertifiedPicture picture;
+  picture.options = options;
+  picture.options.sampler = drawn.sampler;
+  if (options.mode == RenderMode::iso && drawn.gradient != GradientKind::automatic)
+    picture.options.gradient = drawn.gradient;
+  picture.certify.window = scene.certificate->window;
+  if (scene.certificate->covered) picture.covered = *scene.certificate->covered;
+  picture.content_sha256 = scene.certificate->content_sha256;
+  picture.file = output.filename().string();
+  picture.pixels_sha256 = sha256_of_pixels(drawn.image);
+  picture.device = source.device().info().name;
+  picture.driver = source.device().info().driver;
+  return picture;
 }
 
-std::string pixels_sha256(const Image& image) {
-  Sha256 sha;
-  sha.update(image.rgb.data(), image.rgb.size());
-  return sha.hex();
-}
-
-Json head_json(const Scene& scene, const RenderOptions& o, const fs::path& output, const char* statement) {
-  return {{"format", "vdvr picture certificate 1"},
-          {"statement", statement},
-          {"volume",
-           {{"content_sha256", scene.certificate->content_sha256},
-            {"epsilon_abs", scene.certificate->epsilon_abs}}},
-          {"picture",
-           {{"file", output.filename().string()},
-            {"width", o.width},
-            {"height", o.height},
-            {"mode", o.mode == RenderMode::iso ? "iso" : "mip"},
-            {"camera", camera_json(o.camera)}}}};
-}
-
-Json surface(const std::string& show, const CertifiedRays& rays, const RenderOptions& o, const Scene& scene,
-             Image image, const fs::path& output, const Progress& progress) {
-  const double value = o.surfaces.front().value;
-  const SurfaceBounds bounds = rays.surface(o.camera, o.width, o.height, value, progress);
-  const double p99 = band_quantile(bounds, 0.99), median = band_quantile(bounds, 0.5);
+void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image,
+                   const fs::path& output) {
   if (is_values(output)) {
-    FloatImage classes{o.width, o.height, {bounds.hit.begin(), bounds.hit.end()}, 1};
+    const FloatImage classes{
+        bounds.first.width, bounds.first.height, {bounds.hit.begin(), bounds.hit.end()}, 1};
     write_npy(output, show == "class" ? classes
                       : show == "lo"  ? bounds.first
                       : show == "hi"  ? bounds.last
                                       : band_of(bounds));
-  } else {
-    if (show == "class") image = class_picture(bounds);
-    else if (show == "band") image = band_picture(bounds, p99 > 0 ? p99 : 1);
-    else hatch_possible(image, bounds);
-    write_png(output, image);
+    return;
   }
-  Json json = head_json(scene, o, output, surface_statement);
-  json["picture"]["iso"] = value;
-  if (!is_values(output)) json["picture"]["sha256"] = pixels_sha256(image);
-  if (show == "band") json["picture"]["band_at_white"] = p99;
-  double sum = 0;
-  std::int64_t count = 0;
-  for (const float band : band_of(bounds).values)
-    if (!std::isnan(band)) {
-      sum += static_cast<double>(band);
-      ++count;
-    }
-  json["iso"] = {
-      {"sure", bounds.share(2)},       {"possible", bounds.share(1)},
-      {"none", bounds.share(0)},       {"band_mean", count > 0 ? sum / static_cast<double>(count) : 0},
-      {"band_median", median},         {"band_p99", p99},
-      {"unit", scene.volume.grid.unit}};
+  const double p99 = band_quantile(bounds, 0.99);
+  if (show == "class") image = class_picture(bounds);
+  else if (show == "band") image = band_picture(bounds, p99 > 0 ? p99 : 1);
+  else hatch_possible(image, bounds);
+  write_png(output, image);
+}
+
+Json surface(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
+             const Scene& scene, const Image& image, const fs::path& output, const Progress& progress) {
+  const RenderOptions& o = picture.options;
+  const SurfaceBounds bounds = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
+  throw_if_stopped();
+  write_surface(show, bounds, image, output);
+  picture.file_sha256 = sha256_of_file(output);
+  picture.overlays = {"stripes over possible hits"};
+  Json json = certificate_head(picture, *scene.certificate, statement_of(RenderMode::iso));
+  json["iso"] = surface_json(bounds, scene.volume.grid.unit);
+  if (show == "band") json["picture"]["band_at_white"] = json["iso"]["band_p99"];
   return json;
 }
 
-Json maximum(const std::string& show, const CertifiedRays& rays, const RenderOptions& o, const Scene& scene,
-             const Image& image, const fs::path& output, const Progress& progress) {
-  const MaximumBounds bounds = rays.maximum(o.camera, o.width, o.height, progress);
-  if (is_values(output)) write_npy(output, show == "lo" ? bounds.low : bounds.high);
-  else write_png(output, image);
-  double sum = 0, most = 0;
-  std::int64_t count = 0, untested = 0;
-  for (std::size_t i = 0; i < bounds.low.values.size(); ++i) {
-    const double width =
-        static_cast<double>(bounds.high.values[i]) - static_cast<double>(bounds.low.values[i]);
-    if (std::isnan(width)) continue;
-    if (!std::isfinite(width)) {
-      ++untested;
-      continue;
-    }
-    sum += width;
-    most = std::max(most, width);
-    ++count;
-  }
-  Json json = head_json(scene, o, output, maximum_statement);
-  if (!is_values(output)) json["picture"]["sha256"] = pixels_sha256(image);
-  json["mip"] = {{"half_width_mean", count > 0 ? 0.5 * sum / static_cast<double>(count) : 0},
-                 {"half_width_max", 0.5 * most},
-                 {"pixels", count},
-                 {"untested", untested}};
+Json maximum(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
+             const Scene& scene, const Image& image, const fs::path& output, const Progress& progress) {
+  const RenderOptions& o = picture.options;
+  const MaximumBounds maxima = rays.maximum(o.camera, o.width, o.height, progress);
+  throw_if_stopped();
+  const PixelBounds bounds = colours_of_maxima(maxima, o);
+  const PictureBound bound = bound_of_picture(bounds, image);
+  const Image bounds_image = picture_of_bound(bound, bounds);
+  if (is_values(output))
+    write_npy(output, show == "lo" ? maxima.low : show == "hi" ? maxima.high : bound.levels);
+  else write_png(output, show == "bound" ? bounds_image : image);
+  write_png(ray_certificate_paths(output, o.mode).back(), bounds_image);
+  picture.file_sha256 = sha256_of_file(output);
+  Json json = picture_certificate_json(picture, bounds, bound, *scene.certificate);
+  json["mip"] = maximum_json(maxima);
   return json;
 }
 
@@ -125,38 +98,47 @@ void check_ray_certificate(const Arguments& args, RenderMode mode, bool values) 
   const bool certified_show =
       std::find(certified_outputs().begin(), certified_outputs().end(), show) != certified_outputs().end();
   const bool by_ray = mode == RenderMode::iso || mode == RenderMode::mip;
-  if (args.has("certify") && !by_ray) return;  // certify_render.hpp
-  if (!args.has("certify")) {
+  if (asks_certify(args) && !by_ray) return;  // certify_render.hpp
+  if (!asks_certify(args)) {
     if (certified_show) throw InputError(fmt::format("--show {}: goes with --certify", show));
     return;
   }
   refuse(args, {"turntable", "method", "unverified", "axes", "box", "colorbar", "caption"},
          "does not go with --certify, which is of one plain picture of the certified field");
   if (show != "colour" && !certified_show)
-    throw InputError(fmt::format("--show {}: has no certificate; class, band, lo and hi have", show));
-  if (values && !certified_show) throw InputError("--certify writes values of --show class, band, lo or hi");
+    throw InputError(fmt::format("--show {}: has no certificate; {} have", show,
+                                 mode == RenderMode::mip ? "bound, lo and hi" : "class, band, lo and hi"));
+  if (values && !certified_show)
+    throw InputError(fmt::format("--certify writes values of --show {}",
+                                 mode == RenderMode::mip ? "bound, lo or hi" : "class, band, lo or hi"));
   if (!values && (show == "lo" || show == "hi"))
     throw InputError(fmt::format("--show {}: is written as .npy", show));
   if (mode == RenderMode::mip && (show == "class" || show == "band"))
     throw InputError(fmt::format("--show {}: is of --mode iso", show));
+  if (mode == RenderMode::iso && show == "bound")
+    throw InputError("--show bound: of --mode iso there are class and band");
   if (const auto iso = args.numbers("iso", 0); iso && iso->size() > 1)
     throw InputError("--certify: one surface at a time; give --iso one value");
 }
 
-fs::path ray_certificate_path(const fs::path& output) {
-  fs::path path = output;
-  return path.replace_extension(".certificate.json");
+std::vector<fs::path> ray_certificate_paths(const fs::path& output, RenderMode mode) {
+  std::vector<fs::path> paths{output, output};
+  paths[0].replace_extension(".certificate.json");
+  paths[1].replace_extension(".bound.png");
+  if (mode != RenderMode::mip) paths.pop_back();
+  return paths;
 }
 
-Json write_ray_certificate(const Arguments& args, const Scene& scene, const RenderOptions& options,
-                           Image image, const fs::path& output, const Progress& progress) {
-  if (!scene.certificate) throw InputError("--certify: the volume has no certificate");
-  const CertifiedRays rays(scene.volume, *scene.certificate, options.sampler == SamplerKind::image3d);
+Json write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
+                           RenderResult drawn, const fs::path& output, const Progress& progress) {
+  const Scene& scene = source.scene();
+  CertifiedPicture picture = described(source, options, drawn, output);
+  const CertifiedRays rays(scene.volume, *scene.certificate, false, box_of(options.clip));
   const std::string show = args.text_or("show", "colour");
   const Json json = options.mode == RenderMode::iso
-                        ? surface(show, rays, options, scene, std::move(image), output, progress)
-                        : maximum(show, rays, options, scene, image, output, progress);
-  io::write_file(ray_certificate_path(output), json.dump(2) + "\n");
+                        ? surface(show, rays, picture, scene, drawn.image, output, progress)
+                        : maximum(show, rays, picture, scene, drawn.image, output, progress);
+  io::write_file(ray_certificate_paths(output, options.mode).front(), json.dump(2) + "\n");
   return json;
 }
 
@@ -171,7 +153,12 @@ void print_ray_certificate(const Json& json) {
         iso.at("band_p99").get<double>(), iso.at("unit").get<std::string>());
     return;
   }
-  const Json& mip = json.at("mip");
+  const Json &mip = json.at("mip"), &levels = json.at("levels");
+  fmt::print(
+      "  colours      {:.0f} % of the pixels certain to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst "
+      "{:.1f}\n",
+      100 * json.at("within").at("4").get<double>(), 100 * json.at("within").at("8").get<double>(),
+      levels.at("mean").get<double>(), levels.at("max").get<double>());
   fmt::print("  certain      the maximum of F to +- {:.4g} in the mean, {:.4g} at most\n",
              mip.at("half_width_mean").get<double>(), mip.at("half_width_max").get<double>());
 }

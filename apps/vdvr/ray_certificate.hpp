@@ -4,8 +4,9 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/source.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/progress.hpp"
 
@@ -13,18 +14,19 @@ namespace vdvr::cli {
 
 /// What --show has beside its usual values; the option is declared by add_certify (certify_render.hpp).
 inline const std::vector<std::string>& certified_outputs() {
-  static const std::vector<std::string> names{"class", "band", "lo", "hi"};
+  static const std::vector<std::string> names{"class", "band", "lo", "hi", "bound"};
   return names;
 }
 /// Refuses what goes with no certificate; before anything is read.
 void check_ray_certificate(const Arguments& args, RenderMode mode, bool values);
-/// OUTPUT.certificate.json.
-std::filesystem::path ray_certificate_path(const std::filesystem::path& output);
+/// What is written beside the picture: the certificate, of mode mip also the picture of the bound.
+std::vector<std::filesystem::path> ray_certificate_paths(const std::filesystem::path& output,
+                                                         RenderMode mode);
 
-/// The certificate of a picture of `scene`. `image`: what was drawn, which is marked; written, or what --show
+/// The certificate of a picture of the source. `drawn` with `options`: is marked and written, or what --show
 /// asks for. The JSON of the file.
-Json write_ray_certificate(const Arguments& args, const Scene& scene, const RenderOptions& options,
-                           Image image, const std::filesystem::path& output, const Progress& progress);
+Json write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
+                           RenderResult drawn, const std::filesystem::path& output, const Progress& progress);
 void print_ray_certificate(const Json& certificate);
 
 }  // namespace vdvr::cli

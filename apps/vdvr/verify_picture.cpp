@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <random>
 
 #include "apps/common/progress.hpp"
@@ -11,6 +13,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -19,64 +22,175 @@ namespace {
 constexpr double kSameLevels = 0.05;
 constexpr double kRayStep = 0.125;  // base cells
 
+/// What was found along random rays.
 struct RayCheck {
   std::int64_t rays = 0, outside = 0;
   double worst = 0;  ///< of the share of half the interval, from its middle, that F takes
 };
-
-/// F along random rays, of which half go where the interval is not just the background.
-RayCheck check_rays(const Arguments& args, const CertifiedPicture& picture, const VdvrFile& file,
-                    const PixelBounds& bounds, const Progress& progress) {
-  const auto path = args.path("projections");
-  const ProjectionSet scan = load_certified_scan(path, args, file.certificate, progress);
-  check_projections(path, scan, file.certificate);
-  const ExactField exact(scan, file.certificate.field, progress);
-  const auto field = [&](const std::vector<Vec3>& points) { return exact.at(points); };
-  std::vector<std::size_t> crossing;
-  for (std::size_t i = 0; i < bounds.parts.size(); ++i)
-    if (bounds.parts[i] > 0) crossing.push_back(i);
-  std::mt19937_64 random(2024);
-  RayCheck check;
-  const std::int64_t wanted = args.integer_or("rays", 16, 1, 1'000'000);
-  for (; check.rays < wanted; ++check.rays) {
-    report(progress, "rays", static_cast<double>(check.rays) / static_cast<double>(wanted));
-    const bool any = crossing.empty() || check.rays % 2 == 1;
-    const std::size_t i = any ? random() % bounds.parts.size() : crossing[random() % crossing.size()];
-    const auto at = static_cast<std::int64_t>(i);
-    const IdealPixel ideal = ideal_pixel(field, picture.options, file.volume.grid, at % picture.options.width,
-                                         at / picture.options.width, kRayStep);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double lo = static_cast<double>(bounds.lo.values[3 * i + c]) - ideal.quadrature - 0x1p-12,
-                   hi = static_cast<double>(bounds.hi.values[3 * i + c]) + ideal.quadrature + 0x1p-12;
-      const double share = std::abs(2 * ideal.rgb[c] - hi - lo) / (hi - lo);
-      check.worst = std::max(check.worst, share);
-      if (share > 1) ++check.outside;
-    }
-  }
-  return check;
-}
+using Field = std::function<std::vector<double>(const std::vector<Vec3>&)>;
 
 /// The intervals again, of what this device draws.
 struct Again {
   RenderResult drawn;
-  PixelBounds bounds;
+  PixelBounds bounds;     ///< of all but iso
+  MaximumBounds maxima;   ///< of mip
+  SurfaceBounds surface;  ///< of iso
   bool same_device = false;
 };
+void certify_again(Device& device, const ResidentVolume& resident, const CertifiedPicture& picture,
+                   const VdvrFile& file, const Progress& progress, Again& again) {
+  const RenderOptions& o = picture.options;
+  if (o.mode == RenderMode::dvr) {
+    again.bounds =
+        certify_pixels(device, resident, brick_bounds(file.certificate, o.sampler == SamplerKind::image3d), o,
+                       picture.certify, progress);
+    return;
+  }
+  if (o.mode == RenderMode::slice) {
+    again.bounds = certify_slice(file.volume, file.certificate, o, progress);
+    clear_absent(again.drawn.image, again.bounds);
+    return;
+  }
+  const CertifiedRays rays(file.volume, file.certificate, false, box_of(o.clip));
+  if (o.mode == RenderMode::iso) {
+    again.surface = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
+    return;
+  }
+  again.maxima = rays.maximum(o.camera, o.width, o.height, progress);
+  again.bounds = colours_of_maxima(again.maxima, o);
+}
+
 Again made_again(const CommonOptions& common, const CertifiedPicture& picture, const VdvrFile& file,
                  const std::string& name, const Progress& progress) {
   Device device = open_device(common);
   const ResidentVolume resident(device, file.volume);
-  const bool image3d = picture.options.sampler == SamplerKind::image3d;
-  const bool same = device.info().name == picture.device && device.info().driver == picture.driver;
+  Again again;
+  again.same_device = device.info().name == picture.device && device.info().driver == picture.driver;
   try {
-    return {raycast(device, resident, picture.options),
-            certify_pixels(device, resident, brick_bounds(file.certificate, image3d), picture.options,
-                           picture.certify, progress),
-            same};
+    again.drawn = raycast(device, resident, picture.options);
+    throw_if_stopped();
+    certify_again(device, resident, picture, file, progress, again);
   } catch (const InputError& e) {
     throw FileError(fmt::format("{}: does not describe a picture: {}", name, e.what()));
   }
+  throw_if_stopped();
+  return again;
 }
+
+// --- F along random rays ---
+
+void take(RayCheck& check, double value, double low, double high) {
+  const double share = high > low ? std::abs(2 * value - high - low) / (high - low) : value == low ? 0 : 2;
+  check.worst = std::max(check.worst, share);
+  if (!(share <= 1)) ++check.outside;
+}
+
+void check_colours(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                   std::size_t i, RayCheck& check) {
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const IdealPixel ideal = ideal_pixel(field, o, grid, at % o.width, at / o.width, kRayStep);
+  for (std::size_t c = 0; c < 3; ++c)
+    take(check, ideal.rgb[c],
+         static_cast<double>(again.bounds.lo.values[3 * i + c]) - ideal.quadrature - 0x1p-12,
+         static_cast<double>(again.bounds.hi.values[3 * i + c]) + ideal.quadrature + 0x1p-12);
+}
+
+void check_grey(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                std::size_t i, RayCheck& check) {
+  if (again.bounds.parts[i] == 0) return;  // absent
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const auto [low, high] = o.slice_range.value();
+  const double value = field({slice_point(o, grid, at % o.width, at / o.width)}).front(),
+               grey = high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0;
+  take(check, grey, static_cast<double>(again.bounds.lo.values[3 * i]) - 0x1p-23,
+       static_cast<double>(again.bounds.hi.values[3 * i]) + 0x1p-23);
+}
+
+/// What a value between two of a row's may rise above both, as second differences tell: an estimate.
+double rise(const std::vector<double>& values) {
+  double most = 0;
+  for (std::size_t i = 1; i + 1 < values.size(); ++i)
+    most = std::max(most, std::abs(values[i - 1] - 2 * values[i] + values[i + 1]));
+  return most;
+}
+
+void check_maximum(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                   std::size_t i, RayCheck& check) {
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+  if (steps.points.empty() || std::isnan(again.maxima.low.values[i])) return;
+  // Both ends too: the largest value may lie where the region does.
+  std::vector<Vec3> points{steps.at(steps.first)};
+  for (const Vec3& point : steps.points) points.push_back(point);
+  points.push_back(steps.at(steps.last));
+  const std::vector<double> values = field(points);
+  take(check, *std::max_element(values.begin(), values.end()),
+       static_cast<double>(again.maxima.low.values[i]) - rise(values),
+       static_cast<double>(again.maxima.high.values[i]));
+}
+
+void check_crossing(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                    std::size_t i, RayCheck& check) {
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+  if (steps.points.empty()) return;
+  const int hit = again.surface.hit[i];
+  const double value = o.surfaces.front().value,
+               first = hit == 0 ? steps.last : static_cast<double>(again.surface.first.values[i]);
+  if (!(first > steps.first)) return;  // possible from the start: nothing is said
+  const std::vector<double> values = field(steps.points);
+  const double side = values.front() < value ? 1 : -1;
+  bool early = false;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    early |= steps.first + (static_cast<double>(k) + 0.5) * steps.length < first &&
+             !(side * (values[k] - value) < 0);
+  bool reached = hit != 2;
+  if (hit == 2) {
+    const double last = static_cast<double>(again.surface.last.values[i]);
+    // The end of the band is rounded to float32: four units of it, by the slope that neighbours show.
+    double slope = 0;
+    for (std::size_t k = 1; k < values.size(); ++k)
+      slope = std::max(slope, std::abs(values[k] - values[k - 1]) / steps.length);
+    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * slope;
+  }
+  if (early || !reached) ++check.outside;
+}
+
+/// Of random rays half go where the picture is not just the background.
+RayCheck check_rays(const Arguments& args, const CertifiedPicture& picture, const VdvrFile& file,
+                    const Again& again, const Progress& progress) {
+  const auto path = args.path("projections");
+  const ProjectionSet scan = load_certified_scan(path, args, file.certificate, progress);
+  check_projections(path, scan, file.certificate);
+  const ExactField exact(scan, file.certificate.field, progress);
+  const Field field = [&](const std::vector<Vec3>& points) { return exact.at(points); };
+  const RenderMode mode = picture.options.mode;
+  const auto pixels = static_cast<std::size_t>(picture.options.width * picture.options.height);
+  std::vector<std::size_t> crossing;
+  for (std::size_t i = 0; i < pixels; ++i)
+    if (mode == RenderMode::iso ? again.surface.hit[i] > 0 : again.bounds.parts[i] > 0) crossing.push_back(i);
+  std::mt19937_64 random(2024);
+  RayCheck check;
+  const std::int64_t wanted = args.integer_or("rays", 16, 1, 1'000'000);
+  for (; check.rays < wanted; ++check.rays) {
+    throw_if_stopped();
+    report(progress, "rays", static_cast<double>(check.rays) / static_cast<double>(wanted));
+    const bool any = crossing.empty() || check.rays % 2 == 1;
+    const std::size_t i = any ? random() % pixels : crossing[random() % crossing.size()];
+    const auto one = mode == RenderMode::iso     ? check_crossing
+                     : mode == RenderMode::mip   ? check_maximum
+                     : mode == RenderMode::slice ? check_grey
+                                                 : check_colours;
+    one(field, picture, file.volume.grid, again, i, check);
+  }
+  return check;
+}
+
+// --- what the file claims ---
 
 /// Intervals that are as much narrower as two devices may differ.
 PixelBounds narrowed(PixelBounds bounds) {
@@ -88,9 +202,6 @@ PixelBounds narrowed(PixelBounds bounds) {
 /// What the file claims and the intervals do not give.
 void compare(const PictureClaims& claims, const PictureBound& bound, const Again& again,
              std::vector<std::string>& wrong) {
-  if (claims.light != text_of(again.bounds.light) || claims.statement != statement_of(again.bounds))
-    wrong.push_back(
-        fmt::format("what is proved is not what it says: of light '{}'", text_of(again.bounds.light)));
   if (!(bound.max <= claims.max + kSameLevels && bound.mean <= claims.mean + kSameLevels))
     wrong.push_back(fmt::format("the bound is {:.2f} in the mean and {:.2f} at most, not {:.2f} and {:.2f}",
                                 bound.mean, bound.max, claims.mean, claims.max));
@@ -108,6 +219,28 @@ void compare(const PictureClaims& claims, const PictureBound& bound, const Again
   }
 }
 
+/// The same of a surface. Shares may differ by two pixels, depths by what double precision does.
+void compare_surface(const Json& claims, const SurfaceBounds& surface, std::vector<std::string>& wrong) {
+  const double two = 2 / static_cast<double>(surface.hit.size());
+  const Json found = surface_json(surface, "");
+  for (const char* name : {"sure", "none"})
+    if (!(claims.at(name).get<double>() <= found.at(name).get<double>() + two))
+      wrong.push_back(fmt::format("{:.2f} % of the pixels are {}, not {:.2f} %",
+                                  100 * found.at(name).get<double>(), name,
+                                  100 * claims.at(name).get<double>()));
+  for (const char* name : {"band_mean", "band_median", "band_p99"})
+    if (!(claims.at(name).get<double>() >= found.at(name).get<double>() * (1 - 1e-6)))
+      wrong.push_back(fmt::format("`{}` is {:.6g}, not {:.6g}", name, found.at(name).get<double>(),
+                                  claims.at(name).get<double>()));
+}
+
+std::string line_of(const Again& again, const PictureBound& bound, const VdvrFile& file, RenderMode mode) {
+  if (mode != RenderMode::iso) return bound_line(bound, file.certificate);
+  return fmt::format("{:.1f} % of the pixels show the surface for sure, {:.1f} % may, {:.1f} % do not",
+                     100 * again.surface.share(2), 100 * again.surface.share(1),
+                     100 * again.surface.share(0));
+}
+
 }  // namespace
 
 int verify_picture(const Arguments& args, const CommonOptions& common) {
@@ -123,24 +256,31 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
   const auto image_path = certificate_path.parent_path() / picture.file;
   if (sha256_of_file(image_path) != picture.file_sha256)
     wrong.push_back(fmt::format("{} is not the picture that was certified", image_path.string()));
-  if (file.certificate.covered && (picture.covered.radius > file.certificate.covered->radius ||
-                                   picture.options.clip->radius > file.certificate.covered->radius ||
-                                   picture.options.clip->low[2] < file.certificate.covered->z.first ||
-                                   picture.options.clip->high[2] > file.certificate.covered->z.second))
+  if (picture.options.mode != RenderMode::slice && file.certificate.covered &&
+      (picture.covered.radius > file.certificate.covered->radius ||
+       picture.options.clip->radius > file.certificate.covered->radius ||
+       picture.options.clip->low[2] < file.certificate.covered->z.first ||
+       picture.options.clip->high[2] > file.certificate.covered->z.second))
     wrong.emplace_back("the picture shows more than the volume says is covered");
 
   picture.certify.window = file.certificate.window;
   const Again again = made_again(common, picture, file, certificate_path.string(), progress.callback());
-  const PixelBounds& bounds = again.bounds;
-  const PictureBound bound = bound_of_picture(bounds, again.drawn.image);
+  const RenderMode mode = picture.options.mode;
+  const bool iso = mode == RenderMode::iso;
+  const PictureBound bound = iso ? PictureBound{} : bound_of_picture(again.bounds, again.drawn.image);
   const bool same_pixels = sha256_of_pixels(again.drawn.image) == picture.pixels_sha256;
   if (!same_pixels && again.same_device) wrong.emplace_back("the picture that it describes is another one");
-  compare(claims, bound, again, wrong);
+  if (claims.statement != statement_of(mode, again.bounds.light) ||
+      (!iso && claims.light != text_of(again.bounds.light)))
+    wrong.push_back(
+        fmt::format("what is proved is not what it says, but: {}", statement_of(mode, again.bounds.light)));
+  if (iso) compare_surface(claims.iso, again.surface, wrong);
+  else compare(claims, bound, again, wrong);
   std::optional<RayCheck> rays;
-  if (args.has("projections") && !picture.options.shading)
-    rays = check_rays(args, picture, file, bounds, progress.callback());
+  const bool lit = mode == RenderMode::dvr && picture.options.shading;
+  if (args.has("projections") && !lit) rays = check_rays(args, picture, file, again, progress.callback());
   if (rays && rays->outside > 0)
-    wrong.push_back(fmt::format("F shows a colour outside the interval in {} channels", rays->outside));
+    wrong.push_back(fmt::format("F lies outside of what is certain in {} places", rays->outside));
   progress.clear();
 
   Json json = {{"picture", certificate_path.string()},
@@ -148,16 +288,17 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
                {"holds", wrong.empty()},
                {"same_pixels", same_pixels},
                {"failures", wrong}};
-  json.update(bound_json(bound));
+  if (iso) json["iso"] = surface_json(again.surface, file.volume.grid.unit);
+  else json.update(bound_json(bound));
   if (rays) json["rays"] = {{"count", rays->rays}, {"outside", rays->outside}, {"worst_share", rays->worst}};
   print_result(common, json, [&] {
     fmt::print("{}: {}\n  {}\n", certificate_path.string(), wrong.empty() ? "holds" : "DOES NOT HOLD",
-               bound_line(bound, file.certificate));
+               line_of(again, bound, file, mode));
     if (!same_pixels) fmt::print("  this device draws other pixels; the bound is of what it draws\n");
     if (rays)
       fmt::print(
-          "  F along {} random rays: {} channels outside; it takes at most {:.0f} % of half an interval\n",
-          rays->rays, rays->outside, 100 * rays->worst);
+          "  F along {} random rays: {} times outside{}\n", rays->rays, rays->outside,
+          iso ? "" : fmt::format("; it takes at most {:.0f} % of half an interval", 100 * rays->worst));
     else if (args.has("projections"))
       fmt::print("  F was not evaluated: the picture has light, which no field of F alone gives\n");
   });

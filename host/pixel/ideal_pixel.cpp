@@ -23,21 +23,25 @@ std::array<double, 3> seen(const std::vector<double>& values, std::size_t stride
 
 }  // namespace
 
+RaySteps steps_of_pixel(const RenderOptions& o, const Grid& g, std::int64_t x, std::int64_t y, double step) {
+  const PixelRay s = pixel_ray(o, g, x, y);
+  RaySteps steps{s.from, s.direction, s.first, s.last, 0, {}};
+  if (!(s.first < s.last)) return steps;
+  const double unit = *std::min_element(g.spacing.begin(), g.spacing.end());
+  // Every third middle is a middle of steps three times as long.
+  const auto count = 3 * static_cast<std::size_t>(std::ceil((s.last - s.first) / (3 * step * unit)));
+  steps.length = (s.last - s.first) / static_cast<double>(count);
+  for (std::size_t i = 0; i < count; ++i)
+    steps.points.push_back(s.at(s.first + (static_cast<double>(i) + 0.5) * steps.length));
+  return steps;
+}
+
 IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
                        const RenderOptions& o, const Grid& g, std::int64_t x, std::int64_t y, double step) {
-  const PixelRay s = pixel_ray(o, g, x, y);
-  const double unit = *std::min_element(g.spacing.begin(), g.spacing.end());
+  const RaySteps s = steps_of_pixel(o, g, x, y, step);
+  const std::vector<Vec3>& points = s.points;
+  const double unit = *std::min_element(g.spacing.begin(), g.spacing.end()), h = s.length;
   IdealPixel pixel;
-  std::vector<Vec3> points;
-  double h = 0;
-  if (s.first < s.last) {
-    // Thrice an odd number would do as well: every third middle is a middle of steps three times as long.
-    const auto count = 3 * static_cast<std::size_t>(std::ceil((s.last - s.first) / (3 * step * unit)));
-    h = (s.last - s.first) / static_cast<double>(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      points.push_back(s.at(s.first + (static_cast<double>(i) + 0.5) * h));
-    }
-  }
   const std::vector<double> values = points.empty() ? std::vector<double>{} : field(points);
   pixel.rgb = seen(values, 1, h / unit, o, y);
   pixel.points = points.size();

@@ -35,6 +35,18 @@ ProjectionSet geometry_of(const Certificate& certificate) {
   return std::move(*scan);
 }
 
+/// What lies in both.
+std::optional<std::array<double, 6>> common_box(const std::optional<std::array<double, 6>>& a,
+                                                const std::optional<std::array<double, 6>>& b) {
+  if (!a || !b) return a ? a : b;
+  std::array<double, 6> box = *a;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box[i] = std::max(box[i], (*b)[i]);
+    box[i + 3] = std::min(box[i + 3], (*b)[i + 3]);
+  }
+  return box;
+}
+
 }  // namespace
 
 double SurfaceBounds::share(std::uint8_t kind) const {
@@ -52,10 +64,11 @@ std::array<double, 3> background_of(const PictureViews& views, std::int64_t y) {
 }
 
 struct CertifiedRays::Impl {
-  Impl(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan, bool image3d)
+  Impl(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan, bool image3d,
+       const std::optional<std::array<double, 6>>& box)
       : bounds(brick_bounds(certificate, image3d)),
         coverage(certified_coverage(scan, certificate.field)),
-        field(volume, bounds, coverage, certificate.roi) {
+        field(volume, bounds, coverage, common_box(certificate.roi, box)) {
     if (certificate.window)
       throw InputError(
           "the certificate has a window: outside of it nothing bounds |V - F|, so that nothing can "
@@ -68,9 +81,10 @@ struct CertifiedRays::Impl {
 
 CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certificate,
                              const ProjectionSet& scan, bool image3d)
-    : impl_(std::make_unique<Impl>(volume, certificate, scan, image3d)) {}
-CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d)
-    : CertifiedRays(volume, certificate, geometry_of(certificate), image3d) {}
+    : impl_(std::make_unique<Impl>(volume, certificate, scan, image3d, std::nullopt)) {}
+CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d,
+                             const std::optional<std::array<double, 6>>& box)
+    : impl_(std::make_unique<Impl>(volume, certificate, geometry_of(certificate), image3d, box)) {}
 CertifiedRays::~CertifiedRays() = default;
 
 ColourBounds CertifiedRays::colours(const PictureViews& views, std::size_t view,

@@ -2,6 +2,7 @@
 // surface, of a maximum (docs/pixel-bounds.md). Double precision on the host, ray by ray.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -47,8 +48,10 @@ class VDVR_API CertifiedRays {
   /// bounds by brick, or a window.
   CertifiedRays(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan,
                 bool image3d = false);
-  /// The same with the geometry that the certificate notes. Throws InputError where it notes none.
-  CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d = false);
+  /// The same with the geometry that the certificate notes, and of what lies in `box` ({x0, y0, z0, x1, y1,
+  /// z1}) alone. Throws InputError where it notes none.
+  CertifiedRays(const MixedVolume& volume, const Certificate& certificate, bool image3d = false,
+                const std::optional<std::array<double, 6>>& box = {});
   ~CertifiedRays();
   CertifiedRays(const CertifiedRays&) = delete;
   CertifiedRays& operator=(const CertifiedRays&) = delete;

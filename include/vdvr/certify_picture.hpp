@@ -63,6 +63,19 @@ VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume
                                     const std::vector<float>& bounds, const RenderOptions& options,
                                     const CertifyPictureOptions& certify = {}, const Progress& progress = {});
 
+/// The same of a slice, whose `slice_range` says its greys: F at the middle of each pixel, by V and the bound
+/// of its brick. What is not covered, or outside the region of interest, is absent: clear_absent() makes a
+/// drawn slice so. Host only. Throws InputError for another mode, no `slice_range`, a certificate with a
+/// window or one that does not say which points are covered; Interrupted.
+VDVR_API PixelBounds certify_slice(const MixedVolume& volume, const Certificate& certificate,
+                                   const RenderOptions& options, const Progress& progress = {});
+VDVR_API void clear_absent(Image& drawn, const PixelBounds& bounds);
+/// The middle of a slice's pixel, world units.
+VDVR_API Vec3 slice_point(const RenderOptions& options, const Grid& grid, std::int64_t x, std::int64_t y);
+struct MaximumBounds;
+/// The colours that mode mip has for what certain maxima can be; behind rays without one the background.
+VDVR_API PixelBounds colours_of_maxima(const MaximumBounds& maxima, const RenderOptions& options);
+
 /// How far what was drawn can lie from the ideal picture, in levels of 255.
 struct PictureBound {
   FloatImage levels;  ///< one channel: of the worst channel of each pixel; infinite where nothing is known
@@ -84,6 +97,18 @@ struct IdealPixel {
   double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
   std::size_t points = 0;
 };
+/// The ray of a pixel within the grid and `options.clip`, and the middles of its steps.
+struct RaySteps {
+  Vec3 from{}, direction{};
+  double first = 0, last = 0, length = 0;  ///< from the eye, world units; of a step
+  std::vector<Vec3> points;                ///< thrice a whole number of them, or none
+  [[nodiscard]] Vec3 at(double t) const {
+    return {from[0] + t * direction[0], from[1] + t * direction[1], from[2] + t * direction[2]};
+  }
+};
+/// `step` in base cells, at most.
+VDVR_API RaySteps steps_of_pixel(const RenderOptions& options, const Grid& grid, std::int64_t x,
+                                 std::int64_t y, double step);
 /// `field` gives values at world points, as ExactField::at. `step` in base cells.
 VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
                                 const RenderOptions& options, const Grid& grid, std::int64_t x,

@@ -4,12 +4,15 @@
 #include <boost/test/unit_test.hpp>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "host/rays/crossings.hpp"
 #include "host/rays/emission.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
+#include "vdvr/certified_rays.hpp"
+#include "vdvr/certify_picture.hpp"
 
 using namespace vdvr;
 
@@ -280,6 +283,34 @@ BOOST_AUTO_TEST_CASE(without_an_error_the_interval_closes) {
   // 64 parts a cell, on each of which V moves by its slope over them; a colour turns by less than 4 a value,
   // and extinction by less than 2.
   BOOST_TEST(width < 2 * (4 + 2) * 3 * slope / 64);
+}
+
+BOOST_AUTO_TEST_CASE(colours_of_a_maximum_hold_the_points_and_both_sides_of_jumps_between_its_ends) {
+  RenderOptions o;
+  o.mode = RenderMode::mip;
+  o.width = 4;
+  o.height = 1;
+  o.transfer.points = {{0, {0, 0, 0}, 1}, {0.4, {1, 0, 0}, 1}, {0.4, {0, 1, 0}, 1}, {1, {0, 0, 0}, 1}};
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  MaximumBounds m;
+  m.low = {4, 1, {0.1f, 0.3f, 0.5f, none}, 1};
+  m.high = {4, 1, {0.2f, 0.4f, std::numeric_limits<float>::infinity(), none}, 1};
+  const PixelBounds b = colours_of_maxima(m, o);
+  const auto interval = [&](std::size_t pixel, std::size_t c) {
+    return std::pair{static_cast<double>(b.lo.values[3 * pixel + c]),
+                     static_cast<double>(b.hi.values[3 * pixel + c])};
+  };
+  constexpr double u = 0x1p-22;  // two roundings to float32 of numbers up to 1
+  BOOST_TEST(std::abs(interval(0, 0).first - 0.25) <= u);
+  BOOST_TEST(std::abs(interval(0, 0).second - 0.5) <= u);
+  BOOST_TEST(std::abs(interval(1, 0).second - 1) <= u);
+  BOOST_TEST(std::abs(interval(1, 1).second - 1) <= u);
+  BOOST_TEST(std::abs(interval(1, 0).first) <= u);
+  BOOST_TEST(std::abs(interval(2, 1).second - 5.0 / 6) <= u);
+  BOOST_TEST(std::abs(interval(2, 1).first) <= u);
+  BOOST_TEST(b.untested[2] == 1);
+  BOOST_TEST(b.parts[3] == 0);
+  BOOST_TEST(interval(3, 0).second - interval(3, 0).first <= u);
 }
 
 BOOST_AUTO_TEST_CASE(ranges_hold_both_sides_of_a_jump_and_the_colour_beside_what_is_clear) {

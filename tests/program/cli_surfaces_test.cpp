@@ -50,9 +50,85 @@ BOOST_AUTO_TEST_CASE(a_maximum_has_its_bounds) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(a_box_cuts_picture_and_certificate_alike) {
+  const std::vector<std::string> words{"render",    small_volume(), "--mode", "iso",     "--iso", "0.5",
+                                       "--certify", "--size",       "32x32",  "--force", "-o"};
+  auto whole = words, half = words;
+  whole.push_back(at("uncut.png"));
+  half.insert(half.end(),
+              {at("cut.png"), "--clip", "-20,-20,-20,20,0,20", "--azimuth", "90", "--frame", "grid"});
+  whole.insert(whole.end(), {"--azimuth", "90", "--frame", "grid"});
+  for (const auto& w : {whole, half}) {
+    const Ended r = run(w);
+    BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
+  }
+  const auto all = json_of(at("uncut.certificate.json")).at("iso"),
+             cut = json_of(at("cut.certificate.json")).at("iso");
+  const auto shown = [](const nlohmann::json& iso) { return 1 - iso.at("none").get<double>(); };
+  BOOST_TEST(shown(cut) > 0);
+  BOOST_TEST(shown(cut) < 0.8 * shown(all));
+}
+
+BOOST_AUTO_TEST_CASE(certified_pictures_of_every_mode_are_verified) {
+  const std::vector<std::vector<std::string>> modes{
+      {"--mode", "iso", "--iso", "0.5"}, {"--mode", "mip"}, {"--mode", "slice", "--slice-axis", "y"}};
+  for (const auto& mode : modes) {
+    const std::string name = mode[1], certificate = at(name + "-v.certificate.json");
+    std::vector<std::string> words{"render",  small_volume(), "--certify",        "--size",
+                                   "160x160", "-o",           at(name + "-v.png")};
+    words.insert(words.end(), mode.begin(), mode.end());
+    const Ended r = run(words);
+    BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
+    BOOST_TEST(json_of(certificate).at("picture").at("mode") == name);
+    BOOST_TEST(std::filesystem::exists(at(name + "-v.bound.png")) == (name != "iso"));
+    const Ended v = run({"verify", small_volume(), "--picture", certificate, "--projections", small_scan(),
+                         "--rays", "24", "--json"});
+    BOOST_TEST_CONTEXT(name << ": " << v.err) {
+      BOOST_TEST(v.code == 0);
+      const auto json = nlohmann::json::parse(v.out);
+      BOOST_TEST(json.at("same_pixels") == true);
+      BOOST_TEST(json.at("rays").at("outside") == 0);
+    }
+    auto better = json_of(certificate);
+    if (name == "iso") better["iso"]["band_p99"] = 1e-9;
+    else better["levels"]["mean"] = 1e-9;
+    write(certificate, better.dump());
+    BOOST_TEST(run({"verify", small_volume(), "--picture", certificate}).code == 1);
+    auto other = json_of(certificate);
+    other["picture"]["mode"] = "xray";
+    write(certificate, other.dump());
+    check_refused({"verify", small_volume(), "--picture", certificate}, "xray");
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_slice_has_its_bound_and_its_tolerance) {
+  const std::vector<std::string> words{"render", small_volume(), "--mode",  "slice",  "--tf-range",
+                                       "0,1",    "--size",       "200x200", "--force"};
+  auto plain = words, within = words, beyond = words;
+  plain.insert(plain.end(), {"--certify", "--show", "bound", "-o", at("slice.npy"), "--json"});
+  const Ended r = run(plain);
+  BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
+  const auto json = nlohmann::json::parse(r.out);
+  const double worst = json.at("levels").at("max").get<double>();
+  // No wider than the certificate's bound, and half a level of the byte drawn.
+  const auto info = run({"info", small_volume(), "--json"});
+  const double total =
+      nlohmann::json::parse(info.out).at("certificate").at("total").at("buffer").get<double>();
+  BOOST_TEST(worst > 0.5);
+  BOOST_TEST(worst <= 255 * total + 1);
+  within.insert(within.end(), {"--picture-tolerance", std::to_string(worst + 1), "-o", at("slice-in.png")});
+  beyond.insert(beyond.end(), {"--picture-tolerance", "1", "-o", at("slice-out.png")});
+  BOOST_TEST(run(within).code == 0);
+  BOOST_TEST(run(beyond).code == 1);
+}
+
 BOOST_AUTO_TEST_CASE(what_has_no_certificate_by_ray_is_refused) {
   const std::string out = at("refused.png");
-  check_refused({"render", small_volume(), "--mode", "slice", "--certify", "-o", out}, "--certify");
+  check_refused({"render", small_volume(), "--mode", "error", "--certify", "-o", out}, "--certify");
+  check_refused({"render", small_volume(), "--mode", "mip", "--certify", "--show", "band", "-o", out},
+                "band");
+  check_refused({"render", small_volume(), "--mode", "iso", "--certify", "--show", "bound", "-o", out},
+                "bound");
   check_refused({"render", small_volume(), "--mode", "iso", "--show", "band", "-o", out}, "--certify");
   check_refused({"render", small_volume(), "--mode", "mip", "--certify", "--show", "class", "-o", out},
                 "--show class");

@@ -206,9 +206,10 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
     refuse(args, {"covered-from"}, "goes with --clip-covered and --certify");
   if (flat)
     refuse(args,
-           {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading", "show",
+           {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading",
             "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
+  if (flat && !asks_certify(args)) refuse(args, {"show"}, "does not apply to a slice without --certify");
   // What a slice takes of it is the window; an error picture's colours always run to epsilon.
   if (o.mode == RenderMode::error) refuse(args, {"tf-range"}, "does not apply to --mode error");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
@@ -423,8 +424,10 @@ int render_command(Arguments& args) {
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   check_ray_certificate(args, o.mode, kind == OutputKind::values);
   // Colours are certified by the device, surfaces and maxima ray by ray on the host.
-  const bool certifies = args.has("certify") && o.mode != RenderMode::dvr;
-  if (certifies) check_output(ray_certificate_path(output), common.force, {file_of_volume(path)});
+  const bool certifies = asks_certify(args) && (o.mode == RenderMode::iso || o.mode == RenderMode::mip);
+  if (certifies)
+    for (const auto& beside : ray_certificate_paths(output, o.mode))
+      check_output(beside, common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
   const std::string method = method_option(args);
@@ -440,6 +443,7 @@ int render_command(Arguments& args) {
   const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
   o.camera = camera_for(args, frame, orbit);
   o.clip = clip_for(args, scene, progress.callback());
+  if (certifies) o.clip = certified_clip(args, scene, o, progress.callback());
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr";
   o.skip_empty = !args.has("no-skip");
@@ -457,7 +461,7 @@ int render_command(Arguments& args) {
                                  : draw_one(stage, o, output, kind);
   Json ray_certificate;
   if (certifies)
-    ray_certificate = write_ray_certificate(args, scene, o, result.image, output, progress.callback());
+    ray_certificate = write_ray_certificate(args, source, o, result, output, progress.callback());
   progress.clear();
 
   const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
