@@ -16,8 +16,9 @@ void check_consistency(const std::filesystem::path& path, const Certificate& c) 
 
 }  // namespace
 
-VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  VdvrFile file = read_vdvr(path, max_memory_bytes, Altered::refuse);
+VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                        const std::optional<std::filesystem::path>& scratch) {
+  VdvrFile file = read_vdvr(path, max_memory_bytes, Altered::refuse, scratch);
   check_consistency(path, file.certificate);
   return file;
 }
