@@ -128,13 +128,15 @@ RenderResult Source::draw(const RenderOptions& options) {
   return crew_ ? crew_->render(options) : renderer_->render(options);
 }
 
-PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify) {
+PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
+                            const Progress& progress) {
   if (paged_)
     throw ResourceError(
         "--certify: intervals of pixels need the whole volume on the device, which has no room for it: raise "
         "--max-memory, or take another --device");
   const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
-  return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify);
+  return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify,
+                        progress);
 }
 
 std::uint64_t Source::bytes() const {

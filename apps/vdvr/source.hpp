@@ -35,8 +35,10 @@ class Source {
   [[nodiscard]] Device& device() { return *device_; }
   [[nodiscard]] RenderResult draw(const RenderOptions& options);
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
-  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify);
-  /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most so far.
+  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
+                                    const Progress& progress);
+  /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most
+  /// so far.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Of a volume that is brought to the device by bricks.
   [[nodiscard]] std::optional<PagingCounts> paging() const;
