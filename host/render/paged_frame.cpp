@@ -101,6 +101,11 @@ class Parts {
       const auto i = static_cast<std::size_t>(a);
       wider_[a] = 0.125 + 0x1p-19 * (2 * std::abs(eye[i]) + cells[i]);
     }
+    // The picture lies on the device by now, and will on the host.
+    const std::uint64_t left = volume.state->memory.left(),
+                        picture =
+                            sizeof(cl_float4) * static_cast<std::uint64_t>(options.width * options.height);
+    limit_ = std::min(volume.memory, left > picture ? left - picture : 0);
     drawn_.assign(volume.facts->ranges.size(), 0u);
     std::iota(drawn_.begin(), drawn_.end(), 0u);
   }
@@ -159,7 +164,7 @@ class Parts {
                  static_cast<std::size_t>(bx));
     }
     needed_ = volume_.fixed_bytes(lit_) + bytes;
-    if (!volume_.fits(samples, stored, bytes, lit_)) return std::nullopt;
+    if (!volume_.fits(samples, stored, bytes, lit_, limit_)) return std::nullopt;
     return here;
   }
 
@@ -172,7 +177,7 @@ class Parts {
       throw ResourceError(fmt::format(
           "the bricks behind {} x {} pixels take {} bytes with base and index, and {} are left for them "
           "under the limit: raise `max_memory`, take a larger `size`, or `gradient` central",
-          width, height, needed_, volume_.memory));
+          width, height, needed_, limit_));
     const auto half = [](std::int64_t n) { return (n / 2 + kLeastSide - 1) / kLeastSide * kLeastSide; };
     Pixels first = part, second = part;
     if (width >= height) first.x1 = second.x0 = part.x0 + half(width);
@@ -189,6 +194,7 @@ class Parts {
   bool beside_ = false;  ///< gradients are taken
   glm::dvec3 wider_{0};  ///< cells
   std::vector<std::uint32_t> drawn_;
+  std::uint64_t limit_ = 0;  ///< of what is on the device for a part
   mutable std::uint64_t needed_ = 0;
 };
 
@@ -210,7 +216,8 @@ bool stored_would_fit(const PagedVolume& volume) {
   const PagedVolume::Impl& v = volume.impl();
   const DeviceInfo& d = v.state->info;
   return v.whole_lit <= static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()) &&
-         8 * v.whole_lit <= d.max_allocation && 8 * v.whole_lit <= d.global_memory / 2;
+         8 * v.whole_lit <= d.max_allocation &&
+         sample_buffer_bytes(*v.volume) + 8 * v.whole_lit <= d.global_memory / 2;
 }
 
 DrawnField drawn_field(const PagedVolume& volume) {

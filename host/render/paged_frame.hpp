@@ -15,8 +15,8 @@ DrawnField drawn_field(const PagedVolume& volume);
 /// Always `buffer`. Throws ResourceError for image3d: the positions of samples in an atlas have the rounding
 /// of their coordinates there, so that other tiles beside them would change bits.
 std::pair<SamplerKind, std::string> choose_sampler(SamplerKind asked);
-/// Whether GradientKind::automatic takes stored gradients: what a device without a limit would do for the
-/// whole volume.
+/// Whether GradientKind::automatic takes stored gradients: what a device of which half is free
+/// would do for the whole volume.
 bool stored_would_fit(const PagedVolume& volume);
 /// Draws part after part, and waits for each: bricks of the next take the place of those before. `frame` is
 /// of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render, and ResourceError

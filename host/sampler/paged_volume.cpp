@@ -56,14 +56,20 @@ PagedVolume::Impl::Impl(Device& device, const MixedVolume& v, std::uint64_t memo
     break;
   }
   const std::uint64_t most = memory_bytes == 0 ? left : std::min(left, memory_bytes);
-  memory = most > host ? most - host : 0;
+  // An eighth is left for pages that the keeper of scratch is late for, and for small things.
+  memory = most > host ? (most - host) / 8 * 7 : 0;
   const std::uint64_t least = fixed_bytes(false);
   if (least > memory)
     throw ResourceError(fmt::format(
         "base and index of this volume take {} bytes, and {} are left for them under the limit; only tiles "
         "are brought to the device brick by brick: raise `max_memory`",
         least + host, most));
+  // Last, because a constructor that throws runs no destructor to give it back.
+  state->take_host(host, "index of a volume by bricks");
+  on_host_ = host;
 }
+
+PagedVolume::Impl::~Impl() { state->memory.give(on_host_); }
 
 void PagedVolume::Impl::find_kinds() {
   const MixedVolume& v = *volume;
@@ -114,7 +120,7 @@ std::uint64_t PagedVolume::Impl::fixed_bytes(bool lit) const {
 }
 
 bool PagedVolume::Impl::fits(std::uint64_t samples, std::uint64_t stored_bytes, std::uint64_t device_bytes,
-                             bool lit) const {
+                             bool lit, std::uint64_t limit) const {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
   std::uint64_t all_samples = volume->base.size() + samples, all_bytes = volume->base.bytes() + stored_bytes;
   std::uint64_t on_device = fixed_bytes(lit) + device_bytes;
@@ -123,7 +129,7 @@ bool PagedVolume::Impl::fits(std::uint64_t samples, std::uint64_t stored_bytes, 
     all_bytes += stored_bytes_of(brick) + 4;
     on_device += bytes_of(brick, lit);
   }
-  if (on_device > memory || all_bytes > state->info.max_allocation) return false;
+  if (on_device > limit || all_bytes > state->info.max_allocation) return false;
   return !lit || (all_samples <= most && 8 * all_samples <= state->info.max_allocation);
 }
 

@@ -13,15 +13,19 @@ namespace vdvr {
 
 struct PagedVolume::Impl {
   Impl(Device& device, const MixedVolume& volume, std::uint64_t memory_bytes);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   /// Bytes on the device that a brick adds, with `lit` those of lit samples too; of bricks that read the base
   /// 0.
   [[nodiscard]] std::uint64_t bytes_of(std::size_t brick, bool lit) const;
   /// What is on the device with any part.
   [[nodiscard]] std::uint64_t fixed_bytes(bool lit) const;
-  /// Whether bricks with so many samples, and so many bytes of them as they are stored, fit beside that.
+  /// Whether bricks with so many samples, and so many bytes of them as they are stored, fit beside that
+  /// within `limit`.
   [[nodiscard]] bool fits(std::uint64_t samples, std::uint64_t stored_bytes, std::uint64_t device_bytes,
-                          bool lit) const;
+                          bool lit, std::uint64_t limit) const;
   [[nodiscard]] std::uint64_t samples_of(std::size_t brick) const;
   [[nodiscard]] std::uint64_t stored_bytes_of(std::size_t brick) const;
   /// `here`: by brick 1 where its tile is wanted; bricks that every part has are added.
@@ -39,6 +43,7 @@ struct PagedVolume::Impl {
   mutable PagingCounts counts;
 
  private:
+  std::uint64_t on_host_ = 0;  ///< of the account
   struct Kind {
     TileKind name;
     const SampleBlock* block = nullptr;

@@ -131,7 +131,7 @@ def frames(work, launchers):
     if "\n1: " in work.call([work.vdvr, "devices"], **two).stdout:
         render(picture, "--force", "--device", "all", **two)
         check(picture.read_bytes() == one, "all devices draw another picture")
-    # By bricks: the volume does not fit, and the picture is the same.
+    # Neither base nor index fit; that tiles need not is tests/device/paged_volume_test.cpp.
     refused = render(picture, "--force", "--max-memory", "20K", expected=3)
     check("max-memory" in refused.stderr, refused.stderr)
     whole, _ = turned()
