@@ -6,6 +6,7 @@
 #include "apps/vdvr/crew.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/read_large.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/verify_file.hpp"
@@ -89,8 +90,8 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {
   const CommonOptions common = common_options(args);
   const std::uint64_t memory = common.max_memory / static_cast<std::uint64_t>(processes_here());
-  if (unverified) return read_vdvr(path, memory, Altered::report, common.scratch);
-  VdvrFile file = read_certified(path, memory, common.scratch);
+  if (unverified) return read_large_vdvr(path, memory, common.scratch, Altered::report);
+  VdvrFile file = read_large_certified(path, memory, common.scratch);
   if (file.seal == Seal::none && !common.quiet)
     say(
         fmt::format("{}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "

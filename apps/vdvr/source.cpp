@@ -68,9 +68,8 @@ Source::Source(const Arguments& args, const CommonOptions& common, const std::st
   } else {
     report(progress, "find ranges", 0);
     paged_.emplace(*device_, scene_->volume);
-    renderer_.emplace(*device_, *paged_);
   }
-  if (selectors.size() > 1) open_others({selectors.begin() + 1, selectors.end()}, memory, progress);
+  if (paged_ || selectors.size() > 1) open_others({selectors.begin() + 1, selectors.end()}, memory, progress);
 }
 
 void Source::open_others(const std::vector<std::string>& selectors, std::uint64_t memory,
@@ -119,7 +118,8 @@ RenderResult Source::draw(const RenderOptions& options) {
   if (options.output == RenderOutput::error && !bounds_set_) {
     if (!scene_->certificate)
       throw InputError("--show error: the volume has no certificate to take bounds from");
-    const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
+    // By bricks it is always the buffer.
+    const bool image3d = renderer_ && renderer_->sampler(options.sampler) == SamplerKind::image3d;
     const std::vector<float> bounds = brick_bounds(*scene_->certificate, image3d);
     if (crew_) crew_->set_bounds(bounds);
     else renderer_->set_bounds(bounds);

@@ -59,7 +59,7 @@ class Source {
   std::optional<ResidentVolume> resident_;  ///< or
   std::optional<PagedVolume> paged_;        ///< or
   std::vector<std::unique_ptr<Other>> others_;
-  std::optional<RenderCrew> crew_;  ///< of all devices, where there are several
+  std::optional<RenderCrew> crew_;  ///< of all devices, where there are several, or of one by bricks
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;

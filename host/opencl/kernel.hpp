@@ -13,12 +13,11 @@
 
 namespace vdvr::opencl {
 
-/// Global and local work sizes, and the first work-item's number; `global` is rounded up to a multiple of
-/// `local` here and nowhere else, so every kernel guards its range by arguments.
+/// Global and local work sizes; `global` is rounded up to a multiple of `local` here and nowhere else, so
+/// every kernel guards its range by arguments.
 struct Range {
   std::array<std::uint64_t, 3> global{1, 1, 1};
   std::array<std::uint64_t, 3> local{1, 1, 1};
-  std::array<std::uint64_t, 3> offset{0, 0, 0};
 };
 
 /// Args are the device-side argument types: cl::Buffer, cl::Image3D, or plain values.
@@ -58,9 +57,8 @@ class Kernel {
       cl_uint index = 0;
       (kernel_.setArg(index++, args), ...);
       cl::Event event;
-      state_->queue.enqueueNDRangeKernel(
-          kernel_, cl::NDRange(range.offset[0], range.offset[1], range.offset[2]),
-          cl::NDRange(g(0), g(1), g(2)), cl::NDRange(local[0], local[1], local[2]), nullptr, &event);
+      state_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(g(0), g(1), g(2)),
+                                         cl::NDRange(local[0], local[1], local[2]), nullptr, &event);
       state_->keep_pace(std::move(event));
     } catch (const cl::Error& e) {
       throw DeviceError(fmt::format("kernel {} on '{}', global {}x{}x{}, local {}x{}x{}: {} {}", name_,

@@ -25,12 +25,8 @@
 namespace vdvr {
 namespace {
 
-// Pixels along a side below which no part is cut: a work-group.
+// PixelBox along a side below which no part is cut: a work-group.
 constexpr std::int64_t kLeastSide = 8;
-
-struct Pixels {
-  std::int64_t x0, y0, x1, y1;
-};
 
 // A box in cells, or the pyramid of some pixels within it.
 struct Beam {
@@ -48,7 +44,7 @@ struct Beam {
   }
 };
 
-Beam beam_of(const VdvrRaycast& p, const Pixels& part) {
+Beam beam_of(const VdvrRaycast& p, const PixelBox& part) {
   const glm::dvec3 scale(p.cells_per_length_x, p.cells_per_length_y, p.cells_per_length_z);
   const auto direction = [&](std::int64_t x, std::int64_t y) {
     const double across = 2 * static_cast<double>(x) / p.width - 1,
@@ -71,7 +67,7 @@ Beam beam_of(const VdvrRaycast& p, const Pixels& part) {
   return beam;
 }
 
-Beam beam_of(const VdvrSlice& s, const Pixels& part) {
+Beam beam_of(const VdvrSlice& s, const PixelBox& part) {
   Beam beam;
   for (int a = 0; a < 3; ++a) beam.low[a] = beam.high[a] = static_cast<double>(s.first[a]);
   const auto span = [&](int axis, float step, std::int64_t from, std::int64_t to) {
@@ -118,7 +114,7 @@ class Parts {
 
  private:
   /// Those of `bricks` that rays of these pixels may pass.
-  [[nodiscard]] std::vector<std::uint32_t> met(const Pixels& part,
+  [[nodiscard]] std::vector<std::uint32_t> met(const PixelBox& part,
                                                const std::vector<std::uint32_t>& bricks) const {
     const Beam beam = options_.mode == RenderMode::slice ? beam_of(slice_, part) : beam_of(rays_, part);
     const VdvrGrid& g = volume_.grid;
@@ -169,7 +165,7 @@ class Parts {
   }
 
   template <class Draw>
-  void cut(const Pixels& part, const std::vector<std::uint32_t>& around, Draw&& draw) const {
+  void cut(const PixelBox& part, const std::vector<std::uint32_t>& around, Draw&& draw) const {
     const std::vector<std::uint32_t> bricks = met(part, around);
     if (auto here = wanted(bricks)) return draw(part, std::move(*here));
     const std::int64_t width = part.x1 - part.x0, height = part.y1 - part.y0;
@@ -179,7 +175,7 @@ class Parts {
           "under the limit: raise `max_memory`, take a larger `size`, or `gradient` central",
           width, height, needed_, limit_));
     const auto half = [](std::int64_t n) { return (n / 2 + kLeastSide - 1) / kLeastSide * kLeastSide; };
-    Pixels first = part, second = part;
+    PixelBox first = part, second = part;
     if (width >= height) first.x1 = second.x0 = part.x0 + half(width);
     else first.y1 = second.y0 = part.y0 + half(height);
     cut(first, bricks, draw);
@@ -197,18 +193,6 @@ class Parts {
   std::uint64_t limit_ = 0;  ///< of what is on the device for a part
   mutable std::uint64_t needed_ = 0;
 };
-
-opencl::Range range_of(const Pixels& part, const RenderOptions& o, const FramePlan& plan) {
-  RenderOptions some = o;
-  some.width = part.x1 - part.x0;
-  some.height = part.y1 - part.y0;
-  opencl::Range range = packet_range(some, plan.tuning, plan.lanes);
-  // Work-items count packets; groups are kLeastSide pixels wide and high, so that none leaves the part.
-  const auto packets = static_cast<std::uint64_t>(kLeastSide);
-  range.offset = {static_cast<std::uint64_t>(part.x0) / packets * range.local[0],
-                  static_cast<std::uint64_t>(part.y0) / packets * range.local[1], 0};
-  return range;
-}
 
 }  // namespace
 
@@ -257,9 +241,9 @@ Enqueued enqueue_frame(Frame& frame, Device& device, const PagedVolume& volume, 
   const VdvrRaycast rays = flat ? VdvrRaycast{} : make_params(frame.field(), o, table, plan.slack);
   const VdvrSlice slice = flat ? make_slice(frame.field(), o) : VdvrSlice{};
   const Parts parts(v, o, lit, rays, slice);
-  parts.each(rows.value_or(Rows{0, o.height}), [&](const Pixels& pixels, std::vector<std::uint8_t> here) {
+  parts.each(rows.value_or(Rows{0, o.height}), [&](const PixelBox& pixels, std::vector<std::uint8_t> here) {
     const auto part = v.load(std::move(here), lit);
-    draw_pixels(frame, *part, o, plan, table, range_of(pixels, o, plan));
+    draw_pixels(frame, *part, o, plan, table, pixels);
     opencl::finish(*v.state, "drawing a part of a picture");
   });
   return {plan.sampler, std::move(plan.sampler_reason), plan.gradient, start};

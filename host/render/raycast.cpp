@@ -153,23 +153,28 @@ namespace {
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(const Frame& f, const Impl& v, const RenderOptions& o, const opencl::Defines& defines,
-            const opencl::Range& range, const BakedTransfer& table, float slack, const VdvrGrid& grid,
-            const cl::Buffer& bricks, const Field&... field) {
+            const opencl::Range& range, const PixelBox& pixels, const BakedTransfer& table, float slack,
+            const VdvrGrid& grid, const cl::Buffer& bricks, const Field&... field) {
   const auto& picture = f.picture().buffer();
   if (o.mode == RenderMode::slice) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
         *v.state, "render/raycast", kernel_of(o).name, defines);
-    kernel(range, field..., bricks, grid, make_slice(f.field(), o), picture, f.row_samples());
+    VdvrSlice slice = make_slice(f.field(), o);
+    slice.pixel_x = static_cast<int>(pixels.x0);
+    slice.pixel_y = static_cast<int>(pixels.y0);
+    kernel(range, field..., bricks, grid, slice, picture, f.row_samples());
     return;
   }
   // dvr and iso leap by distances, mip by the bricks' maxima.
+  VdvrRaycast params = make_params(f.field(), o, table, slack);
+  params.pixel_x = static_cast<int>(pixels.x0);
+  params.pixel_y = static_cast<int>(pixels.y0);
   const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : f.distance();
   const auto draw = [&](const auto&... bounds) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
                    cl::Buffer, std::remove_cvref_t<decltype(bounds)>...>
         kernel(*v.state, "render/raycast", kernel_of(o).name, defines);
-    kernel(range, field..., bricks, grid, guide, f.table(), make_params(f.field(), o, table, slack), picture,
-           f.row_samples(), bounds...);
+    kernel(range, field..., bricks, grid, guide, f.table(), params, picture, f.row_samples(), bounds...);
   };
   if (o.output == RenderOutput::error) draw(f.bounds());
   else draw();
@@ -178,10 +183,14 @@ void launch(const Frame& f, const Impl& v, const RenderOptions& o, const opencl:
 }  // namespace
 
 void draw_pixels(Frame& frame, const Impl& v, const RenderOptions& o, const FramePlan& plan,
-                 const BakedTransfer& table, const opencl::Range& range) {
+                 const BakedTransfer& table, const PixelBox& pixels) {
+  RenderOptions drawn = o;
+  drawn.width = pixels.x1 - pixels.x0;
+  drawn.height = pixels.y1 - pixels.y0;
+  const opencl::Range range = packet_range(drawn, plan.tuning, plan.lanes);
   const auto defines = raycast_defines(v, o, plan.sampler, plan.gradient, plan.tuning, plan.lanes);
   const auto draw = [&](const VdvrGrid& grid, const cl::Buffer& bricks, const auto&... field) {
-    launch(frame, v, o, defines, range, table, plan.slack, grid, bricks, field...);
+    launch(frame, v, o, defines, range, pixels, table, plan.slack, grid, bricks, field...);
   };
   if (plan.sampler == SamplerKind::image3d) {
     const Atlas& atlas = v.atlas();
@@ -213,13 +222,8 @@ Enqueued enqueue_frame(Frame& frame, Device& device, const ResidentVolume& volum
   else if (plan.gradient == GradientKind::stored) static_cast<void>(v.lit());
   opencl::finish(*v.state, "preparing a frame");
   const auto start = std::chrono::steady_clock::now();
-  RenderOptions drawn = o;
-  if (rows) drawn.height = rows->end - rows->first;
-  opencl::Range range = packet_range(drawn, tuning, plan.lanes);
-  if (rows)  // work-items count packets
-    range.offset[1] =
-        static_cast<std::uint64_t>(rows->first / group_for(tuning.group_y, plan.lanes)) * range.local[1];
-  draw_pixels(frame, v, o, plan, table, range);
+  const Rows all = rows.value_or(Rows{0, o.height});
+  draw_pixels(frame, v, o, plan, table, {0, all.first, o.width, all.end});
   return {plan.sampler, std::move(plan.sampler_reason), plan.gradient, start};
 }
 

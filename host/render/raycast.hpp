@@ -57,9 +57,14 @@ struct FramePlan {
 float range_slack(Device& device, const FieldFacts& facts, SamplerKind sampler);
 /// What `automatic` stands for, stored ones having room or not. Throws InputError for stored ones of images.
 GradientKind choose_gradient(const RenderOptions& options, SamplerKind sampler, bool stored_fit);
-/// Launches the kernel over the pixels of `range`, with `table` as Frame::prepare gave it.
+/// Pixels [x0, x1) x [y0, y1).
+struct PixelBox {
+  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+/// Launches the kernel over pixels, and over more to the right and below: up to whole work-groups. `table` as
+/// Frame::prepare gave it.
 void draw_pixels(Frame& frame, const ResidentVolume::Impl& volume, const RenderOptions& options,
-                 const FramePlan& plan, const BakedTransfer& table, const opencl::Range& range);
+                 const FramePlan& plan, const BakedTransfer& table, const PixelBox& pixels);
 /// Of a picture, from `first` on and below `end`; multiples of 16 but for the picture's own end.
 struct Rows {
   std::int64_t first = 0, end = 0;

@@ -85,17 +85,14 @@ void convert(Pixels pixels, const RenderOptions& o, RenderResult& r) {
 struct Renderer::Impl {
   Device* device;
   const ResidentVolume* volume = nullptr;  ///< or
-  const PagedVolume* paged = nullptr;      ///< or
   const D2vrScene* scene = nullptr;
   Frame frame;
 };
 
 Renderer::Renderer(Device& device, const ResidentVolume& volume)
-    : impl_(new Impl{&device, &volume, nullptr, nullptr, Frame(drawn_field(volume))}) {}
-Renderer::Renderer(Device& device, const PagedVolume& volume)
-    : impl_(new Impl{&device, nullptr, &volume, nullptr, Frame(drawn_field(volume))}) {}
+    : impl_(new Impl{&device, &volume, nullptr, Frame(drawn_field(volume))}) {}
 Renderer::Renderer(Device& device, const D2vrScene& scene)
-    : impl_(new Impl{&device, nullptr, nullptr, &scene, Frame(drawn_field(scene))}) {}
+    : impl_(new Impl{&device, nullptr, &scene, Frame(drawn_field(scene))}) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
@@ -103,15 +100,13 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 void Renderer::set_bounds(const std::vector<float>& bounds) { impl_->frame.set_bounds(bounds); }
 
 SamplerKind Renderer::sampler(SamplerKind asked) const {
-  if (impl_->paged) return choose_sampler(asked).first;
   return impl_->volume ? choose_sampler(*impl_->device, *impl_->volume, asked).first : SamplerKind::buffer;
 }
 
 RenderResult Renderer::render(const RenderOptions& options) {
   Frame& frame = impl_->frame;
-  Enqueued enqueued = impl_->volume  ? enqueue_frame(frame, *impl_->device, *impl_->volume, options)
-                      : impl_->paged ? enqueue_frame(frame, *impl_->device, *impl_->paged, options)
-                                     : enqueue_frame(frame, *impl_->scene, options);
+  Enqueued enqueued = impl_->volume ? enqueue_frame(frame, *impl_->device, *impl_->volume, options)
+                                    : enqueue_frame(frame, *impl_->scene, options);
   RenderResult r;
   r.sampler = enqueued.sampler;
   r.sampler_reason = std::move(enqueued.sampler_reason);

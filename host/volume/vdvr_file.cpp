@@ -24,6 +24,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {
@@ -559,16 +560,28 @@ const char* text_of(Seal seal) {
   return "BROKEN SEAL";
 }
 
-VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered,
-                   const std::optional<std::filesystem::path>& scratch) {
-  const Reading reading{max_memory_bytes, scratch, nullptr};
+namespace {
+
+VdvrFile read_checked(const std::filesystem::path& path, const Reading& reading, Altered altered) {
   if (io::metadata_unchecked(path))
     // Scratch files take addresses, not memory.
-    io::rehearse(path, scratch ? 0 : max_memory_bytes, [&] { static_cast<void>(read_whole(path, reading)); });
+    io::rehearse(path, reading.scratch_folder ? 0 : reading.max_memory_bytes,
+                 [&] { static_cast<void>(read_whole(path, reading)); });
   VdvrFile file = read_whole(path, reading);
   if (altered == Altered::refuse && !file.altered.empty())
     throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
   return file;
+}
+
+}  // namespace
+
+VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered) {
+  return read_checked(path, {max_memory_bytes, std::nullopt, nullptr}, altered);
+}
+
+VdvrFile read_large_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                         const std::filesystem::path& scratch, Altered altered) {
+  return read_checked(path, {max_memory_bytes, scratch, nullptr}, altered);
 }
 
 bool is_vdvr(const std::filesystem::path& path) {

@@ -20,9 +20,9 @@ struct PagingCounts {
 };
 
 /// A volume whose base and index lie on a device, and of whose tiles those that a part of a picture needs: a
-/// Renderer of it (raycast.hpp) cuts each picture into parts, until the bricks that a part's rays pass fit,
-/// and draws part after part. Rays know nothing of parts, so that the picture is the one of ResidentVolume,
-/// to the bit.
+/// RenderCrew of it (render_crew.hpp) cuts each picture into parts, until the bricks that a part's rays pass
+/// fit, and draws part after part. Rays know nothing of parts, so that the picture is the one of
+/// ResidentVolume, to the bit.
 ///
 /// `memory_bytes` bounds what it takes on the device and for its index on the host; 0: what the device has
 /// left. `volume` must outlive it, and is where tiles come from: in scratch (read_vdvr) it needs not fit

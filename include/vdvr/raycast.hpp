@@ -99,10 +99,8 @@ struct RenderResult {
 };
 
 class D2vrScene;
-class PagedVolume;
 
-/// Draws pictures of one volume, whole on the device or by bricks (paged_volume.hpp), or of one scene of
-/// projections (d2vr.hpp), and keeps what the next picture
+/// Draws pictures of one volume, or of one scene of projections (d2vr.hpp), and keeps what the next picture
 /// can use: the picture's memory, the transfer function's tables, which bricks can be leapt over.
 ///
 /// Threads: one Renderer belongs to one thread at a time. Any number of them draw one const volume at once,
@@ -114,7 +112,6 @@ class PagedVolume;
 class VDVR_API Renderer {
  public:
   Renderer(Device& device, const ResidentVolume& volume);
-  Renderer(Device& device, const PagedVolume& volume);
   Renderer(Device& device, const D2vrScene& scene);
   ~Renderer();
   Renderer(Renderer&&) noexcept;

@@ -10,9 +10,10 @@
 
 namespace vdvr {
 
-/// A Renderer over several devices, each of which has the volume. A picture is cut into bands of rows, which
-/// go to whichever device is free, and is that of one device, to the bit, where the devices are of one kind.
-/// What `automatic` stands for the first of them decides.
+/// A Renderer (raycast.hpp) over several devices, or over one whose volume comes by bricks. Each device has
+/// the volume. With several a picture is cut into bands of rows, which go to whichever device is free, and is
+/// that of one device, to the bit, where the devices are of one kind. What `automatic` stands for the first
+/// of them decides.
 ///
 /// Used by one thread at a time; has one thread for each further device while it draws. Must not outlive
 /// devices and volumes.

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 #include "vdvr/certificate.hpp"
@@ -52,12 +51,8 @@ VDVR_API void write_vdvr(const std::filesystem::path& path, const MixedVolume& v
 /// Reads and checks everything: types, shapes in 64 bits before allocating, tile indices, finite geometry,
 /// checksums; then compares the seal and the content's hash. Throws FileError (path, dataset, value), and
 /// MismatchError for a file that was altered, unless it is to be reported. `max_memory_bytes` 0: no limit.
-/// With `scratch`, a folder (empty: the default of scratch.hpp), samples of more than a quarter of the limit
-/// lie in scratch files there, of which an eighth of it may be resident; without, what does not fit the limit
-/// is refused by ResourceError.
 VDVR_API VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
-                            Altered altered = Altered::refuse,
-                            const std::optional<std::filesystem::path>& scratch = std::nullopt);
+                            Altered altered = Altered::refuse);
 
 /// True when the file begins like HDF5 and says format = "vdvr".
 VDVR_API bool is_vdvr(const std::filesystem::path& path);

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 #include "vdvr/export.hpp"
@@ -14,8 +13,7 @@ namespace vdvr {
 
 /// read_vdvr for whoever relies on the certificate: refuses an altered file, and a certificate whose own
 /// numbers do not follow from each other. Throws as read_vdvr, MismatchError naming the path.
-VDVR_API VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
-                                 const std::optional<std::filesystem::path>& scratch = std::nullopt);
+VDVR_API VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
 /// The same for verify_file: altered samples stay in VdvrFile::altered, since they can be measured. Throws
 /// MismatchError for a broken seal over samples that are whole, since a certificate that is not the one

@@ -149,7 +149,7 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
       // The account of this device refuses what the limit does not allow.
       Device small("", budget + kAside);
       const PagedVolume paged(small, c.volume, budget);
-      Renderer by_bricks(small, paged);
+      RenderCrew by_bricks({{&small, nullptr, &paged}});
       std::uint64_t n = 0;
       for (const RenderOptions& o : pictures(c.volume)) {
         if ((o.gradient == GradientKind::stored) != lit) continue;
@@ -201,7 +201,7 @@ BOOST_AUTO_TEST_CASE(automatic_takes_what_the_whole_volume_takes) {
   RenderOptions o = pictures(v).front();
   o.gradient = GradientKind::automatic;
   const RenderResult expected = Renderer(support::device(), whole).render(o);
-  const RenderResult found = Renderer(small, paged).render(o);
+  const RenderResult found = RenderCrew({{&small, nullptr, &paged}}).render(o);
   BOOST_TEST((expected.gradient == found.gradient));
   BOOST_TEST((expected.image.rgb == found.image.rgb));
 }
@@ -213,7 +213,8 @@ BOOST_AUTO_TEST_CASE(bounds_by_brick_are_those_of_the_whole_volume) {
   const ResidentVolume whole(support::device(), v);
   Device small("", budget_for(v, false) + kAside);
   const PagedVolume paged(small, v, budget_for(v, false));
-  Renderer reference(support::device(), whole), by_bricks(small, paged);
+  Renderer reference(support::device(), whole);
+  RenderCrew by_bricks({{&small, nullptr, &paged}});
   reference.set_bounds(bounds);
   by_bricks.set_bounds(bounds);
   RenderOptions o = pictures(v).front();
@@ -229,7 +230,7 @@ BOOST_AUTO_TEST_CASE(what_does_not_fit_is_refused_with_what_it_needs) {
   };
   BOOST_CHECK_EXCEPTION(PagedVolume(device, v, 100'000), ResourceError, says("base and index"));
   const PagedVolume tight(device, v, 900'000);
-  Renderer renderer(device, tight);
+  RenderCrew renderer({{&device, nullptr, &tight}});
   RenderOptions o = pictures(v).front();
   BOOST_CHECK_EXCEPTION(renderer.render(o), ResourceError, says("behind 8 x 8 pixels"));
   o.sampler = SamplerKind::image3d;
