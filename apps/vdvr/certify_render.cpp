@@ -46,8 +46,9 @@ Image as_image(const FloatImage& values) {
   return image;
 }
 
-CertifyPictureOptions certify_options(const Arguments& args) {
+CertifyPictureOptions certify_options(const Arguments& args, const Certificate& certificate) {
   CertifyPictureOptions c;
+  c.window = certificate.window;
   c.fast = args.has("certify") && args.choice("certify", {"exact", "fast"}, "exact") == "fast";
   c.kappa = args.positive_or("certify-parts", c.kappa);
   return c;
@@ -110,19 +111,24 @@ struct Explained {
   PixelExplanation why;
 };
 
+/// Before anything is written.
+void check_pixel(const Arguments& args, const RenderOptions& o) {
+  const auto pixel = args.numbers("explain", 2);
+  const auto inside = [](double at, std::int64_t size) {
+    return at >= 0 && at < static_cast<double>(size) && at == std::floor(at);
+  };
+  if (pixel && !(inside((*pixel)[0], o.width) && inside((*pixel)[1], o.height)))
+    throw InputError(fmt::format("--explain: {},{} is no pixel of {}x{}; 0,0 is the first", (*pixel)[0],
+                                 (*pixel)[1], o.width, o.height));
+}
+
 std::optional<Explained> explained(const Arguments& args, const Scene& scene, const RenderOptions& o,
                                    SamplerKind sampler) {
   const auto pixel = args.numbers("explain", 2);
   if (!pixel) return std::nullopt;
-  const auto inside = [](double at, std::int64_t size) {
-    return at >= 0 && at < static_cast<double>(size) && at == std::floor(at);
-  };
-  if (!inside((*pixel)[0], o.width) || !inside((*pixel)[1], o.height))
-    throw InputError(fmt::format("--explain: {},{} is no pixel of {}x{}; 0,0 is the first", (*pixel)[0],
-                                 (*pixel)[1], o.width, o.height));
   Explained e{static_cast<std::int64_t>((*pixel)[0]), static_cast<std::int64_t>((*pixel)[1]), {}};
   e.why = explain_pixel(scene.volume, brick_bounds(*scene.certificate, sampler == SamplerKind::image3d), o,
-                        e.x, e.y);
+                        e.x, e.y, scene.certificate->window.has_value());
   return e;
 }
 
@@ -153,17 +159,20 @@ void print_explained(const Explained& e, const Scene& scene, const RenderOptions
              p.opacity);
 }
 
-void check_file(const Arguments& args, const Scene& scene) {
+void check_file(const Arguments& args, const Scene& scene, const TransferFunction& transfer) {
   const std::string name = args.path("FILE").string();
   if (!scene.certificate || !scene.verified)
     throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
   if (scene.certificate->comparison)
     throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
-  if (scene.certificate->window)
-    throw InputError(
-        fmt::format("{}: was certified within a --window, and outside it F is unknown: build it "
-                    "without --window to certify pictures",
-                    name));
+  const auto& window = scene.certificate->window;
+  if (window && !is_clear_outside(transfer, *window))
+    throw InputError(fmt::format(
+        "{}: was certified within --window {:.6g},{:.6g}, outside of which F is unknown, and the transfer "
+        "function shows values there: name one by --tf whose opacity is 0 below and above the window, or "
+        "build "
+        "without --window",
+        name, window->first, window->second));
 }
 
 }  // namespace
@@ -214,6 +223,8 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
   if (o.gradient == GradientKind::stored)
     throw InputError("--gradient stored: a certified picture takes central or analytic");
   refuse(args, {"unverified"}, "excludes --certify");
+  if (const auto levels = args.number("picture-tolerance"); levels && !(*levels >= 0 && *levels <= 255))
+    throw InputError(fmt::format("--picture-tolerance: {:g} is not within 0 and 255 levels", *levels));
   if (args.path("output").extension() == ".npy" && !of_bounds)
     throw InputError("--certify: as .npy there are --show bound, lo, hi and middle");
 }
@@ -221,22 +232,23 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
 int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions o,
                    const Overlay& overlay, const std::filesystem::path& output, const Progress& progress) {
   const Scene& scene = source.scene();
-  check_file(args, scene);
+  check_file(args, scene, o.transfer);
+  check_pixel(args, o);
   const Certificate& certificate = *scene.certificate;
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
   Clip clip = covered;
   if (o.clip) cut(clip, o.clip->low, o.clip->high);
+  require_some(clip);
   o.clip = clip;
   refine_drawing(args, o);
-  const CertifyPictureOptions options = certify_options(args);
+  const CertifyPictureOptions options = certify_options(args, certificate);
   report(progress, "draw", 0);
   RenderResult drawn = source.draw(o);
   throw_if_stopped();
   report(progress, "certify", 0);
-  const PixelBounds bounds = source.certify(o, options);
-  throw_if_stopped();
+  const PixelBounds bounds = source.certify(o, options, progress);
   const PictureBound bound = bound_of_picture(bounds, drawn.image);
   CertifiedPicture picture{o,
                            options,
@@ -245,6 +257,8 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
                            output.filename().string(),
                            sha256_of_pixels(drawn.image),
                            "",
+                           source.device().info().name,
+                           source.device().info().driver,
                            overlay_names(overlay)};
   const std::string show = args.text_or("show", "colour");
   if (show == "colour") {
@@ -257,7 +271,6 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   picture.file_sha256 = sha256_of_file(out.picture);
   const Json json = picture_certificate_json(picture, bounds, bound, certificate);
   io::write_file(out.certificate, json.dump(2) + "\n");
-  report(progress, "", 1);
 
   const auto why = explained(args, scene, o, bounds.sampler);
   std::string pixels;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certified_region.hpp"
@@ -70,10 +71,16 @@ std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Pr
         throw InputError(fmt::format("--clip: {} is not below {} along {}", b[a], b[a + 3], "xyz"[a]));
     cut(clip, {b[0], b[1], b[2]}, {b[3], b[4], b[5]});
   }
-  for (std::size_t a = 0; a < 3; ++a)
-    if (!(clip.low[a] < clip.high[a]))
-      throw InputError(fmt::format("--clip: the box holds nothing of the covered region along {}", "xyz"[a]));
+  require_some(clip);
   return clip;
+}
+
+void require_some(const Clip& clip) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double reach = a < 2 ? clip.radius : std::numeric_limits<double>::infinity();
+    if (!(std::max(clip.low[a], -reach) < std::min(clip.high[a], reach)))
+      throw InputError(fmt::format("--clip: the box holds nothing of the covered region along {}", "xyz"[a]));
+  }
 }
 
 }  // namespace vdvr::cli

@@ -17,5 +17,7 @@ Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& pro
 std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Progress& progress);
 /// Cuts `clip` to what also lies in `box`.
 void cut(Clip& clip, const Vec3& low, const Vec3& high);
+/// Throws InputError where nothing of --clip's box can lie in the cylinder of `clip`.
+void require_some(const Clip& clip);
 
 }  // namespace vdvr::cli

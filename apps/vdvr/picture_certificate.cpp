@@ -170,12 +170,15 @@ Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds
                {"parts", bound.parts_mean},
                {"kappa", picture.certify.kappa},
                {"theta", picture.certify.theta},
-               {"fast", picture.certify.fast}};
+               {"fast", picture.certify.fast},
+               {"device", picture.device},
+               {"driver", picture.driver},
+               {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
   json.update(bound_json(bound));
   return json;
 }
 
-CertifiedPicture read_picture_certificate(const std::filesystem::path& path) {
+std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw FileError(fmt::format("{}: cannot be read", path.string()));
   std::ostringstream text;
@@ -190,17 +193,21 @@ CertifiedPicture read_picture_certificate(const std::filesystem::path& path) {
     CertifiedPicture picture;
     read_picture(j.at("picture"), picture);
     picture.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
+    picture.device = j.at("device").get<std::string>();
+    picture.driver = j.at("driver").get<std::string>();
     picture.certify.kappa = j.at("kappa").get<double>();
     picture.certify.theta = j.at("theta").get<double>();
     picture.certify.fast = j.at("fast").get<bool>();
-    picture.stored_mean = j.at("levels").at("mean").get<double>();
-    picture.stored_max = j.at("levels").at("max").get<double>();
     picture.covered.radius = j.at("covered").at("radius").get<double>();
     const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
     picture.covered.z = {z[0], z[1]};
     picture.options.sampler =
         j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
-    return picture;
+    return {std::move(picture),
+            {j.at("statement").get<std::string>(), j.at("light").get<std::string>(),
+             j.at("levels").at("mean").get<double>(), j.at("levels").at("max").get<double>(),
+             j.at("within").get<std::map<std::string, double>>(),
+             j.at("pixels").at("certified").get<std::int64_t>()}};
   } catch (const Json::exception& e) {
     throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));
   }

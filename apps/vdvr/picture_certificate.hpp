@@ -3,8 +3,9 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/vdvr/output.hpp"
@@ -19,8 +20,15 @@ struct CertifiedPicture {
   CoveredCylinder covered;
   std::string content_sha256, file, pixels_sha256,
       file_sha256;                    ///< of the volume; the picture, its rgb bytes before overlays, its file
+  std::string device, driver;         ///< that drew it
   std::vector<std::string> overlays;  ///< drawn over it afterwards
-  double stored_mean = 0, stored_max = 0;  ///< levels, as read
+};
+/// What the file says of the intervals.
+struct PictureClaims {
+  std::string statement, light;
+  double mean = 0, max = 0;              ///< levels
+  std::map<std::string, double> within;  ///< shares
+  std::int64_t certified = 0;            ///< pixels
 };
 
 /// What is proved, in one sentence.
@@ -28,7 +36,7 @@ std::string statement_of(const PixelBounds& bounds);
 Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,
                               const PictureBound& bound, const Certificate& certificate);
 /// Throws FileError for what is no certificate of a picture.
-CertifiedPicture read_picture_certificate(const std::filesystem::path& path);
+std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::filesystem::path& path);
 
 /// The levels and shares that are compared when a picture is verified.
 Json bound_json(const PictureBound& bound);

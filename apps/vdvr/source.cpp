@@ -84,9 +84,11 @@ RenderResult Source::draw(const RenderOptions& options) {
   return renderer_->render(options);
 }
 
-PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify) {
+PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
+                            const Progress& progress) {
   const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
-  return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify);
+  return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify,
+                        progress);
 }
 
 std::uint64_t Source::bytes() const { return field_ ? field_->bytes() : resident_->bytes(); }

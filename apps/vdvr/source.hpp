@@ -32,7 +32,8 @@ class Source {
   [[nodiscard]] Device& device() { return *device_; }
   [[nodiscard]] RenderResult draw(const RenderOptions& options);
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
-  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify);
+  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
+                                    const Progress& progress);
   /// On the device beside what a frame needs: volume, or projections.
   [[nodiscard]] std::uint64_t bytes() const;
 

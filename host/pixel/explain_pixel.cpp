@@ -23,9 +23,14 @@ double extinction(const TransferPoint& p) { return -std::log1p(-std::min(p.opaci
 /// The largest |q(s) - q(v) - (tau(s) - tau(v)) W| over what F may be, and the control point nearest to that
 /// s.
 double change(const std::vector<TransferPoint>& points, const Sample& v, const std::array<double, 3>& behind,
-              std::size_t& at) {
+              bool windowed, std::size_t& at) {
   const double reach = std::isfinite(v.bound) ? v.bound : points.back().value - points.front().value;
   std::vector<TransferPoint> candidates;
+  if (windowed && !std::isfinite(v.bound)) return 0;
+  if (windowed) {
+    candidates.push_back(v.point);
+    candidates.back().opacity = 0;
+  }
   for (int i = -4; i <= 4; ++i) candidates.push_back(transfer_at(points, v.value + reach * i / 4));
   for (const TransferPoint& p : points)
     if (std::abs(p.value - v.value) <= reach) candidates.push_back(p);
@@ -46,7 +51,7 @@ double change(const std::vector<TransferPoint>& points, const Sample& v, const s
 }
 
 std::vector<Sample> samples_of(const MixedVolume& v, const std::vector<float>& bounds, const RenderOptions& o,
-                               const PixelRay& ray, double step, double length) {
+                               const PixelRay& ray, double step, double length, bool windowed) {
   const Index3 n = v.bricks();
   std::vector<Sample> samples;
   for (double t = ray.first + step / 2; t < ray.last; t += step) {
@@ -57,6 +62,7 @@ std::vector<Sample> samples_of(const MixedVolume& v, const std::vector<float>& b
     s.value = static_cast<double>(sample_at(v, p));
     s.bound = static_cast<double>(bounds[s.brick]);
     s.point = transfer_at(o.transfer.points, s.value);
+    if (windowed && !std::isfinite(s.bound)) s.point.opacity = 0;
     s.passes = std::exp(-extinction(s.point) * length);
     samples.push_back(s);
   }
@@ -66,13 +72,13 @@ std::vector<Sample> samples_of(const MixedVolume& v, const std::vector<float>& b
 }  // namespace
 
 PixelExplanation explain_pixel(const MixedVolume& v, const std::vector<float>& bounds, const RenderOptions& o,
-                               std::int64_t x, std::int64_t y) {
+                               std::int64_t x, std::int64_t y, bool windowed) {
   const PixelRay ray = pixel_ray(o, v.grid, x, y);
   const double unit = *std::min_element(v.grid.spacing.begin(), v.grid.spacing.end());
   PixelExplanation result;
   result.of_points.assign(o.transfer.points.size(), 0);
   if (!(ray.first < ray.last)) return result;
-  const auto samples = samples_of(v, bounds, o, ray, kStep * unit, kStep);
+  const auto samples = samples_of(v, bounds, o, ray, kStep * unit, kStep, windowed);
   std::vector<double> seen(samples.size(), 1);  // how much of each reaches the eye
   for (std::size_t i = 1; i < samples.size(); ++i) seen[i] = seen[i - 1] * samples[i - 1].passes;
   std::array<double, 3> behind = background_of_pixel(o, y);
@@ -80,7 +86,7 @@ PixelExplanation explain_pixel(const MixedVolume& v, const std::vector<float>& b
   for (std::size_t i = samples.size(); i-- > 0;) {
     const Sample& s = samples[i];
     std::size_t point = 0;
-    const double share = 255 * seen[i] * change(o.transfer.points, s, behind, point) * kStep;
+    const double share = 255 * seen[i] * change(o.transfer.points, s, behind, windowed, point) * kStep;
     BrickShare& b = shares[s.brick];
     b.brick = s.brick;
     b.bound = s.bound;

@@ -18,6 +18,7 @@
 #include "shared/certify_params.h"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr {
 namespace {
@@ -30,6 +31,8 @@ static_assert(sizeof(VdvrCertify) == 84);
 constexpr double kUnit = 0x1p-24;
 // Of the list of pieces; what a picture needs beyond is made by bands of fewer rows.
 constexpr std::uint64_t kListBytes = std::uint64_t{192} << 20;
+// Of a launch: between two of them a stop is heard.
+constexpr int kBandRows = 64;
 
 void check(const Impl& v, const std::vector<float>& bounds, const RenderOptions& o,
            const CertifyPictureOptions& c) {
@@ -45,6 +48,11 @@ void check(const Impl& v, const std::vector<float>& bounds, const RenderOptions&
     throw InputError(fmt::format("`certify_parts` kappa {} must lie between 1/1024 and 1024", c.kappa));
   if (!(c.theta > 0 && c.theta < 1))
     throw InputError(fmt::format("termination {} of a certified picture must lie in (0, 1)", c.theta));
+  if (c.window && !is_clear_outside(o.transfer, *c.window))
+    throw InputError(
+        fmt::format("the transfer function shows values outside the certificate's window, {:.6g} to {:.6g}, "
+                    "where F is unknown: take one whose opacity is 0 below and above it",
+                    c.window->first, c.window->second));
 }
 
 /// The middle of the bounds that are finite: bins need not suit the least.
@@ -96,13 +104,15 @@ VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPic
 
 /// By brick 1 where F can show nothing, whatever is done to V in fp32.
 std::vector<std::uint8_t> clear_bricks(const Impl& v, const VdvrCertify& q, const RangeTable& table,
-                                       const std::vector<float>& bounds) {
+                                       const std::vector<float>& bounds, bool windowed) {
   const float reach = std::ldexp(q.reach[0] + q.reach[1] + q.reach[2], v.highest_level);
   std::vector<std::uint8_t> clear(bounds.size());
   for (std::size_t i = 0; i < clear.size(); ++i) {
     const cl_float2 r = v.host_ranges[i];
     const float e = (bounds[i] + 2 * q.slack + 2 * reach * (r.s[1] - r.s[0])) * 1.00001f;
     clear[i] = table.is_clear(r.s[0] - e, r.s[1] + e) ? 1 : 0;
+    // No cell of it was tested, so that F lies outside the window throughout.
+    if (windowed && !std::isfinite(bounds[i])) clear[i] = 1;
   }
   return clear;
 }
@@ -128,10 +138,13 @@ class Launch {
  public:
   Launch(const Impl& v, const std::vector<float>& bounds, const RenderOptions& o,
          const CertifyPictureOptions& c)
-      : v_(v), o_(o), certify_(c), table_(make_range_table(o.transfer, typical_bound(bounds))) {
+      : v_(v),
+        o_(o),
+        certify_(c),
+        table_(make_range_table(o.transfer, typical_bound(bounds), c.window.has_value())) {
     q_ = make_certify(v, o, c, table_);
     const VdvrGrid& grid = v.field.grid;
-    const auto clear = clear_bricks(v, q_, table_, bounds);
+    const auto clear = clear_bricks(v, q_, table_, bounds, c.window.has_value());
     const auto distance = distance_to_other(clear, {grid.bricks_x, grid.bricks_y, grid.bricks_z});
     distance_ = DeviceArray<cl_uchar>(*v.state, distance, "distances to bricks that may show something");
     bounds_ = DeviceArray<float>(*v.state, bounds, "bounds of bricks");
@@ -145,7 +158,7 @@ class Launch {
 
   /// `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
   template <class... Field>
-  void run(SamplerKind sampler, const cl::Buffer& bricks, const Field&... field) {
+  void run(SamplerKind sampler, const Progress& progress, const cl::Buffer& bricks, const Field&... field) {
     const int lanes = lanes_for(v_, sampler, GradientKind::central, {});
     const auto defines = with_kernel(
         raycast_defines(v_, o_, sampler,
@@ -159,13 +172,17 @@ class Launch {
     const VdvrRaycast p = make_params(drawn, o_, baked, q_.slack);
     const int height = static_cast<int>(o_.height);
     if (certify_.fast) {
-      q_.first_row = 0;
-      q_.rows = height;
       opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
                      VdvrRaycast, VdvrCertify, cl::Buffer, cl::Buffer>
           kernel(*v_.state, "pixel/pixel_bounds", "certify_fast", defines);
-      kernel(packet_range(o_, {}, lanes), field..., bricks, v_.field.grid, distance_.buffer(),
-             bounds_.buffer(), ranges_.buffer(), next_.buffer(), p, q_, least_.buffer(), most_.buffer());
+      for (q_.first_row = 0; q_.first_row < height; q_.first_row += q_.rows) {
+        RenderOptions band = o_;
+        band.height = q_.rows = std::min(height - q_.first_row, kBandRows);
+        kernel(packet_range(band, {}, lanes), field..., bricks, v_.field.grid, distance_.buffer(),
+               bounds_.buffer(), ranges_.buffer(), next_.buffer(), p, q_, least_.buffer(), most_.buffer());
+        v_.state->queue.finish();
+        band_is_done(progress, height);
+      }
       return;
     }
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
@@ -180,6 +197,7 @@ class Launch {
              next_.buffer(), p, q_, least_.buffer(), most_.buffer(), list_.buffer(), fullest_.buffer());
       std::uint64_t fullest = 0;
       for (const cl_uint pieces : fullest_.to_host()) fullest = std::max<std::uint64_t>(fullest, pieces);
+      band_is_done(progress, height);
       if (fullest <= longest) continue;
       // Some lists were too short: the band once more.
       q_.capacity = static_cast<int>(fullest + fullest / 8);
@@ -191,6 +209,10 @@ class Launch {
   [[nodiscard]] std::vector<cl_float4> most() const { return most_.to_host(); }
 
  private:
+  void band_is_done(const Progress& progress, int height) const {
+    throw_if_stopped();
+    report(progress, "certify", std::min(1.0, static_cast<double>(q_.first_row + q_.rows) / height));
+  }
   /// Rows of the next band, and a list for it. Returns how many pieces a packet's list holds.
   std::uint64_t fit_list(int lanes, opencl::Range& range, int height) {
     RenderOptions band = o_;
@@ -205,7 +227,7 @@ class Launch {
       return packets(rows) * static_cast<std::uint64_t>(lanes) * numbers *
              static_cast<std::uint64_t>(q_.capacity);
     };
-    q_.rows = std::min(height - q_.first_row, 64);
+    q_.rows = std::min(height - q_.first_row, kBandRows);
     while (q_.rows > 8 && floats(q_.rows) * sizeof(float) > kListBytes) q_.rows = std::max(8, q_.rows / 2);
     const std::uint64_t needed = floats(q_.rows);
     if (list_.size() < needed) {
@@ -229,10 +251,28 @@ class Launch {
 
 }  // namespace
 
+bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, double>& window) {
+  const auto& points = transfer.points;
+  if (points.empty()) return true;
+  // Of a straight stretch a part lies outside: both its ends are then clear, or what lies between shows.
+  const auto outside = [&](const TransferPoint& a, const TransferPoint& b) {
+    return b.value > a.value && (a.value < window.first || b.value > window.second);
+  };
+  const auto shows = [](const TransferPoint& p) { return p.opacity > 0; };
+  if (shows(points.front()) || shows(points.back())) return false;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if ((points[i].value < window.first || points[i].value > window.second) && shows(points[i])) return false;
+    if (i > 0 && outside(points[i - 1], points[i]) && (shows(points[i - 1]) || shows(points[i])))
+      return false;
+  }
+  return true;
+}
+
 const char* text_of(CertifiedLight light) { return light == CertifiedLight::unlit ? "unlit" : "as drawn"; }
 
 PixelBounds certify_pixels(Device& device, const ResidentVolume& volume, const std::vector<float>& bounds,
-                           const RenderOptions& options, const CertifyPictureOptions& certify) {
+                           const RenderOptions& options, const CertifyPictureOptions& certify,
+                           const Progress& progress) {
   const Impl& v = volume.impl();
   check(v, bounds, options, certify);
   PixelBounds result;
@@ -243,9 +283,10 @@ PixelBounds certify_pixels(Device& device, const ResidentVolume& volume, const s
   Launch launch(v, bounds, options, certify);
   if (result.sampler == SamplerKind::image3d) {
     const Atlas& atlas = v.atlas();
-    launch.run(result.sampler, atlas.bricks.buffer(), atlas.images[0], atlas.images[1], atlas.images[2]);
+    launch.run(result.sampler, progress, atlas.bricks.buffer(), atlas.images[0], atlas.images[1],
+               atlas.images[2]);
   } else {
-    launch.run(result.sampler, v.field.bricks.buffer(), v.field.samples.buffer());
+    launch.run(result.sampler, progress, v.field.bricks.buffer(), v.field.samples.buffer());
   }
   const auto least = launch.least(), most = launch.most();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

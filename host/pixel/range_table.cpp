@@ -86,7 +86,7 @@ Row row_between(const std::vector<TransferPoint>& points, double from, double to
 
 }  // namespace
 
-RangeTable make_range_table(const TransferFunction& transfer, double bound) {
+RangeTable make_range_table(const TransferFunction& transfer, double bound, bool or_clear) {
   const auto& points = transfer.points;
   RangeTable t;
   const double first = points.front().value, width = std::max(points.back().value - first, 1e-30);
@@ -101,6 +101,9 @@ RangeTable make_range_table(const TransferFunction& transfer, double bound) {
   for (int i = 0; i < t.bins; ++i)
     rows.push_back(
         row_between(points, i == 0 ? -endless : edge(i), i + 1 == t.bins ? endless : edge(i + 1), piece));
+  // What is clear has no extinction and no colour.
+  if (or_clear)
+    for (Row& row : rows) row[1] = 0;
   Row all = kEmpty;
   t.next_shown.assign(static_cast<std::size_t>(t.bins), t.bins);
   for (int i = t.bins - 1, next = t.bins; i >= 0; --i) {

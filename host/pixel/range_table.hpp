@@ -25,7 +25,8 @@ struct RangeTable {
   [[nodiscard]] bool is_clear(float from, float to) const;
 };
 
-/// With bins below an eighth of `bound`, 2048 to 16384 of them.
-RangeTable make_range_table(const TransferFunction& transfer, double bound);
+/// With bins below an eighth of `bound`, 2048 to 16384 of them. `or_clear`: beside the values of an interval
+/// there may be others, which show nothing.
+RangeTable make_range_table(const TransferFunction& transfer, double bound, bool or_clear = false);
 
 }  // namespace vdvr

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/mixed_volume.hpp"
+#include "vdvr/progress.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/resident_volume.hpp"
 
@@ -27,7 +29,13 @@ struct CertifyPictureOptions {
   double theta = 0x1p-10;
   /// One pass over the ray and nothing kept: for intervals 1.4 to 3 times as wide, while one turns a view.
   bool fast = false;
+  /// The certificate's: beside what its bound says, F may lie anywhere outside of this at any point, and it
+  /// does so throughout a brick without a bound. The transfer function must be clear there.
+  std::optional<std::pair<double, double>> window{};
 };
+
+/// Whether a transfer function shows nothing below window.first and nothing above window.second.
+VDVR_API bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, double>& window);
 
 /// What of the light is certified. as_drawn: colour and opacity of F under the light that V was drawn with, a
 /// function on the ray that the drawn step fixes.
@@ -49,10 +57,11 @@ struct PixelBounds {
 /// Intervals of the picture that `options` draw: mode dvr, output colour. `bounds` are those of the sampler
 /// that Renderer::sampler() names (certificate.hpp, brick_bounds): |V - F| at every point that is drawn, so
 /// `options.clip` must lie in the covered region. With shading the light is as drawn, of gradients `central`
-/// or `analytic`. Throws InputError for other modes, gradients, counts of bounds, and what render() refuses.
+/// or `analytic`. Throws InputError for other modes, gradients, counts of bounds, a transfer function that
+/// shows what lies outside the window, and what render() refuses; Interrupted.
 VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume,
                                     const std::vector<float>& bounds, const RenderOptions& options,
-                                    const CertifyPictureOptions& certify = {});
+                                    const CertifyPictureOptions& certify = {}, const Progress& progress = {});
 
 /// How far what was drawn can lie from the ideal picture, in levels of 255.
 struct PictureBound {

@@ -22,8 +22,10 @@ struct PixelExplanation {
   double levels = 0;               ///< of all: near the bound of a soft transfer function, and no bound
 };
 /// To first order: the largest change of emission at each of an eighth of a cell, by what of it is seen and
-/// what lies behind (docs/pixel-bounds.md, section 8). On the host, without light.
+/// what lies behind (docs/pixel-bounds.md, section 8). `windowed`: F may also lie where nothing shows, and
+/// does so in bricks without a bound. On the host, without light.
 VDVR_API PixelExplanation explain_pixel(const MixedVolume& volume, const std::vector<float>& bounds,
-                                        const RenderOptions& options, std::int64_t x, std::int64_t y);
+                                        const RenderOptions& options, std::int64_t x, std::int64_t y,
+                                        bool windowed = false);
 
 }  // namespace vdvr

@@ -10,6 +10,7 @@
 #include "parts.hpp"
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/camera.hpp"
+#include "vdvr/framing.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/transfer_function.hpp"
@@ -44,7 +45,10 @@ void add_choices(nb::module_& m) {
   nb::enum_<Classification>(m, "Classification")
       .value("post", Classification::post)
       .value("preintegrated", Classification::preintegrated);
-  nb::enum_<StepMode>(m, "StepMode").value("fixed", StepMode::fixed).value("level", StepMode::level);
+  nb::enum_<StepMode>(m, "StepMode")
+      .value("adaptive", StepMode::adaptive)
+      .value("fixed", StepMode::fixed)
+      .value("level", StepMode::level);
 }
 
 void add_transfer(nb::module_& m) {
@@ -94,7 +98,10 @@ void add_options(nb::module_& m) {
       .def_ro("focal_point", &Camera::focal_point)
       .def_ro("view_up", &Camera::view_up)
       .def_ro("view_angle_deg", &Camera::view_angle_deg);
-  m.def("orbit_camera", &orbit_camera, "grid"_a, "azimuth_deg"_a, "elevation_deg"_a, "zoom"_a);
+  nb::class_<OrbitFrame>(m, "OrbitFrame", "Where an orbit looks, and from how far.");
+  m.def("frame_grid", &frame_grid, "grid"_a);
+  m.def("orbit_camera", nb::overload_cast<const OrbitFrame&, double, double, double>(&orbit_camera),
+        "frame"_a, "azimuth_deg"_a, "elevation_deg"_a, "zoom"_a);
   m.def("look_at", &look_at, "position"_a, "focal_point"_a, "view_up"_a.none(), "view_angle_deg"_a);
   nb::class_<IsoSurface>(m, "IsoSurface")
       .def_ro("value", &IsoSurface::value)
@@ -116,6 +123,12 @@ void add_options(nb::module_& m) {
       .def_rw("slice_position", &RenderOptions::slice_position, nb::arg().none())
       .def_rw("slice_range", &RenderOptions::slice_range, nb::arg().none())
       .def_rw("shading", &RenderOptions::shading)
+      .def(
+          "set_clip",
+          [](RenderOptions& o, const Vec3& low, const Vec3& high) {
+            o.clip = Clip{low, high};
+          },
+          "low"_a, "high"_a)
       .def_rw("gradient", &RenderOptions::gradient)
       .def_rw("head_light", &RenderOptions::head_light)
       .def_rw("lights", &RenderOptions::lights)

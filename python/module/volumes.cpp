@@ -20,6 +20,7 @@
 #include "vdvr/certify.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/export_vtk.hpp"
+#include "vdvr/framing.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -121,6 +122,15 @@ nb::object values_of(FloatImage&& image) {
     return nb::cast(as_array(std::move(image.values), {size(image.height), size(image.width)}));
   return nb::cast(
       as_array(std::move(image.values), {size(image.height), size(image.width), size(image.channels)}));
+}
+
+OrbitFrame frame_of(HeldVolume& held, const RenderOptions& options, double azimuth_deg,
+                    double elevation_deg) {
+  OrbitFrame frame;
+  run_long(nb::none(), [&](const Progress&) {
+    frame = frame_view(held.file().volume, options, azimuth_deg, elevation_deg);
+  });
+  return frame;
 }
 
 nb::object render(HeldVolume& held, const std::shared_ptr<Device>& device, const RenderOptions& options,
@@ -227,6 +237,7 @@ void add_volumes(nb::module_& m) {
           "spacing"_a.none(), "box"_a.none())
       .def("on_lattice", &on_lattice, "lattice"_a, "bounds"_a)
       .def("sampler", &HeldVolume::sampler, "asked"_a)
+      .def("frame_view", &frame_of, "options"_a, "azimuth_deg"_a, "elevation_deg"_a)
       .def("render", &render, "device"_a, "options"_a, "values"_a)
       .def("error_picture", &error_picture, "options"_a, "values"_a)
       .def("vtk_boxes", &vtk_boxes, "most_blocks"_a)

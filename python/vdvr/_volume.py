@@ -123,15 +123,17 @@ class Volume:
         azimuth: float = 30.0,
         elevation: float = 20.0,
         zoom: float = 1.0,
+        frame: str = "shown",
         camera: Optional[Dict[str, Any]] = None,
         transfer_range: Optional[Tuple[float, float]] = None,
         iso: Union[float, Sequence[float], None] = None,
         iso_opacity: Optional[Sequence[float]] = None,
         slice_axis: str = "z",
         slice_position: Optional[float] = None,
+        clip: Optional[Sequence[float]] = None,
         show: str = "colour",
         step: float = 1.0,
-        step_mode: str = "fixed",
+        step_mode: Optional[str] = None,
         classification: str = "post",
         gradient: str = "auto",
         shading: bool = True,
@@ -152,12 +154,16 @@ class Volume:
             red, green, blue, opacity of one cell); by default one that suits the volume.
         transfer_range : stretches it over these densities; of a slice the window, black to white.
         azimuth, elevation : degrees; azimuth 0 looks along -y with x to the right, elevation is towards -z.
-        zoom : 1 fits the volume.
+        zoom : 1 fits what `frame` says: "shown", what the transfer function or the surfaces show, or "grid", the
+            whole grid (which costs no look at the samples).
         camera : {"position", "focal_point", "view_up", "view_angle"} instead of these; x, y, z and degrees.
         iso : densities of surfaces, mode "iso"; by default one between background and object.
         slice_axis, slice_position : "x", "y" or "z", and where on it; by default the middle.
+        clip : x0, y0, z0, x1, y1, z1: draw what lies in this box alone; of every mode but slices.
         show : "colour", "depth", "normal", or "error": the largest bound of the samples behind a pixel.
         step : of a ray, in cells.
+        step_mode : "adaptive" (finer where the transfer function changes much along one), "fixed" or "level" (step
+            / 2^l in bricks of level l); by default adaptive of mode "dvr" with classification "post", else fixed.
         lights : "head" for one at the eye, or directions x, y, z towards the light; by default the first.
         background : red, green, blue, 0 to 1; or six numbers, of the top and of the bottom.
         values : float32 [y, x] of what lies behind the pixels instead, NaN where nothing does
@@ -180,10 +186,13 @@ class Volume:
         o.slice_range = window or (bright.grey_lo, bright.grey_hi)
         densities = [bright.threshold] if iso is None else [float(v) for v in np.atleast_1d(np.asarray(iso, float))]
         o.surfaces = _core.iso_surfaces(densities, None if iso_opacity is None else [float(v) for v in iso_opacity])
-        o.camera = self._camera(azimuth, elevation, zoom, camera)
         o.step = number(step, "step")
-        o.step_mode = choice(_core.StepMode, step_mode, "step_mode")
         o.classification = choice(_core.Classification, classification, "classification")
+        can_adapt = mode == "dvr" and classification == "post"
+        o.step_mode = choice(_core.StepMode, step_mode or ("adaptive" if can_adapt else "fixed"), "step_mode")
+        o.camera = self._camera(o, azimuth, elevation, zoom, frame, camera)
+        if clip is not None:
+            o.set_clip(*_box(clip, "clip"))
         o.gradient = choice(_core.GradientKind, gradient, "gradient")
         o.shading = bool(shading)
         if lights is not None:
@@ -218,10 +227,15 @@ class Volume:
             function = _core.transfer_of([list(numbers(p, 5, "transfer")) for p in transfer])
         return _core.stretched(function, *window) if window else function
 
-    def _camera(self, azimuth: float, elevation: float, zoom: float,
+    def _camera(self, options: "_core.RenderOptions", azimuth: float, elevation: float, zoom: float, frame: str,
                 free: Optional[Dict[str, Any]]) -> "_core.Camera":
-        orbit = _core.orbit_camera(self.grid, number(azimuth, "azimuth"), number(elevation, "elevation"),
-                                   number(zoom, "zoom"))
+        angles = number(azimuth, "azimuth"), number(elevation, "elevation")
+        if frame not in ("shown", "grid"):
+            raise _core.InputError(f"frame: {frame!r} is none of shown, grid")
+        # A slice has no camera.
+        whole = frame == "grid" or options.mode == _core.RenderMode.slice
+        about = _core.frame_grid(self.grid) if whole else self._held.frame_view(options, *angles)
+        orbit = _core.orbit_camera(about, *angles, number(zoom, "zoom"))
         if free is None:
             return orbit
         known = {"position", "focal_point", "view_up", "view_angle"}
@@ -281,6 +295,13 @@ def _points(points: "ArrayLike") -> Tuple["NDArray[np.float64]", Tuple[int, ...]
     if array.ndim < 1 or array.shape[-1] != 3:
         raise _core.InputError(f"points: an array of shape {array.shape}; give [..., 3], x, y, z")
     return np.ascontiguousarray(array.reshape(-1, 3)), array.shape[:-1]
+
+
+def _box(given: Sequence[float], name: str) -> Tuple[List[float], List[float]]:
+    box = numbers(given, 6, name)
+    if not all(low < high for low, high in zip(box, box[3:])):
+        raise _core.InputError(f"{name}: {given}; give x0, y0, z0, x1, y1, z1, each of the last three above the first")
+    return list(box[:3]), list(box[3:])
 
 
 def _window(given: Sequence[float]) -> Tuple[float, float]:

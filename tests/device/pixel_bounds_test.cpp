@@ -146,6 +146,47 @@ BOOST_AUTO_TEST_CASE(untested_bricks_count_and_the_interval_is_all_colours) {
   BOOST_TEST(b.untested[0] == 0);  // beside the volume
 }
 
+BOOST_AUTO_TEST_CASE(with_a_window_any_point_may_be_clear_and_untested_bricks_are) {
+  const Grid grid = fields::centred_grid({16, 16, 16});
+  const MixedVolume v = as_mixed(fields::uniform(grid, [](double, double, double) { return 0.5; }));
+  const ResidentVolume resident(device(), v);
+  const RenderOptions o =
+      unlit(grid, {"band", {{0.3, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 0.9}, {0.7, {1, 1, 1}, 0}}});
+  CertifyPictureOptions whole, window;
+  window.window = std::pair{0.3, 0.7};
+  const std::size_t centre = 3 * (12 * 24 + 12);
+  const PixelBounds known = certify_pixels(device(), resident, all(v, 0.01f), o, whole),
+                    maybe = certify_pixels(device(), resident, all(v, 0.01f), o, window),
+                    outer = certify_pixels(device(), resident, all(v, std::numeric_limits<float>::infinity()),
+                                           o, window);
+  BOOST_TEST(known.lo.values[centre] > 0.99f);
+  // From the background, were F outside the window all along, to the colour.
+  const float background = outer.hi.values[centre];
+  BOOST_TEST(background < 0.2f);
+  BOOST_TEST(maybe.lo.values[centre] <= background);
+  BOOST_TEST(maybe.hi.values[centre] > 0.99f);
+  BOOST_TEST(outer.untested[centre / 3] == 0);
+  BOOST_TEST(outer.parts[centre / 3] == 0);
+  window.window = std::pair{0.3, 0.6};
+  BOOST_CHECK_THROW((void)certify_pixels(device(), resident, all(v, 0.01f), o, window), InputError);
+}
+
+BOOST_AUTO_TEST_CASE(what_a_transfer_function_shows_outside_a_window_is_told) {
+  const auto clear = [](std::vector<TransferPoint> points) {
+    return is_clear_outside({"f", std::move(points)}, {0.2, 0.6});
+  };
+  BOOST_TEST(clear({{0.2, {1, 1, 1}, 0}, {0.4, {1, 1, 1}, 1}, {0.6, {1, 1, 1}, 0}}));
+  BOOST_TEST(clear({{0, {1, 1, 1}, 0},
+                    {0.2, {1, 1, 1}, 0},
+                    {0.2, {1, 1, 1}, 1},
+                    {0.6, {1, 1, 1}, 1},
+                    {0.6, {1, 1, 1}, 0}}));
+  BOOST_TEST(!clear({{0.1, {1, 1, 1}, 0}, {0.4, {1, 1, 1}, 1}, {0.6, {1, 1, 1}, 0}}));
+  BOOST_TEST(!clear({{0.2, {1, 1, 1}, 0}, {0.4, {1, 1, 1}, 1}, {0.7, {1, 1, 1}, 0}}));
+  BOOST_TEST(!clear({{0.2, {1, 1, 1}, 0}, {0.4, {1, 1, 1}, 1}}));  // its last value goes on
+  BOOST_TEST(!clear({{0.3, {1, 1, 1}, 0.1}, {0.4, {1, 1, 1}, 0}}));
+}
+
 // How much of the interval fields within the bounds reach: docs/pixel-bounds.md promises 65 % at kappa 1/2,
 // 80 % at 1/8 in the mean.
 BOOST_AUTO_TEST_CASE(an_adversary_reaches_most_of_the_interval) {

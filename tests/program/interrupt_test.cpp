@@ -56,6 +56,8 @@ struct Work {
          {"verify", volume.string(), "--projections", (folder / "small.h5").string(), "--exhaustive"}},
         {"reconstruct", {"reconstruct", s, "--size", "640x640x16", "--spacing", "0.5", "-o", o + ".mha"}},
         {"render", {"render", volume.string(), "--size", "1500x1500", "-o", o + ".png"}},
+        {"certified picture",
+         {"render", volume.string(), "--certify", "--size", "1500x1500", "-o", o + ".png"}},
         {"probe", {"probe", s, "--exact", "--points", (folder / "points.csv").string(), "-o", o + ".csv"}},
         {"export", {"export", volume.string(), "--oversampling", "8", "-o", o + ".zarr"}},
         {"export of blocks", {"export", volume.string(), "-o", o + ".vtm"}},
