@@ -1,5 +1,5 @@
 # Debian packages by component, for cpack -G DEB; scripts/debian-packages makes, checks and tries them. vdvr: programs, man pages,
-# completion, ParaView's reader; libvdvr0.1: the shared library; libvdvr-dev: what a program is built with; vdvr-doc: documents
+# completion, ParaView's reader; vdvr-mpi, where MPI is found; libvdvr0.1: the shared library; libvdvr-dev: what a program is built with; vdvr-doc: documents
 # and scans. The two of the library are left out where only the static one is built.
 set(VDVR_MAINTAINER "VDVR developers <developers@vdvr.invalid>" CACHE STRING
     "Who answers for the Debian packages; the default is nobody's address")
@@ -54,6 +54,10 @@ vdvr_deb_papers(deb_documents vdvr-doc)
 install(FILES README.md CONTRIBUTING.md SECURITY.md CITATION.cff DESTINATION share/doc/vdvr-doc COMPONENT deb_documents EXCLUDE_FROM_ALL)
 install(DIRECTORY docs data DESTINATION share/doc/vdvr-doc COMPONENT deb_documents EXCLUDE_FROM_ALL)
 set(CPACK_COMPONENTS_ALL vdvr_program deb_program deb_documents)
+if(TARGET vdvr_mpi)
+  vdvr_deb_papers(deb_mpi vdvr-mpi)
+  list(APPEND CPACK_COMPONENTS_ALL vdvr_mpi deb_mpi)
+endif()
 if(BUILD_SHARED_LIBS)
   set(shared vdvr)
 elseif(TARGET vdvr_twin)
@@ -116,6 +120,13 @@ set(CPACK_DEBIAN_VDVR_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_VDVR_PACKAGE_RECOMMENDS "pocl-opencl-icd | opencl-icd")
 set(CPACK_DEBIAN_VDVR_PACKAGE_SUGGESTS
     "vdvr-doc, hdf5-filter-plugin, hdf5-filter-plugin-blosc-serial, bitshuffle, paraview, python3-h5py")
+if(TARGET vdvr_mpi)
+  vdvr_deb_package(vdvr_mpi vdvr-mpi science "certified volumes of X-ray CT projections: for clusters\n${about}This package has\
+ vdvr-mpi, whose builds are spread over the ranks of an\nMPI job." vdvr_mpi deb_mpi)
+  set(CPACK_DEBIAN_VDVR_MPI_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_VDVR_MPI_PACKAGE_RECOMMENDS "openmpi-bin, pocl-opencl-icd | opencl-icd")
+  set(CPACK_DEBIAN_VDVR_MPI_PACKAGE_SUGGESTS "vdvr, vdvr-doc")
+endif()
 vdvr_deb_package(vdvr_doc vdvr-doc doc "certified volumes of X-ray CT projections: documents and scans\n${about}This package\
  has the documents, and three scans to try." deb_documents)
 set(CPACK_DEBIAN_VDVR_DOC_PACKAGE_ARCHITECTURE all)
@@ -135,6 +146,7 @@ if(shared)
 endif()
 if(BUILD_SHARED_LIBS)
   set(CPACK_DEBIAN_VDVR_PACKAGE_DEPENDS "libvdvr${VDVR_ABI} (= ${VDVR_DEB_VERSION})")
+  set(CPACK_DEBIAN_VDVR_MPI_PACKAGE_DEPENDS "libvdvr${VDVR_ABI} (= ${VDVR_DEB_VERSION})")
   set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_BINARY_DIR}")
 endif()
 include(CPack)

@@ -24,6 +24,17 @@ target_link_libraries(vdvr_mpi PRIVATE MPI::MPI_C)
 if(BUILD_SHARED_LIBS)
   set_target_properties(vdvr_mpi PROPERTIES INSTALL_RPATH "$ORIGIN/${VDVR_LIB_FROM_BIN}")
 endif()
+# Its man page says where the options are: on those of `vdvr`.
+if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
+  set(VDVR_MPI_MANUAL "${CMAKE_BINARY_DIR}/mpi-manuals")
+  add_custom_command(OUTPUT "${VDVR_MPI_MANUAL}/written"
+    COMMAND "${CMAKE_COMMAND}" "-DOUTPUT=${VDVR_MPI_MANUAL}" "-DMPI=$<TARGET_FILE:vdvr_mpi>" "-DEPOCH=${VDVR_EPOCH}"
+            -P "${CMAKE_SOURCE_DIR}/cmake/WriteManuals.cmake"
+    DEPENDS vdvr_mpi "${CMAKE_SOURCE_DIR}/cmake/WriteManuals.cmake" VERBATIM)
+  add_custom_target(vdvr_mpi_manual ALL DEPENDS "${VDVR_MPI_MANUAL}/written")
+  install(DIRECTORY "${VDVR_MPI_MANUAL}/man1" DESTINATION "${CMAKE_INSTALL_MANDIR}" COMPONENT vdvr_mpi)
+  install(DIRECTORY "${VDVR_MPI_MANUAL}/completions" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion" COMPONENT vdvr_mpi)
+endif()
 install(TARGETS vdvr_mpi RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT vdvr_mpi)
 
 # For the tests, with Debian's MPICH beside another MPI.

@@ -4,7 +4,9 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,24 +35,58 @@ std::vector<Command> commands_of_ranks() {
   return out;
 }
 
+const std::vector<Command>& known() {
+  static const std::vector<Command> all = commands_of_ranks();
+  return all;
+}
+
+void print_overview() {
+  fmt::print(
+      "vdvr-mpi {}: {}\n\nusage: mpirun -n N vdvr-mpi COMMAND [options]\n       vdvr-mpi COMMAND --help\n\n"
+      "commands:\n",
+      VDVR_VERSION, purpose);
+  for (const Command& c : known()) fmt::print("  {:<16} {}\n", c.name, c.purpose);
+  fmt::print(
+      "\nbuild and run spread their blocks over all ranks; plan and verify are rank 0's alone.\n"
+      "Options are those of vdvr, whose man pages have them: man vdvr-build.\n");
+}
+
+// The options are those of the program of one process, and so are the pages.
+int print_manual(const std::vector<std::string>& words) {
+  if (words.size() > 1)
+    return fail(program, fmt::format("--man: there is one page; `vdvr --man {}` has the options", words[1]),
+                2);
+  std::vector<Command> documented = known();
+  for (Command& c : documented) c.program = "vdvr";
+  fmt::print("{}", overview_page(program, purpose, documented));
+  return 0;
+}
+
+int print_completion(const std::vector<std::string>& words) {
+  if (words.size() != 2 || words[1] != "bash")
+    return fail(program, "--completion: name the shell; there is one for bash", 2);
+  fmt::print("{}", bash_completion(program, known()));
+  return 0;
+}
+
+// What needs no other rank, and no MPI: a launcher's ranks but the first say nothing.
+std::optional<int> answer_alone(const std::vector<std::string>& words) {
+  const std::string word = words.empty() ? "" : words[0];
+  const bool help = word == "--help" || word == "-h" || word == "help";
+  if (!words.empty() && !help && word != "--version" && word != "--man" && word != "--completion")
+    return std::nullopt;
+  const int code = words.empty() ? 2 : 0;
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const char* rank = std::getenv(name); rank != nullptr && std::string(rank) != "0") return code;
+  if (word == "--man") return print_manual(words);
+  if (word == "--completion") return print_completion(words);
+  if (word == "--version") fmt::print("vdvr-mpi {}\n", VDVR_VERSION);
+  else print_overview();
+  return code;
+}
+
 int lead(const std::vector<std::string>& words) {
-  static const std::vector<Command> known = commands_of_ranks();
-  if (words.empty() || words[0] == "--help" || words[0] == "-h") {
-    fmt::print("vdvr-mpi {}: {}\n\nusage: mpirun -n N vdvr-mpi COMMAND [options]\n\ncommands:\n",
-               VDVR_VERSION, purpose);
-    for (const Command& c : known) fmt::print("  {:<16} {}\n", c.name, c.purpose);
-    fmt::print("\nbuild and run spread their blocks over all ranks; plan and verify are rank 0's alone.\n");
-    return words.empty() ? 2 : 0;
-  }
-  if (words[0] == "--version") {
-    fmt::print("vdvr-mpi {}\n", VDVR_VERSION);
-    return 0;
-  }
-  if (words[0] == "--man") {
-    fmt::print("{}", overview_page(program, purpose, known));
-    return 0;
-  }
-  for (const Command& command : known)
+  for (const Command& command : known())
     if (words[0] == command.name) return run_guarded(command, {words.begin() + 1, words.end()});
   return fail(program, fmt::format("unknown command '{}'; `vdvr-mpi --help` lists them", words[0]), 2);
 }
@@ -92,6 +128,7 @@ int run(const std::vector<std::string>& words) {
 }  // namespace vdvr::cli
 
 int main(int argc, char** argv) {
+  if (const auto code = vdvr::cli::answer_alone({argv + 1, argv + argc})) return *code;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
   return vdvr::cli::run({argv + 1, argv + argc});

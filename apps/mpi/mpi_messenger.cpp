@@ -22,11 +22,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-enum Tag { words = 1, file_here = 2, file_part = 3, file_mapped = 4 };
+enum Tag { words = 1, file_here = 2, file_part = 3, file_mapped = 4, common_here = 5, common_open = 6 };
 
 constexpr std::uint64_t most_on_its_way = std::uint64_t{64} << 20, file_part_bytes = std::uint64_t{16} << 20;
 constexpr std::chrono::microseconds pause{500};
-constexpr std::chrono::seconds longest_send{120}, longest_flush{10};
+constexpr std::chrono::seconds longest_send{120}, longest_flush{10}, longest_wait_for_common{10};
 
 struct Header {
   std::uint64_t number = 0, bytes = 0;
@@ -101,6 +101,8 @@ MpiMessenger::~MpiMessenger() {
   std::error_code ignored;
   for (const auto& [number, file] : files_)
     if (file.own) std::filesystem::remove(file.path, ignored);
+  for (const auto& [number, common] : commons_)
+    if (common.file >= 0) ::close(common.file);
 }
 
 bool MpiMessenger::is_gone(int process) const {
@@ -252,6 +254,7 @@ void MpiMessenger::hear_of_files() {
     file.written += part.size();
     if (file.written == file.bytes) announce(header.number);
   }
+  hear_of_commons();
   while (take(file_mapped, from, bytes)) {
     const auto found = files_.find(header_of(bytes).number);
     if (found == files_.end() || !found->second.own || --found->second.unmapped > 0) continue;
@@ -312,6 +315,63 @@ std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger:
   return {
       {static_cast<const std::byte*>(first), bytes},
       std::shared_ptr<const void>(first, [bytes](const void* p) { ::munmap(const_cast<void*>(p), bytes); })};
+}
+
+void MpiMessenger::hear_of_commons() {
+  int from = 0;
+  std::vector<std::byte> bytes;
+  while (take(common_here, from, bytes)) {
+    const Header header = header_of(bytes);
+    commons_[header.number] = {-1, 0,
+                               std::string(reinterpret_cast<const char*>(bytes.data()) + sizeof header,
+                                           bytes.size() - sizeof header),
+                               header.bytes};
+  }
+  while (take(common_open, from, bytes)) {
+    const auto found = commons_.find(header_of(bytes).number);
+    if (found == commons_.end() || --found->second.unopened > 0 || found->second.file < 0) continue;
+    ::close(std::exchange(found->second.file, -1));
+  }
+}
+
+CommonMemory MpiMessenger::common(std::uint64_t number, std::uint64_t bytes) {
+  int file = -1;
+  if (place_ == 0) {
+    file = ::memfd_create("vdvr-mpi", MFD_CLOEXEC);
+    if (file < 0 || ::ftruncate(file, static_cast<off_t>(bytes)) != 0) {
+      if (file >= 0) ::close(file);
+      return {};
+    }
+    const std::string path = fmt::format("/proc/{}/fd/{}", ::getpid(), file);
+    Common& own = commons_[number] = {file, 0, path, bytes};
+    for (const int rank : neighbours_of_mine()) {
+      ++own.unopened;
+      post(rank, common_here,
+           with_header({number, bytes}, std::as_bytes(std::span(path.data(), path.size()))));
+    }
+  } else {
+    const auto start = Clock::now();
+    while (!commons_.contains(number)) {
+      throw_if_stopped();
+      if (states_[0] != State::here) throw ResourceError("the rank that leads has ended");
+      if (Clock::now() - start > longest_wait_for_common) return {};
+      std::this_thread::sleep_for(pause);
+      progress();
+      hear_of_commons();
+    }
+    const Common& other = commons_.at(number);
+    file = other.bytes < bytes ? -1 : ::open(other.path.c_str(), O_RDWR | O_CLOEXEC);
+    bytes = other.bytes;
+  }
+  void* first = file < 0 ? MAP_FAILED : ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  if (place_ != 0) {
+    if (file >= 0) ::close(file);
+    post(machine_.front(), common_open, with_header({number, 0}, {}));
+  }
+  if (first == MAP_FAILED) return {};
+  return {{static_cast<std::byte*>(first), bytes},
+          std::shared_ptr<void>(first, [bytes](void* p) { ::munmap(p, bytes); }),
+          neighbours()};
 }
 
 void MpiMessenger::part() {

@@ -32,6 +32,7 @@ class MpiMessenger final : public Messenger {
   std::optional<std::pair<int, std::vector<std::byte>>> receive(std::chrono::milliseconds wait) override;
   std::uint64_t share(std::span<const std::byte> bytes) override;
   std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared(std::uint64_t number) override;
+  CommonMemory common(std::uint64_t number, std::uint64_t bytes) override;
   [[nodiscard]] bool is_gone(int process) const override;
   void give_up(int process) override;
 
@@ -58,6 +59,15 @@ class MpiMessenger final : public Messenger {
     int unmapped = 0;  // ranks that have not yet
     bool own = false, whole = false;
   };
+  // Memory without a name on any disk, which others of this machine open by its number in the first one's
+  // process: it vanishes with those who have it.
+  struct Common {
+    int file = -1;  // of the first one's process, until all have opened it
+    int unopened = 0;
+    std::string path;
+    std::uint64_t bytes = 0;
+  };
+  void hear_of_commons();
   void post(int to, int tag, std::vector<std::byte> bytes);
   void progress();
   bool take(int tag, int& from, std::vector<std::byte>& bytes);
@@ -74,6 +84,7 @@ class MpiMessenger final : public Messenger {
   int next_ = 0;               // whom to listen to first
   std::list<Sending> sending_;
   std::map<std::uint64_t, File> files_;
+  std::map<std::uint64_t, Common> commons_;
   std::uint64_t shares_ = 0;
 };
 

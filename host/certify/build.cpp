@@ -373,7 +373,8 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   watch.lap("filter");
   GoldSettings settings = gold_settings(plan, options, {}, scan.cone.has_value());
   std::optional<Crew> crew;
-  if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew);
+  const bool all = 2 * std::count(selected.begin(), selected.end(), 1) > std::ssize(selected);
+  if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew, all);
   Crew* const others = crew ? &*crew : nullptr;
   watch.lap("crew");
   const FieldSlopes slopes = field_slopes(as_mixed(plan.base));

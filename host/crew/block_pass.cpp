@@ -145,6 +145,30 @@ void read_fit(ByteReader& in, const std::function<void(std::size_t, float)>& vis
     for (std::uint64_t i = 0; i < length.at(run); ++i) visit(first[run] + i, samples.at(next++));
 }
 
+std::vector<GoldStream::Work> works_of(std::span<const BrickRemainder::Block> blocks) {
+  std::vector<GoldStream::Work> works;
+  for (const auto& [first, size] : blocks) {
+    if (works.empty() || works.back().z != first[2] || works.back().size() != size)
+      works.push_back({first[2], size[2], size[0], size[1], {}});
+    works.back().first.push_back({first[0], first[1]});
+  }
+  return works;
+}
+
+Bytes remainder_record(const BrickRemainder& remainder, const BrickRemainder::Block& block,
+                       const BlockPass& pass, int rate) {
+  ByteWriter out;
+  const auto& [first, size] = block;
+  put(out, BlockKey{rate, pass.number, first[2], size, {{first[0], first[1]}}});
+  out.put(remainder.found(block));
+  return out.take();
+}
+
+void take_remainder(ByteReader& in, const BlockKey& key, BrickRemainder& remainder) {
+  const auto& [x, y] = key.first.at(0);
+  remainder.take({{x, y, key.z}, key.size}, in.get_vector<float>());
+}
+
 Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField* field,
                      const opencl::DeviceArray<std::uint8_t>& selected, int rate) {
   ByteWriter out;
@@ -171,6 +195,8 @@ Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField*
       break;
     case BlockPass::Ask::extract:
       put_extract(out, batch, pass);
+      break;
+    case BlockPass::Ask::remainder:  // is of no batch
       break;
   }
   return out.take();

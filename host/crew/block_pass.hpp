@@ -21,7 +21,8 @@ struct BlockPass {
     test,      ///< the base's measure
     classify,  ///< levels above 0, with their tiles
     measure,   ///< a closed field's measure, and which parts of a brick are over the tolerance
-    extract    ///< tiles of the levels given
+    extract,   ///< tiles of the levels given
+    remainder  ///< what T leaves out (brick_remainder.hpp)
   };
   Ask ask = Ask::test;
   bool fine = true;  ///< gold at the rate that certifies, else at half of it
@@ -72,5 +73,13 @@ inline bool is_above_base(const LevelTriple& level) { return level != LevelTripl
 /// pass, on the device.
 Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField* field,
                      const opencl::DeviceArray<std::uint8_t>& selected, int rate);
+
+/// The same of `remainder`: blocks of bricks as works, one after another.
+std::vector<GoldStream::Work> works_of(std::span<const BrickRemainder::Block> blocks);
+/// Of a block that was looked at.
+Bytes remainder_record(const BrickRemainder& remainder, const BrickRemainder::Block& block,
+                       const BlockPass& pass, int rate);
+/// Of a record, what follows the key.
+void take_remainder(ByteReader& in, const BlockKey& key, BrickRemainder& remainder);
 
 }  // namespace vdvr

@@ -3,6 +3,7 @@
 #include "host/crew/crew.hpp"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,40 +21,48 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A worker has as many pieces at once: one to compute, one to go on with.
+// A worker has as many pieces at once: one to compute, one to go on with, but for the last ones.
 constexpr std::size_t ahead = 2;
-// Of a pass, to a worker: small enough that all end together, large enough that blocks share batches.
-constexpr double pieces_each = 8;
+// Of what is left of a worker's part each piece takes so much: large ones, whose blocks share batches, then
+// smaller ones, so that all end together. The least is a part of that part, or takes milliseconds.
+constexpr double piece_of_rest = 0.2, least_of_part = 1.0 / 32, least_samples = 1 << 18;
 
 bool is_same(const DeviceInfo& a, const DeviceInfo& b) {
   return a.name == b.name && a.driver == b.driver && a.platform == b.platform;
 }
 
-// Runs of blocks in their order, of about equal cost.
-std::vector<Works> cut(const GoldStream& gold, const Works& works, std::size_t workers) {
+// Runs of blocks in their order, of about equal cost, one for each worker, in pieces.
+std::vector<std::vector<Works>> cut(const GoldStream& gold, const Works& works, std::size_t workers) {
   double total = 0;
   for (const GoldStream::Work& w : works) total += gold.cost(w);
-  const double wanted = total / (pieces_each * static_cast<double>(workers));
-  std::vector<Works> pieces;
-  double room = 0;
+  const double part = std::max(total / static_cast<double>(workers), least_samples),
+               least = std::max(part * least_of_part, std::min(part, least_samples));
+  std::vector<std::vector<Works>> runs(1);
+  double left = part, room = 0;  // of the run, of the piece
   for (const GoldStream::Work& w : works) {
     const double block = gold.cost(w) / static_cast<double>(w.first.size());
     for (std::size_t from = 0; from < w.first.size();) {
-      if (room < 0.5 * block) {
-        pieces.emplace_back();
-        room = wanted;
+      if (left < 0.5 * block && runs.size() < workers) {
+        runs.emplace_back();
+        left += part;
+        room = 0;
+      }
+      if (room < 0.5 * block || runs.back().empty()) {
+        runs.back().emplace_back();
+        room = std::max(left * piece_of_rest, least);
       }
       const auto n =
           std::min(w.first.size() - from, static_cast<std::size_t>(std::max(1.0, std::round(room / block))));
-      GoldStream::Work part = w;
-      part.first.assign(w.first.begin() + static_cast<std::ptrdiff_t>(from),
+      GoldStream::Work some = w;
+      some.first.assign(w.first.begin() + static_cast<std::ptrdiff_t>(from),
                         w.first.begin() + static_cast<std::ptrdiff_t>(from + n));
-      pieces.back().push_back(std::move(part));
+      runs.back().back().push_back(std::move(some));
       room -= static_cast<double>(n) * block;
+      left -= static_cast<double>(n) * block;
       from += n;
     }
   }
-  return pieces;
+  return runs;
 }
 
 // Takes the blocks of a record away from a piece.
@@ -102,6 +111,7 @@ struct Crew::State {
   std::vector<Member> members;
   CrewTraffic traffic;
   std::uint64_t passes = 0;
+  bool has_told = false;  // what is left out of bricks that the plan looked at
 
   State(opencl::State& device, const CrewOptions& o) : options(o), leader(device) {}
 
@@ -154,7 +164,8 @@ std::optional<CrewReport> Crew::State::take() {
   return inbox.take(a_moment);
 }
 
-Crew::Crew(Device& leader, const PreparedScan& from, const GoldSettings& settings, const CrewOptions& options)
+Crew::Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, const CrewOptions& options,
+           bool all)
     : state_(std::make_unique<State>(leader.state(), options)) {
   State& s = *state_;
   kinds_.push_back({leader.info(), probe_filters(leader), 0});
@@ -182,6 +193,7 @@ Crew::Crew(Device& leader, const PreparedScan& from, const GoldSettings& setting
     }
     const std::span<const float> samples(from.filtered.samples.data(), from.filtered.samples.size());
     const std::uint64_t shared = messenger.others() > 0 ? messenger.share(std::as_bytes(samples)) : 0;
+    const std::uint64_t common = all && messenger.others() > 0 ? share_gold(from, settings, shared) : 0;
     for (State::Member& m : s.members) {
       if (!m.worker->is_remote()) continue;
       ByteWriter out;
@@ -189,16 +201,54 @@ Crew::Crew(Device& leader, const PreparedScan& from, const GoldSettings& setting
       out.put(shared);
       out.put(static_cast<std::uint64_t>(samples.size()));
       out.put(static_cast<std::uint8_t>(options.mixed_devices));
+      out.put(common);
       put_scan(out, from.filtered, from.sups, settings);
       s.remote(m).send(out.take());
     }
     wait_for_kinds();
+  } else if (all) {
+    share_gold(from, settings, 0);
   }
   if (options.mixed_devices || kinds_.size() == 1) return;
   throw InputError(fmt::format(
       "`device`: '{}' and '{}' are not the same device and driver, whose results may differ; take devices of "
       "one kind, or --mixed-devices",
       kinds_[0].info.name, kinds_[1].info.name));
+}
+
+namespace {
+
+CommonMemory memory_of_threads(std::uint64_t bytes, int sharers) {
+  void* first =
+      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (first == MAP_FAILED) return {};
+  return {{static_cast<std::byte*>(first), bytes},
+          std::shared_ptr<void>(first, [bytes](void* p) { ::munmap(p, bytes); }),
+          sharers};
+}
+
+}  // namespace
+
+// Where devices compute in the host's memory, gold is kept once for those of a machine, and made by all of
+// them; processes of other machines do so among themselves. Returns the number by which processes ask for
+// such memory, 0 where they must not.
+std::uint64_t Crew::share_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number) {
+  State& s = *state_;
+  // What a device made, others of another kind would read.
+  if (s.options.mixed_devices) return 0;
+  const int sharers =
+      s.options.messenger ? s.options.messenger->neighbours() : static_cast<int>(s.members.size());
+  if (sharers == 1) return number;
+  KeptGold& kept = from.source(settings)->kept;
+  const auto shape = kept.common_shape();
+  const std::uint64_t bytes = shape ? CommonGold::bytes_of(*shape) : 0;
+  if (!shape || bytes / count(sharers) > from.state.memory.left() / 2) return 0;
+  const CommonMemory memory =
+      s.options.messenger ? s.options.messenger->common(number, bytes) : memory_of_threads(bytes, sharers);
+  if (memory.bytes.empty()) return 0;
+  kept.share(memory, true);
+  for (const auto& other : s.others) other->share_gold([memory](std::uint64_t) { return memory; });
+  return number;
 }
 
 // What devices the others have. They answer while the scan is still on its way to them.
@@ -258,9 +308,18 @@ namespace {
 // whoever has done its own takes from the end of the longest that is left.
 class Queue {
  public:
-  Queue(std::vector<Works> pieces, std::size_t workers) : pieces_(std::move(pieces)) {
-    for (std::size_t w = 0; w < workers; ++w)
-      runs_.push_back({pieces_.size() * w / workers, pieces_.size() * (w + 1) / workers});
+  Queue(std::vector<std::vector<Works>> runs, std::size_t workers) : runs_(workers) {
+    for (std::size_t w = 0; w < workers; ++w) {
+      runs_[w].first = pieces_.size();
+      if (w < runs.size())
+        for (Works& piece : runs[w]) pieces_.push_back(std::move(piece));
+      runs_[w].last = pieces_.size();
+    }
+  }
+  [[nodiscard]] std::size_t left() const {
+    std::size_t pieces = returned_.size();
+    for (const Run& run : runs_) pieces += run.last - run.first;
+    return pieces;
   }
   std::optional<std::size_t> next(std::size_t worker) {
     if (!returned_.empty()) {
@@ -284,7 +343,7 @@ class Queue {
 
  private:
   struct Run {
-    std::size_t first, last;
+    std::size_t first = 0, last = 0;
   };
   std::vector<Works> pieces_;
   std::vector<Run> runs_;
@@ -305,7 +364,7 @@ void Crew::run(GoldStream& gold, const SharedPass& pass, const DeviceField* fiel
   s.leader.set(gold, field);
   const auto feed = [&](std::size_t i) {
     State::Member& m = s.members[i];
-    while (!m.lost && m.given.size() < ahead) {
+    while (!m.lost && m.given.size() < (queue.left() >= s.members.size() ? ahead : 1)) {
       const auto piece = queue.next(i);
       if (!piece) return;
       if (m.given.empty()) m.heard = Clock::now();
@@ -359,6 +418,33 @@ void Crew::run(GoldStream& gold, const SharedPass& pass, const DeviceField* fiel
   }
   for (State::Member& m : s.members)
     if (!m.worker->is_remote()) m.worker->halt();  // what ends a piece reads the caller's streams
+}
+
+void Crew::look_at(GoldStream& gold, const std::vector<std::uint8_t>& selected, const Progress& progress) {
+  State& s = *state_;
+  BrickRemainder& remainder = *gold.source()->remainder;
+  const std::vector<BrickRemainder::Block> open = remainder.open(selected);
+  if (open.empty()) return;
+  BlockPass pass;
+  pass.ask = BlockPass::Ask::remainder;
+  pass.lattice = gold.settings().lattice;
+  pass.selected = selected;
+  const auto shared = std::make_shared<const BlockPass>(std::move(pass));
+  const auto records = std::make_shared<std::vector<Bytes>>();
+  // What the plan found, once.
+  if (!std::exchange(s.has_told, true))
+    for (const BrickRemainder::Block& block : remainder.known())
+      records->push_back(remainder_record(remainder, block, *shared, gold.settings().rate));
+  run(
+      gold, shared, nullptr, works_of(open), [&](const Bytes& record) { records->push_back(record); },
+      progress, "remainder");
+  for (const Bytes& record : *records) {
+    ByteReader in(record);
+    const BlockKey key = get_key(in);
+    take_remainder(in, key, remainder);
+  }
+  for (State::Member& m : s.members)
+    if (!m.lost) m.worker->learn(records);
 }
 
 void run_blocks(Crew* crew, GoldStream& gold, const SharedPass& pass, const DeviceField* field, Works works,

@@ -25,6 +25,7 @@ namespace vdvr {
 using Works = std::vector<GoldStream::Work>;
 using OnRecord = std::function<void(const Bytes&)>;
 using SharedPass = std::shared_ptr<const BlockPass>;
+using Records = std::shared_ptr<const std::vector<Bytes>>;
 
 /// What a worker says of the pass with that number (of all passes of a crew).
 struct CrewReport {
@@ -58,6 +59,8 @@ class CrewWorker {
   virtual ~CrewWorker() = default;
   /// The field that passes measure from here on. `volume` stays until halt() or the next pass has ended.
   virtual void use(const MixedVolume& volume, const Room& room) = 0;
+  /// Records of `remainder`.
+  virtual void learn(const Records& records) = 0;
   virtual void begin(std::uint64_t number, SharedPass pass) = 0;
   virtual void give(std::uint64_t number, std::size_t piece, const Works& works) = 0;
   /// Forgets what was given and waits until nothing of the caller's is read any more.
@@ -68,9 +71,11 @@ class CrewWorker {
 
 class Crew {
  public:
-  /// The leader's device takes part; `from`, and what options name, are referred to. Throws InputError where
+  /// The leader's device takes part; `from`, and what options name, are referred to. `all`: nearly all gold
+  /// will be asked for, so that it is worth keeping once for all of a machine. Throws InputError where
   /// devices differ that must not.
-  Crew(Device& leader, const PreparedScan& from, const GoldSettings& settings, const CrewOptions& options);
+  Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, const CrewOptions& options,
+       bool all);
   ~Crew();
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
@@ -78,6 +83,9 @@ class Crew {
   void use(const MixedVolume& volume, const Room& room);
   void run(GoldStream& gold, const SharedPass& pass, const DeviceField* field, Works works,
            const OnRecord& on_record, const Progress& progress, const std::string& stage);
+
+  /// Finds what T leaves out of these bricks, as far as nobody knows it, and tells all.
+  void look_at(GoldStream& gold, const std::vector<std::uint8_t>& selected, const Progress& progress);
 
   /// Name and driver of every kind of device, the leader's first.
   struct Kind {
@@ -94,6 +102,7 @@ class Crew {
   class Leader;
   struct State;
   void wait_for_kinds();
+  std::uint64_t share_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number);
   std::unique_ptr<State> state_;
   std::vector<Kind> kinds_;
 };

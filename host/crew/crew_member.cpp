@@ -8,6 +8,16 @@ void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* 
                     const opencl::DeviceArray<std::uint8_t>& selected,
                     std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,
                     const Progress& progress, const std::string& stage) {
+  if (pass.ask == BlockPass::Ask::remainder) {
+    for (const GoldStream::Work& work : works)
+      for (const auto& [x, y] : work.first) {
+        BrickRemainder& remainder = *gold.source()->remainder;
+        const BrickRemainder::Block block{{x, y, work.z}, work.size()};
+        remainder.look_at(std::span(&block, 1), progress);
+        on_record(remainder_record(remainder, block, pass, gold.settings().rate));
+      }
+    return;
+  }
   gold.run_works(
       works, pass.selected,
       [&](GoldBatch& batch) {
@@ -17,8 +27,19 @@ void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* 
 }
 
 std::shared_ptr<GoldSource> CrewMember::source() {
-  if (!source_) source_ = std::make_shared<GoldSource>(state_, scan_, sups_, settings_);
+  if (source_) return source_;
+  source_ = std::make_shared<GoldSource>(state_, scan_, sups_, settings_);
+  if (const auto shape = room_for_gold_ ? source_->kept.common_shape() : std::nullopt)
+    source_->kept.share(room_for_gold_(CommonGold::bytes_of(*shape)), false);
   return source_;
+}
+
+void CrewMember::learn(const std::vector<Bytes>& records) {
+  for (const Bytes& record : records) {
+    ByteReader in(record);
+    const BlockKey key = get_key(in);
+    take_remainder(in, key, *source()->remainder);
+  }
 }
 
 // Passes of one build bring one lattice.

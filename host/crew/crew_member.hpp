@@ -25,6 +25,11 @@ class CrewMember {
   void begin(std::shared_ptr<const BlockPass> pass, const Progress& progress);
   void compute(std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,
                const Progress& progress);
+  /// Gold is kept in memory that others have too, where `room` has some: asked once, for so many bytes.
+  using RoomForGold = std::function<CommonMemory(std::uint64_t)>;
+  void share_gold(RoomForGold room) { room_for_gold_ = std::move(room); }
+  /// Records of `remainder` that others computed.
+  void learn(const std::vector<Bytes>& records);
   /// GoldRates::arithmetic of this device.
   [[nodiscard]] double arithmetic();
 
@@ -37,6 +42,7 @@ class CrewMember {
   const FilteredScan& scan_;
   const FieldSups& sups_;
   GoldSettings settings_;
+  RoomForGold room_for_gold_;
   std::shared_ptr<GoldSource> source_;
   std::optional<GoldStream> fitting_;
   std::optional<GoldRates> rates_;

@@ -239,6 +239,17 @@ BlockPass get_pass(ByteReader& in) {
   return pass;
 }
 
+void put_records(ByteWriter& out, const std::vector<Bytes>& records) {
+  out.put(static_cast<std::uint64_t>(records.size()));
+  for (const Bytes& record : records) out.put(record);
+}
+
+std::vector<Bytes> get_records(ByteReader& in) {
+  std::vector<Bytes> records(in.get<std::uint64_t>());
+  for (Bytes& record : records) record = in.get_vector<std::byte>();
+  return records;
+}
+
 void put_works(ByteWriter& out, const Works& works) {
   out.put(static_cast<std::uint64_t>(works.size()));
   for (const GoldStream::Work& w : works) {

@@ -19,6 +19,7 @@ enum class CrewWord : std::uint8_t {
   ready,
   field,   // leader: the shape of a field, whose samples follow
   part,    // leader: some of these samples
+  learn,   // leader: records of what all need
   pass,    // leader
   work,    // leader: a piece of the pass
   halt,    // leader: what was given and not begun is not wanted any more
@@ -45,6 +46,9 @@ Crew::Kind get_kind(ByteReader& in);
 
 void put_pass(ByteWriter& out, const BlockPass& pass);
 BlockPass get_pass(ByteReader& in);
+
+void put_records(ByteWriter& out, const std::vector<Bytes>& records);
+std::vector<Bytes> get_records(ByteReader& in);
 
 void put_works(ByteWriter& out, const Works& works);
 Works get_works(ByteReader& in);

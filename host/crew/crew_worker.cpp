@@ -74,6 +74,10 @@ void ThreadWorker::use(const MixedVolume& volume, const Room& room) {
   enqueue({true, [this, &volume, room] { device_.use(volume, room); }});
 }
 
+void ThreadWorker::learn(const Records& records) {
+  enqueue({true, [this, records] { device_.learn(*records); }});
+}
+
 void ThreadWorker::begin(std::uint64_t, SharedPass pass) {
   enqueue({false, [this, pass = std::move(pass)] {
              device_.begin(pass, [this](const std::string&, double) {
@@ -100,7 +104,7 @@ void ThreadWorker::halt() {
   halted_ = true;
   {
     std::unique_lock guard(lock_);
-    std::erase_if(jobs_, [](const Job& job) { return !job.is_field; });
+    std::erase_if(jobs_, [](const Job& job) { return !job.is_kept; });
     changed_.wait(guard, [&] { return !busy_ && jobs_.empty(); });
   }
   halted_ = false;
@@ -128,6 +132,13 @@ void RemoteWorker::use(const MixedVolume& volume, const Room&) {
       out.put(std::vector<std::byte>(part.begin(), part.end()));
       send(out.take());
     }
+}
+
+void RemoteWorker::learn(const Records& records) {
+  ByteWriter out;
+  put(out, CrewWord::learn);
+  put_records(out, *records);
+  send(out.take());
 }
 
 void RemoteWorker::begin(std::uint64_t number, SharedPass pass) {

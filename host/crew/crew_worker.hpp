@@ -30,6 +30,7 @@ class CrewDevice {
   virtual ~CrewDevice() = default;
   virtual void use(const MixedVolume& volume, const Room& room) = 0;
   virtual void begin(const SharedPass& pass, const Progress& progress) = 0;
+  virtual void learn(const std::vector<Bytes>& records) = 0;
   virtual void compute(const Works& works, const std::function<void(Bytes)>& on_record,
                        const Progress& progress) = 0;
 };
@@ -45,6 +46,8 @@ class OtherDevice final : public CrewDevice {
                const Progress& progress) override {
     member_.compute(works, on_record, progress);
   }
+  void learn(const std::vector<Bytes>& records) override { member_.learn(records); }
+  void share_gold(CrewMember::RoomForGold room) { member_.share_gold(std::move(room)); }
   [[nodiscard]] double arithmetic() { return member_.arithmetic(); }
 
  private:
@@ -61,6 +64,7 @@ class LeadersDevice final : public CrewDevice {
     field_ = field;
   }
   void use(const MixedVolume&, const Room&) override {}
+  void learn(const std::vector<Bytes>&) override {}
   void begin(const SharedPass& pass, const Progress& progress) override;
   void compute(const Works& works, const std::function<void(Bytes)>& on_record,
                const Progress& progress) override;
@@ -79,15 +83,16 @@ class ThreadWorker final : public CrewWorker {
   ThreadWorker(CrewInbox& inbox, std::size_t index, CrewDevice& device);
   ~ThreadWorker() override;
   void use(const MixedVolume& volume, const Room& room) override;
+  void learn(const Records& records) override;
   void begin(std::uint64_t number, SharedPass pass) override;
   void give(std::uint64_t number, std::size_t piece, const Works& works) override;
-  /// Fields are still taken.
+  /// Fields are still taken, and so is what there is to learn.
   void halt() override;
   [[nodiscard]] bool is_remote() const override { return false; }
 
  private:
   struct Job {
-    bool is_field = false;  // which passes to come measure, whoever is halted
+    bool is_kept = false;  // what passes to come need, whoever is halted
     std::function<void()> run;
   };
   void enqueue(Job job);
@@ -109,6 +114,7 @@ class RemoteWorker final : public CrewWorker {
   RemoteWorker(Messenger& messenger, int process, CrewTraffic& traffic)
       : messenger_(messenger), process_(process), traffic_(traffic) {}
   void use(const MixedVolume& volume, const Room& room) override;
+  void learn(const Records& records) override;
   void begin(std::uint64_t number, SharedPass pass) override;
   void give(std::uint64_t number, std::size_t piece, const Works& works) override;
   void halt() override;

@@ -70,6 +70,7 @@ void JournalledGold::run(BlockPass pass, const DeviceField* field,
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));
   Works works = unknown(*shared, apply);
   if (works.empty()) report(progress, stage, 1);  // all of it was in the journal
+  if (crew_ && !works.empty()) crew_->look_at(gold_, gold_.bricks_of(works, shared->selected), progress);
   run_blocks(
       crew_, gold_, shared, field, std::move(works),
       [&](const Bytes& record) {

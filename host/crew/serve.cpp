@@ -98,6 +98,8 @@ class Server {
         return take_field(in);
       case CrewWord::part:
         return take_part(in);
+      case CrewWord::learn:
+        return member_->learn(get_records(in));
       case CrewWord::pass:
         pass_ = in.get<std::uint64_t>();
         if (!is_halted()) member_->begin(std::make_shared<const BlockPass>(get_pass(in)), progress());
@@ -137,6 +139,7 @@ class Server {
     member_.reset();
     const auto shared = in.get<std::uint64_t>(), samples = in.get<std::uint64_t>();
     const bool mixed = in.get<std::uint8_t>() != 0;
+    const auto common = in.get<std::uint64_t>();
     scan_ = {};
     sups_ = {};
     GoldSettings settings;
@@ -148,6 +151,8 @@ class Server {
     auto* first = const_cast<float*>(reinterpret_cast<const float*>(bytes.data()));
     scan_.samples = SampleArray(std::span(first, samples), owner);
     member_.emplace(device_->state(), scan_, sups_, settings);
+    if (common != 0)
+      member_->share_gold([this, common](std::uint64_t size) { return messenger_.common(common, size); });
     const std::uint64_t share = std::max<std::uint64_t>(device_->state().memory.limit() / 8, least_share);
     room_ = {std::make_shared<Scratch>(
                  scratch_folder_.empty() ? default_scratch_folder() : std::filesystem::path(scratch_folder_),

@@ -22,27 +22,6 @@ constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 /// Of a spacing: what a box given as text may miss its last point by.
 constexpr double kFace = 1e-6;
 
-/// log2 of samples per cell where the spacing is a cell over a power of two, as exports have them.
-std::optional<int> power_of(double cell, double spacing) {
-  int exponent = 0;
-  if (std::frexp(cell / spacing, &exponent) != 0.5 || std::ldexp(spacing, exponent - 1) != cell) return {};
-  const int k = exponent - 1;
-  return k >= 0 && k <= 6 ? std::optional(k) : std::nullopt;
-}
-
-std::optional<SampleBox> exact_box(const MixedVolume& v, const Lattice& lattice) {
-  SampleBox box;
-  box.first = lattice.first;
-  box.count = lattice.count;
-  box.end_brick = v.bricks();
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto k = power_of(v.grid.spacing[a], lattice.spacing[a]);
-    if (!k || lattice.origin[a] != v.grid.origin[a]) return {};
-    box.per_cell[a] = *k;
-  }
-  return box;
-}
-
 void require_fit(std::size_t points, std::size_t room) {
   if (points != room) throw InputError(fmt::format("out: room for {} values of {} points", room, points));
 }

@@ -17,6 +17,14 @@
 namespace vdvr {
 namespace {
 
+/// log2 of samples per cell where the spacing is a cell over a power of two, as exports have them.
+std::optional<int> power_of(double cell, double spacing) {
+  int exponent = 0;
+  if (std::frexp(cell / spacing, &exponent) != 0.5 || std::ldexp(spacing, exponent - 1) != cell) return {};
+  const int k = exponent - 1;
+  return k >= 0 && k <= 6 ? std::optional(k) : std::nullopt;
+}
+
 /// The samples of one axis that one brick answers for.
 struct Run {
   std::int64_t brick = 0, first = 0, count = 0;  // `first` from the box's first
@@ -90,6 +98,19 @@ float jump_between(const MixedVolume& v, const Index3& p, const Index3& step) {
 }
 
 }  // namespace
+
+std::optional<SampleBox> exact_box(const MixedVolume& v, const Lattice& lattice) {
+  SampleBox box;
+  box.first = lattice.first;
+  box.count = lattice.count;
+  box.end_brick = v.bricks();
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto k = power_of(v.grid.spacing[a], lattice.spacing[a]);
+    if (!k || lattice.origin[a] != v.grid.origin[a]) return {};
+    box.per_cell[a] = *k;
+  }
+  return box;
+}
 
 double largest_jump(const MixedVolume& v, const Progress& progress) {
   const Index3 n = v.bricks();

@@ -4,9 +4,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "vdvr/certified_points.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 
@@ -24,6 +26,9 @@ struct SampleBox {
 SampleBox planes_of(const MixedVolume& volume, int log2_per_cell, std::int64_t first, std::int64_t planes);
 /// Its samples along x, y, z.
 Index3 fine_samples(const Grid& grid, int log2_per_cell);
+
+/// The lattice as such a box; none where its spacing is no cell over a power of two.
+std::optional<SampleBox> exact_box(const MixedVolume& volume, const Lattice& lattice);
 
 /// Values to out[z stride_z + y stride_y + x], on the calling thread. Places are exact: no coordinate is
 /// rounded, however large the grid.

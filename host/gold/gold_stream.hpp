@@ -79,6 +79,9 @@ class GoldStream {
   /// Samples of all blocks of a work of works(), which was called last.
   [[nodiscard]] double cost(const Work& work) const;
   [[nodiscard]] SlabShape slab_of(const Work& work) const;
+  /// Those of `selected` that lie in these blocks.
+  [[nodiscard]] std::vector<std::uint8_t> bricks_of(std::span<const Work> works,
+                                                    const std::vector<std::uint8_t>& selected) const;
 
   /// Bricks that may hold a tested node; the others need not be streamed.
   [[nodiscard]] std::vector<std::uint8_t> bricks_near_coverage() const;
@@ -124,8 +127,6 @@ class GoldStream {
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] GoldBox box(const Work& work, const std::array<std::int64_t, 2>& first) const;
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Work> works) const;
-  [[nodiscard]] std::vector<std::uint8_t> bricks_of(std::span<const Work> works,
-                                                    const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
   void take_addends(Batch& batch);

@@ -276,15 +276,43 @@ std::optional<std::string> unpack_chunk(std::span<const std::uint8_t> stored, co
   return std::nullopt;
 }
 
+namespace {
+
+/// With buffers for one chunk: as it is stored, and as it is.
+class ChunkReader {
+ public:
+  ChunkReader(const Dataset& d, void* values)
+      : d_(d), placement_(d, static_cast<std::uint8_t*>(values)), chunk_(d.chunk_bytes) {}
+  std::optional<std::string> read(const Shape& at) {
+    auto problem = fetch(d_, at, stored_);
+    if (!problem) problem = unpack_chunk(stored_, d_.packing, d_.element_bytes, chunk_);
+    if (problem) return fmt::format("chunk at [{}] {}", fmt::join(at, ", "), *problem);
+    placement_.place(at, chunk_.data());
+    return std::nullopt;
+  }
+  [[nodiscard]] std::uint64_t stored_bytes() const { return stored_.size(); }
+
+ private:
+  const Dataset& d_;
+  Placement placement_;
+  std::vector<std::uint8_t> stored_, chunk_;
+};
+
+}  // namespace
+
+std::optional<std::string> read_chunk(const Dataset& d, const Shape& at, void* values,
+                                      std::uint64_t& stored_bytes) {
+  ChunkReader reader(d, values);
+  auto problem = reader.read(at);
+  stored_bytes += reader.stored_bytes();
+  return problem;
+}
+
 std::optional<std::string> read_chunks(const Dataset& d, void* values) {
-  const Placement placement(d, static_cast<std::uint8_t*>(values));
-  std::vector<std::uint8_t> stored, chunk(d.chunk_bytes);
+  ChunkReader reader(d, values);
   Shape at(d.shape.size(), 0);
   do {
-    auto problem = fetch(d, at, stored);
-    if (!problem) problem = unpack_chunk(stored, d.packing, d.element_bytes, chunk);
-    if (problem) return fmt::format("chunk at [{}] {}", fmt::join(at, ", "), *problem);
-    placement.place(at, chunk.data());
+    if (auto problem = reader.read(at)) return problem;
   } while (advance(at, d));
   return std::nullopt;
 }

@@ -41,6 +41,12 @@ std::uint32_t fletcher32(std::span<const std::uint8_t> bytes);
 std::optional<std::string> unpack_chunk(std::span<const std::uint8_t> stored, const Packing& packing,
                                         std::size_t element_bytes, std::span<std::uint8_t> chunk);
 
+/// Of the chunk at `at`, a multiple of the chunk's extents along each axis, what lies in the dataset, to its
+/// place in dataset.bytes bytes; takes dataset.chunk_memory bytes beside them. `stored_bytes` grows by what
+/// is read of the file. What is wrong, with the place of the chunk, or nothing.
+std::optional<std::string> read_chunk(const Dataset& dataset, const Shape& at, void* values,
+                                      std::uint64_t& stored_bytes);
+
 /// The whole dataset into dataset.bytes bytes, chunk by chunk; takes dataset.chunk_memory bytes beside them.
 /// What is wrong, with the place of the chunk, or nothing.
 std::optional<std::string> read_chunks(const Dataset& dataset, void* values);

@@ -180,6 +180,42 @@ std::size_t BrickRemainder::slot(const Index3& p) const {
 
 void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Progress& progress) {
   if (!scan_.views.empty()) add_sixth(selected);
+  look_at(open(selected), progress);
+}
+
+void BrickRemainder::look_at(std::span<const Block> blocks, const Progress& progress) {
+  std::vector<GoldBox> boxes;
+  for (const Block& block : blocks) boxes.push_back(box_of(block.first, block.bricks));
+  kept_.prepare(nodes_, boxes, progress);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    look_at(blocks[i].first, blocks[i].bricks);
+    report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
+  }
+}
+
+template <class Visit>
+void BrickRemainder::for_each_block(Visit&& visit) const {
+  Block block;
+  Index3& first = block.first;
+  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += block_bricks)
+    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
+      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
+        for (std::size_t a = 0; a < 3; ++a)
+          block.bricks[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
+        visit(block);
+      }
+}
+
+template <class Visit>
+void BrickRemainder::for_each_slot(const Block& block, Visit&& visit) const {
+  const Index3 &f = block.first, &n = block.bricks;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) visit(slot({f[0] + x, f[1] + y, f[2] + z}));
+}
+
+// Blocks that hold a brick nobody has looked at, whole.
+std::vector<BrickRemainder::Block> BrickRemainder::open(const std::vector<std::uint8_t>& selected) const {
   const Bricks bricks(grid_, granularity_);
   std::vector<std::uint8_t> wanted(maxima_.size(), 0);
   for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
@@ -189,32 +225,37 @@ void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Pr
       for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
         for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x) wanted[slot({x, y, z})] = 1;
   }
-  // Blocks that hold a brick nobody has looked at, whole.
-  std::vector<std::pair<Index3, Index3>> blocks;
-  std::vector<GoldBox> boxes;
-  Index3 first{};
-  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += block_bricks)
-    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
-      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
-        Index3 size{};
-        for (std::size_t a = 0; a < 3; ++a)
-          size[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
-        bool open = false;
-        for (std::int64_t z = 0; z < size[2] && !open; ++z)
-          for (std::int64_t y = 0; y < size[1] && !open; ++y)
-            for (std::int64_t x = 0; x < size[0] && !open; ++x) {
-              const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
-              open = wanted[i] && !looked_at_[i];
-            }
-        if (!open) continue;
-        blocks.emplace_back(first, size);
-        boxes.push_back(box_of(first, size));
-      }
-  kept_.prepare(nodes_, boxes, progress);
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    look_at(blocks[i].first, blocks[i].second);
-    report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
-  }
+  std::vector<Block> out;
+  for_each_block([&](const Block& block) {
+    bool open = false;
+    for_each_slot(block, [&](std::size_t i) { open = open || (wanted[i] && !looked_at_[i]); });
+    if (open) out.push_back(block);
+  });
+  return out;
+}
+
+std::vector<BrickRemainder::Block> BrickRemainder::known() const {
+  std::vector<Block> out;
+  for_each_block([&](const Block& block) {
+    if (looked_at_[slot(block.first)]) out.push_back(block);
+  });
+  return out;
+}
+
+std::vector<float> BrickRemainder::found(const Block& block) const {
+  std::vector<float> out;
+  for_each_slot(block, [&](std::size_t i) { out.insert(out.end(), maxima_[i].begin(), maxima_[i].end()); });
+  return out;
+}
+
+void BrickRemainder::take(const Block& block, std::span<const float> found) {
+  const auto bricks = at(block.bricks[0] * block.bricks[1] * block.bricks[2]);
+  if (found.size() != 6 * bricks) throw std::logic_error("BrickRemainder: not six numbers a brick");
+  for_each_slot(block, [&](std::size_t i) {
+    std::copy_n(found.begin(), 6, maxima_[i].begin());
+    found = found.subspan(6);
+    looked_at_[i] = 1;
+  });
 }
 
 GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const {
@@ -271,15 +312,7 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
          VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
                                side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
                                static_cast<float>(lowest_)});
-  const std::vector<float> found = out.to_host();
-  for (std::int64_t z = 0; z < bricks[2]; ++z)
-    for (std::int64_t y = 0; y < bricks[1]; ++y)
-      for (std::int64_t x = 0; x < bricks[0]; ++x) {
-        const std::size_t i = slot({first[0] + x, first[1] + y, first[2] + z});
-        const std::int64_t brick = (z * bricks[1] + y) * bricks[0] + x;
-        std::copy_n(found.begin() + brick * 6, 6, maxima_[i].begin());
-        looked_at_[i] = 1;
-      }
+  take({first, bricks}, out.to_host());
 }
 
 float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {

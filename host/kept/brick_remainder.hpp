@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,20 @@ class BrickRemainder {
   /// nobody has. Cost: gold at the rate of the differences, and six of these a node.
   void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
 
+  /// Bricks that are looked at together, some around the grid included.
+  struct Block {
+    Index3 first{}, bricks{};
+  };
+  /// What require() would look at.
+  [[nodiscard]] std::vector<Block> open(const std::vector<std::uint8_t>& selected) const;
+  /// What has been looked at.
+  [[nodiscard]] std::vector<Block> known() const;
+  /// Looks at these, of parallel beam all that require() needs: what is found, six numbers a brick, holds
+  /// wherever it was found.
+  void look_at(std::span<const Block> blocks, const Progress& progress);
+  [[nodiscard]] std::vector<float> found(const Block& block) const;
+  void take(const Block& block, std::span<const float> found);
+
   /// Of cells of gold on `lattice` in a brick that was required.
   [[nodiscard]] float of(std::int64_t brick, const GoldLattice& lattice) const;
 
@@ -45,6 +60,10 @@ class BrickRemainder {
   [[nodiscard]] std::size_t slot(const Index3& position) const;
   [[nodiscard]] GoldBox box_of(const Index3& first, const Index3& bricks) const;
   void look_at(const Index3& first, const Index3& bricks);
+  template <class Visit>
+  void for_each_block(Visit&& visit) const;
+  template <class Visit>
+  void for_each_slot(const Block& block, Visit&& visit) const;
 
   opencl::State& state_;
   KeptGold& kept_;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <set>
 #include <stdexcept>
@@ -56,7 +57,8 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
       interpolation_(interpolation),
       // Where a view looks closest, half a pixel at the axis is more than half of its own.
       half_taps_(scan.views.empty() ? 8 : 10),
-      coverage_(scan.geometry, scan.views) {
+      coverage_(scan.geometry, scan.views),
+      common_bytes_(state) {
   const ParallelGeometry& g = scan.geometry;
   const double across = std::max(grid.spacing[0], grid.spacing[1]);
   rates_ = {rate_of(across, g.pitch_u), rate_of(across, g.pitch_u), rate_of(grid.spacing[2], g.pitch_v)};
@@ -370,6 +372,7 @@ std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<Gol
 
 void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes,
                        const Progress& progress) {
+  if (common_) make_common(progress);
   std::vector<TileAt> tiles = new_tiles(lattice, boxes);
   if (tiles.empty()) return;
   std::vector<TileAt> all = all_tiles();
@@ -447,6 +450,138 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
 }
 
+// --- with others ---
+
+namespace {
+
+// Whether kernels read and write such memory where it lies: OpenCL allows a device of the host to copy it.
+bool is_in_place(opencl::State& state) {
+  constexpr std::size_t n = 1024;
+  const std::shared_ptr<void> memory(std::aligned_alloc(4096, 4 * n), std::free);
+  const std::span<float> values(static_cast<float*>(memory.get()), n);
+  std::fill(values.begin(), values.end(), 1.0f);
+  opencl::DeviceArray<float> array(state, values, memory, "memory of the host");
+  array.fill(2.0f);
+  state.queue.finish();
+  if (values[n - 1] != 2.0f) return false;
+  values[0] = 3.0f;
+  float first = 0;
+  array.read(std::span(&first, 1));
+  return first == 3.0f;
+}
+
+}  // namespace
+
+// Beyond the grid as far as halos and filters read: the first, and how many.
+std::pair<std::int64_t, std::int64_t> KeptGold::all_heights() const {
+  return {-run_margin, grid_.cells[2] * rates_[2] + 1 + 2 * run_margin};
+}
+
+std::optional<CommonGold::Shape> KeptGold::common_shape() const {
+  if (cone_ || scratch() || !state_.info.is_cpu) return std::nullopt;
+  CommonGold::Shape shape;
+  shape.tiles = all_tiles();
+  shape.tile = count(side * side * stride_);
+  const auto [low, heights] = all_heights();
+  if (!few_rows()) shape.heights = count(side * side * column_stride(heights));
+  shape.rows = scan_.geometry.rows;
+  shape.more = {low, heights, rates_[0], rates_[1], rates_[2], static_cast<std::int64_t>(columns_.count)};
+  if (shape.tiles.empty() || !is_in_place(state_)) return std::nullopt;
+  return shape;
+}
+
+void KeptGold::share(CommonMemory memory, bool leads) {
+  const std::optional<CommonGold::Shape> shape = common_shape();
+  if (!shape || memory.bytes.size() < CommonGold::bytes_of(*shape)) return;
+  std::vector<std::uint8_t> given;
+  if (leads)
+    for (const TileAt& tile : shape->tiles) given.push_back(tiles_.contains(tile) ? 1 : 0);
+  CommonGold common(std::move(memory), *shape, given);
+  if (!common.agrees()) return;
+  for (std::size_t i = 0; leads && i < common.given(); ++i) {
+    const Place& place = tiles_.at(shape->tiles[common.order()[i]]);
+    pages_[place.page].read(common.rows(i, 1), place.first);
+  }
+  tiles_.clear();
+  pages_.clear();
+  run_.reset();
+  heights_.reset();
+  common_bytes_.count(common.own_bytes(), "gold that is kept for all devices of this machine");
+  common_.emplace(std::move(common));
+}
+
+// By runs of rows: columns of the detector are upsampled once, too.
+void KeptGold::make_common(const Progress& progress) {
+  const CommonGold& common = *common_;
+  const std::vector<TileAt>& all = common.shape().tiles;
+  const ParallelGeometry& g = scan_.geometry;
+  const std::uint64_t tile = common.shape().tile;
+  const std::size_t each = std::max<std::size_t>(1, page_bytes / (4 * tile));
+  std::vector<std::pair<std::size_t, ColumnBlocks>> parts;  // page and what is made there
+  const auto add_pages = [&](std::size_t first, std::size_t last, bool made) {
+    for (std::size_t i = first; i < last; i += each) {
+      const std::size_t n = std::min(each, last - i);
+      std::vector<TileAt> tiles;
+      for (std::size_t j = 0; j < n; ++j) {
+        tiles.push_back(all[common.order()[i + j]]);
+        tiles_[tiles.back()] = {pages_.size(), j * tile};
+      }
+      pages_.emplace_back(state_, common.rows(i, n), common.owner(), "gold that is kept");
+      if (made) continue;
+      ColumnBlocks blocks = blocks_of(tiles);
+      blocks.wanted = wanted(blocks);
+      blocks.out_stride = stride_;
+      parts.emplace_back(pages_.size() - 1, std::move(blocks));
+    }
+  };
+  add_pages(0, common.given(), true);
+  add_pages(common.given(), all.size(), false);
+  common_->make_rows(
+      [&](std::size_t i) {
+        const std::int64_t first = static_cast<std::int64_t>(i) * CommonGold::chunk;
+        std::vector<double> heights;
+        for (std::int64_t r = first; r < std::min(g.rows, first + CommonGold::chunk); ++r)
+          heights.push_back(static_cast<double>(r));
+        const auto start = std::chrono::steady_clock::now();
+        const UpsampledSlab slab = upsampler_(columns_, heights);
+        state_.queue.finish();
+        const auto upsampled = std::chrono::steady_clock::now();
+        column_seconds_ += std::chrono::duration<double>(upsampled - start).count();
+        for (auto& [page, blocks] : parts) {
+          blocks.out_row = first;
+          back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
+        }
+        state_.queue.finish();
+        tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - upsampled).count();
+      },
+      progress);
+  if (!few_rows()) make_common_heights(progress);
+  common_.reset();
+}
+
+void KeptGold::make_common_heights(const Progress& progress) {
+  const CommonGold& common = *common_;
+  const std::vector<TileAt>& all = common.shape().tiles;
+  const auto [low, heights] = all_heights();
+  begin_run(low, heights);
+  Run& run = *run_;
+  run.common = true;
+  for (std::size_t i = 0; i < all.size(); i += run.a_page) {
+    run.of_last = std::min(run.a_page, all.size() - i);
+    for (std::size_t j = 0; j < run.of_last; ++j)
+      run.tiles[all[common.order()[i + j]]] = {run.pages.size(), j * common.shape().heights};
+    run.pages.emplace_back(state_, common.heights(i, run.of_last), common.owner(), "heights of kept gold");
+  }
+  run.of_last = run.a_page;  // what others have not goes elsewhere
+  common_->make_heights(
+      [&](std::size_t i) {
+        const TileAt& tile = all[common.order()[i]];
+        make_heights(tiles_.at(tile), run.tiles.at(tile));
+        state_.queue.finish();
+      },
+      progress);
+}
+
 // By row of each tile the first and last node that is kept: the region is convex, so that all between them
 // are.
 std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& blocks) const {
@@ -490,23 +625,28 @@ std::int64_t KeptGold::cells_together() const {
 
 void KeptGold::require_run(const Span& z) {
   if (cone_ || (run_ && run_->low <= z.low && z.low + z.count <= run_->low + run_->count)) return;
-  // Beyond the grid as far as halos and filters read.
-  const std::int64_t all_low = -run_margin, all_high = grid_.cells[2] * rates_[2] + 1 + run_margin;
-  Run run;
-  run.low = std::min(all_low, z.low);
-  run.count = std::max(all_high, z.low + z.count) - run.low;
+  const auto [all_low, all] = all_heights();
+  const std::int64_t all_high = all_low + all;
+  std::int64_t low = std::min(all_low, z.low), heights_made = std::max(all_high, z.low + z.count) - low;
   const auto bytes = [&](std::int64_t heights) {
     return count(4 * side * side * column_stride(heights)) * tiles_.size();
   };
   const std::uint64_t room = (state_.memory.left() + run_bytes()) / 2;
-  if (!scratch() && bytes(run.count) > room / 2) {
+  if (!scratch() && bytes(heights_made) > room / 2) {
     // Passes go upwards: as many heights as a band of them reads, where these fit.
     const std::int64_t least = z.count + 2 * run_margin, band = cells_together() * rates_[2] + 4 * run_margin;
-    run.low = z.low - run_margin;
-    run.count = band > least && bytes(band) <= room ? std::min(band, all_high - run.low) : least;
-    run.count = std::max(run.count, least);
+    low = z.low - run_margin;
+    heights_made =
+        std::max(band > least && bytes(band) <= room ? std::min(band, all_high - low) : least, least);
   }
+  begin_run(low, heights_made);
+}
+
+void KeptGold::begin_run(std::int64_t low, std::int64_t heights) {
   run_.reset();
+  Run run;
+  run.low = low;
+  run.count = heights;
   const HeightWeights weights =
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
@@ -534,11 +674,17 @@ std::uint64_t KeptGold::run_bytes() const {
 KeptGold::Place KeptGold::heights_of(const TileAt& tile, const Place& place) {
   if (const auto known = run_->tiles.find(tile); known != run_->tiles.end()) return known->second;
   const std::uint64_t size = count(side * side * run_->stride);
-  const std::size_t i = run_->tiles.size();
-  if (i % run_->a_page == 0)
+  if (run_->pages.empty() || run_->of_last == run_->a_page) {
     run_->pages.emplace_back(state_, scratch(), run_->a_page * size, "heights of kept gold");
-  const Place out{i / run_->a_page, i % run_->a_page * size};
+    run_->of_last = 0;
+  }
+  const Place out{run_->pages.size() - 1, run_->of_last++ * size};
   run_->tiles.emplace(tile, out);
+  make_heights(place, out);
+  return out;
+}
+
+void KeptGold::make_heights(const Place& place, const Place& out) {
   VdvrAlongZ shape{};
   shape.in_x = count(stride_);
   shape.in_y = count(side * stride_);
@@ -546,7 +692,6 @@ KeptGold::Place KeptGold::heights_of(const TileAt& tile, const Place& place) {
   shape.out_y = count(side * run_->stride);
   const VdvrColumns part{place.first, out.first, to_int(side), to_int(side)};
   (*run_->from_rows)(state_, pages_[place.page], run_->pages[out.page], std::span(&part, 1), shape);
-  return out;
 }
 
 // Of all rows where they are few, else of heights at half a pixel.
@@ -626,10 +771,11 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
   };
   for (const GoldBox& box : boxes) {
     // Tiles that came later than the run were not foreseen by it: heights can be made again.
-    if (!few_rows() && !cone_ && !scratch() && run_bytes() > state_.memory.left() / 2) {
+    if (!few_rows() && !cone_ && !run_->common && !scratch() && run_bytes() > state_.memory.left() / 2) {
       resample();
       run_->tiles.clear();
       run_->pages.clear();
+      run_->of_last = 0;
     }
     const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
     for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)

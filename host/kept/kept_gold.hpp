@@ -14,9 +14,11 @@
 #include "host/bounds/projection_bounds.hpp"
 #include "host/fbp/coverage.hpp"
 #include "host/fbp/filter_projections.hpp"
+#include "host/kept/common_gold.hpp"
 #include "host/kept/cone_tiles.hpp"
 #include "host/kept/gold_filters.hpp"
 #include "host/kept/interpolate_gold.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/rates.hpp"
@@ -71,6 +73,15 @@ class KeptGold {
   /// The least and the most that `rounding` of these would be, whatever memory allows: of cone beam it
   /// depends on how many views lie on the device together.
   [[nodiscard]] std::pair<double, double> rounding_by_memory(const GoldLattice& lattice);
+
+  /// How all that can be kept would lie in memory that other devices of this machine have too; none where
+  /// this device does not compute in the host's memory, where it would take most of what is left, or where
+  /// gold is kept in another way.
+  [[nodiscard]] std::optional<CommonGold::Shape> common_shape() const;
+  /// From the next prepare() on, all is made together with those who have that memory, once, and lies there.
+  /// `leads`: nobody else has it yet, and what is kept already is given to all. Does nothing where those who
+  /// have it keep other gold.
+  void share(CommonMemory memory, bool leads);
 
   /// Back-projects what `boxes` will read and is not kept yet; where that is most of what can be kept, all of
   /// it, since the columns of the detector are upsampled anew each time. Throws ResourceError where memory
@@ -128,11 +139,16 @@ class KeptGold {
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
   void back_project_tiles(std::span<const TileAt> tiles, const Progress& progress);
+  void make_common(const Progress& progress);
+  void make_common_heights(const Progress& progress);
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> all_heights() const;
+  void begin_run(std::int64_t low, std::int64_t heights);
   const Across& across_of(int phases, std::size_t axis);
   const GoldFilter& filter_of(int phases, std::size_t axis);
   void resample_heights(const GoldLattice& lattice, const GoldBox& box);
   void require_run(const Span& z);
   Place heights_of(const TileAt& tile, const Place& place);
+  void make_heights(const Place& rows, const Place& heights);
   void take_heights(const GoldLattice& lattice, std::span<const GoldBox> boxes,
                     const opencl::DeviceArray<float>& out);
   void fill_together(const GoldLattice& lattice, std::span<const GoldBox> boxes,
@@ -181,7 +197,8 @@ class KeptGold {
     std::int64_t low = 0, count = 0, stride = 0;
     std::optional<AlongZ> from_rows;
     std::vector<opencl::DeviceArray<float>> pages;  // of `a_page` tiles, the last one not yet full
-    std::size_t a_page = 1;
+    std::size_t a_page = 1, of_last = 0;            // and how many that has
+    bool common = false;
     std::map<TileAt, Place> tiles;
   };
   std::optional<Run> run_;  // of cone beam the kept nodes themselves, never made again
@@ -194,6 +211,8 @@ class KeptGold {
   };
   std::optional<Heights> heights_;
   std::array<opencl::DeviceArray<float>, 2> buffers_;
+  std::optional<CommonGold> common_;  // until it is made
+  HostMemory common_bytes_;           // this device's part of it
   double column_seconds_ = 0, tile_seconds_ = 0;
 };
 

@@ -54,6 +54,15 @@ class DeviceArray {
           cl::Buffer(state.context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, size_bytes(), mapped.data());
     });
   }
+  /// In memory of the host that `owner` keeps, where kernels of a device that computes there read and write
+  /// it: what others see of it is the caller's to know. From a page's first byte on.
+  DeviceArray(State& state, std::span<T> memory, std::shared_ptr<void> owner, const std::string& what)
+      : state_(&state), count_(memory.size()), what_(what), pages_(std::move(owner)) {
+    guard("map", [&] {
+      buffer_ =
+          cl::Buffer(state.context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, size_bytes(), memory.data());
+    });
+  }
   ~DeviceArray() { release(); }
   DeviceArray(DeviceArray&& o) noexcept
       : state_(std::exchange(o.state_, nullptr)),

@@ -1,7 +1,7 @@
 // The .vdvr file (docs/file-format.md): written whole or not at all, read only after everything in it has
 // been checked. Datasets are [z][y][x] and triples "ZYX", as MixedVolume holds them; grid attributes are
 // turned from x,y,z to z,y,x. Called by build, verify, render, probe, export, info.
-#include "vdvr/vdvr_file.hpp"
+#include "host/volume/vdvr_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -314,22 +314,31 @@ void read_base_table(const h5::Reader& file, SampleBlock& b) {
   b.shift = {static_cast<std::uint8_t>(value("shift", largest_shift))};
 }
 
-void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+/// Offsets and shifts of integer tiles.
+void read_table(const h5::Reader& file, const Contents& c, const TileKind& kind, SampleBlock& b) {
+  if (b.type == SampleType::f32) return;
+  b.offset.resize(c.counts.at(kind));
+  b.shift.resize(c.counts.at(kind));
+  file.read(c.offsets.at(kind), b.offset.data());
+  file.read(c.shifts.at(kind), b.shift.data());
+}
+
+void read_index(const h5::Reader& file, const Contents& c, MixedVolume& v) {
   v.level.resize(c.tile.count);
   file.read(c.level, v.level.data());
   v.tile.resize(c.tile.count);
   file.read(c.tile, v.tile.data());
   if (const auto p = index_problem(v, c.counts)) file.refuse(p->where, p->what);
+}
+
+void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+  read_index(file, c, v);
   read_samples(file, c.base, v.base);
   if (v.base.type != SampleType::f32) read_base_table(file, v.base);
   for (const auto& [triple, d] : c.tiles) {
     SampleBlock& b = v.tiles[triple];
     read_samples(file, d, b);
-    if (b.type == SampleType::f32) continue;
-    b.offset.resize(c.counts.at(triple));
-    b.shift.resize(c.counts.at(triple));
-    file.read(c.offsets.at(triple), b.offset.data());
-    file.read(c.shifts.at(triple), b.shift.data());
+    read_table(file, c, triple, b);
   }
   if (const auto p = block_problem("/base", v.base)) file.refuse(p->where, p->what);
   for (const auto& [triple, block] : v.tiles)
@@ -541,6 +550,38 @@ VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_b
   if (altered == Altered::refuse && !file.altered.empty())
     throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
   return file;
+}
+
+VdvrParts open_parts(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+  if (io::metadata_unchecked(path))
+    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+  VdvrParts parts;
+  parts.reader = std::make_unique<h5::Reader>(path, h5::Links::hard);
+  const h5::Reader& file = *parts.reader;
+  VdvrFile& result = parts.file;
+  MixedVolume& v = result.volume;
+  result.file_bytes = file.file_bytes();
+  result.format_version = read_version(file);
+  result.generator = file.text_attribute("/", "generator");
+  read_grid(file, result.format_version, v);
+  Contents contents = open_contents(file, v);
+  read_step(file, contents, v);
+  result.certificate = read_certificate(file, path.string(), result.certificate_json);
+  read_index(file, contents, v);
+  v.base.type = type_of(contents.base);
+  if (v.base.type != SampleType::f32) read_base_table(file, v.base);
+  for (const auto& [kind, d] : contents.tiles) {
+    SampleBlock& b = v.tiles[kind];
+    b.type = type_of(d);
+    read_table(file, contents, kind, b);
+  }
+  read_totals(file, v, result.certificate);
+  result.altered = read_seal(file, result);
+  if (!result.altered.empty())
+    throw MismatchError(fmt::format("{}: {}; build it again", path.string(), result.altered));
+  parts.base = std::move(contents.base);
+  parts.tiles = std::move(contents.tiles);
+  return parts;
 }
 
 bool is_vdvr(const std::filesystem::path& path) {

@@ -18,6 +18,13 @@
 
 namespace vdvr {
 
+/// Memory that others have too, zeros at first, and what keeps it; empty: none is to be had.
+struct CommonMemory {
+  std::span<std::byte> bytes{};
+  std::shared_ptr<void> owner{};
+  int sharers = 1;  ///< who may have it, this one included
+};
+
 /// Carries messages between the process that leads a build, number 0, and others, which serve(). A program
 /// has one; the library knows no MPI. Called by one thread.
 class VDVR_API Messenger {
@@ -42,6 +49,10 @@ class VDVR_API Messenger {
   virtual std::uint64_t share(std::span<const std::byte> bytes) = 0;
   /// Of the others: those bytes, and what keeps them. Waits for them.
   virtual std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared(std::uint64_t number) = 0;
+  /// Memory of at least so many bytes, zeros at first, that all of this machine who ask by that number read
+  /// and write; empty where there is none to be had, or the first of the machine has not asked for it in
+  /// time.
+  virtual CommonMemory common(std::uint64_t number, std::uint64_t bytes) = 0;
   /// Whether it is known to have ended.
   [[nodiscard]] virtual bool is_gone(int process) const = 0;
   /// Nothing more is sent to it and nothing awaited from it.

@@ -62,6 +62,11 @@ void attend(nb::handle progress, const Reports& reports) {
 
 }  // namespace
 
+std::mutex& hdf5_turn() {
+  static std::mutex turn;
+  return turn;
+}
+
 void run_long(nb::handle progress, const std::function<void(const Progress&)>& work) {
   Shared shared;
   std::exception_ptr failure, raised;

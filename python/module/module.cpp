@@ -13,4 +13,5 @@ NB_MODULE(_core, m) {
   vdvr::python::add_pictures(m);
   vdvr::python::add_volumes(m);
   vdvr::python::add_viewers(m);
+  vdvr::python::add_files(m);
 }

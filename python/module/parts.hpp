@@ -10,5 +10,6 @@ void add_scans(nanobind::module_& m);
 void add_pictures(nanobind::module_& m);
 void add_volumes(nanobind::module_& m);
 void add_viewers(nanobind::module_& m);
+void add_files(nanobind::module_& m);
 
 }  // namespace vdvr::python

@@ -9,6 +9,7 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -47,6 +48,28 @@ nb::object data_of(const std::shared_ptr<ProjectionSet>& scan) {
                              static_cast<std::size_t>(g.columns)};
   return nb::cast(
       nb::ndarray<nb::numpy, const float>(std::as_const(scan->data).data(), 3, shape, nb::find(scan)));
+}
+
+/// float [z][y][x] of so many samples x, y, z. A grid has a cell at least along each axis: of one sample the
+/// second is dropped.
+nb::object on_grid(Device& device, const ProjectionSet& scan, const Index3& samples, double spacing,
+                   double spacing_z, const Vec3& origin, const ReconstructOptions& options,
+                   nb::handle progress) {
+  GridOptions wanted;
+  wanted.size.emplace();
+  for (std::size_t a = 0; a < 3; ++a) (*wanted.size)[a] = std::max<std::int64_t>(1, samples[a] - 1);
+  wanted.spacing = spacing;
+  wanted.spacing_z = spacing_z;
+  wanted.origin = origin;
+  Volume volume;
+  run_long(progress, [&](const Progress& report) {
+    volume = reconstruct(device, scan, make_grid(scan.geometry, wanted), options, report);
+  });
+  const Index3 n = volume.grid.samples();
+  const nb::object all = nb::cast(as_array(
+      std::move(volume.samples),
+      {static_cast<std::size_t>(n[2]), static_cast<std::size_t>(n[1]), static_cast<std::size_t>(n[0])}));
+  return all[nb::make_tuple(nb::slice(samples[2]), nb::slice(samples[1]), nb::slice(samples[0]))];
 }
 
 nb::object slices(Device& device, const ProjectionSet& scan, const ReconstructOptions& options,
@@ -167,6 +190,7 @@ void add_projections(nb::module_& m) {
       [](const std::filesystem::path& path, const ScanOptions& options, nb::handle progress) {
         auto scan = std::make_shared<ProjectionSet>();
         run_long(progress, [&](const Progress& report) {
+          const std::lock_guard turn(hdf5_turn());
           *scan = read_scan(path, options, report);
           for (auto& note : check_scan(*scan)) scan->report.notes.push_back(std::move(note));
         });
@@ -176,7 +200,10 @@ void add_projections(nb::module_& m) {
   m.def(
       "write_data_exchange",
       [](const std::filesystem::path& path, const ProjectionSet& scan) {
-        run_long(nb::none(), [&](const Progress&) { write_data_exchange(path, scan); });
+        run_long(nb::none(), [&](const Progress&) {
+          const std::lock_guard turn(hdf5_turn());
+          write_data_exchange(path, scan);
+        });
       },
       "path"_a, "scan"_a);
   m.def(
@@ -204,6 +231,8 @@ void add_projections(nb::module_& m) {
       .def_rw("field", &ReconstructOptions::field)
       .def_rw("upsampling", &ReconstructOptions::upsampling)
       .def_rw("interpolation", &ReconstructOptions::interpolation);
+  m.def("on_grid", &on_grid, "device"_a, "scan"_a, "samples"_a, "spacing"_a, "spacing_z"_a, "origin"_a,
+        "options"_a, "progress"_a.none());
   m.def("slices", &slices, "device"_a, "scan"_a, "options"_a, "progress"_a.none());
 }
 

@@ -56,6 +56,7 @@ Held build(Device& device, const ProjectionSet& scan, const Tolerance& tolerance
 Held open(const std::filesystem::path& path, std::uint64_t max_memory_bytes, bool unverified) {
   Held held;
   run_long(nb::none(), [&](const Progress&) {
+    const std::lock_guard turn(hdf5_turn());
     held = std::make_shared<HeldVolume>(unverified ? read_vdvr(path, max_memory_bytes, Altered::report)
                                                    : read_certified(path, max_memory_bytes));
   });
@@ -246,6 +247,7 @@ void add_volumes(nb::module_& m) {
           "save",
           [](HeldVolume& h, const std::filesystem::path& path, bool deflate) {
             run_long(nb::none(), [&](const Progress&) {
+              const std::lock_guard turn(hdf5_turn());
               write_vdvr(path, h.file().volume, h.file().certificate,
                          deflate ? Compression::deflate : Compression::none);
             });

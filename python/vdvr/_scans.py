@@ -211,15 +211,15 @@ def recon(
     ----------
     tomo : line integrals [view, row, column], or with `sinogram_order` [row, view, column].
     theta : one angle a view, radians.
-    center : where the axis lies, from the detector's left edge, in columns: column i reaches from i to i + 1,
-        as in tomopy. By default columns / 2, the middle. Our `Scan(center=)` is this less 1/2.
+    center : column onto which the axis projects, columns' middles being integers: what tomopy's gridrec takes and
+        its find_center functions give, and what `Scan(center=)` is. By default the middle, (columns - 1) / 2.
     filter_name : "ramlak", "shepp", "cosine", "hamming" or "hann".
     upsampling : of the filtered projections before they are interpolated linearly; 1 is the usual FBP.
 
     Returns
     -------
     float32 [row, y, x] of shape (rows, columns, columns), density per column width; the axis goes through the
-    middle. As in tomopy, a point at column x and row y of a slice, both from its middle, is seen at
+    middle of the slice. As in tomopy, a point at column x and row y of a slice, both from its middle, is seen at
     x cos(theta) - y sin(theta). Outside of the circle that all views see values mean nothing.
     """
     data = np.asarray(tomo)
@@ -228,8 +228,7 @@ def recon(
     described = _core.ArrayScan()
     described.angles_deg = _core.degrees_of([float(a) for a in np.asarray(theta, dtype=np.float64).ravel()])
     projections = _projections(data)
-    middle = 0.5 * projections.shape[2]
-    described.center = (middle if center is None else number(center, "center")) - 0.5
+    described.center = 0.5 * (projections.shape[2] - 1) if center is None else number(center, "center")
     options = _core.ReconstructOptions()
     options.upsampling = int(upsampling)
     field = _core.FieldOptions()

@@ -61,6 +61,20 @@ foreach(name IN ITEMS vdvr vdvr-doc libvdvr${abi} libvdvr-dev)
   set(${name}_members "${output}")
 endforeach()
 
+# Where MPI was found.
+file(GLOB mpi "${work}/vdvr-mpi_${VERSION}-*.deb")
+if(mpi)
+  run(dpkg-deb --field "${mpi}")
+  expect("control of vdvr-mpi" "${output}" "\nDepends: [^\n]*lib(openmpi|mpich)[^\n]*\n")
+  expect("control of vdvr-mpi" "${output}" "\nDescription: [a-z][^\n]*\n VDVR turns")
+  run(dpkg-deb --contents "${mpi}")
+  foreach(file IN ITEMS bin/vdvr-mpi share/man/man1/vdvr-mpi.1.gz share/bash-completion/completions/vdvr-mpi
+          share/doc/vdvr-mpi/copyright)
+    expect("vdvr-mpi" "${output}" " \\./usr/${file}")
+  endforeach()
+  expect_no("vdvr-mpi" "${output}" "/usr/bin/vdvr\n")
+endif()
+
 expect("control of vdvr" "${vdvr_control}" "\nDepends: [^\n]*libclfft2[^\n]*\n")
 expect("control of vdvr" "${vdvr_control}" "\nDepends: [^\n]*libopencl1[^\n]*\n")
 expect("control of vdvr" "${vdvr_control}" "\nRecommends: pocl-opencl-icd")

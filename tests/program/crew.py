@@ -3,7 +3,7 @@
 
 usage: crew.py devices|shares|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
 
-`kills` kills N ranks that work and N times the one that leads (3 and 2 by default; scripts/crew-kills is the
+`kills` kills N ranks that work and N times the one that leads (1 and 1 by default; scripts/crew-kills is the
 long form), at moments that a seed chooses. Without a launcher `mpi` and `kills` are skipped by name.
 """
 import argparse
@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -108,8 +109,8 @@ def shares(work, _):
 
 def launch(mpi, ranks):
     launcher, program = mpi
-    more = ["--oversubscribe"] if "ompi" in pathlib.Path(launcher).resolve().name or "orte" in str(
-        pathlib.Path(launcher).resolve()) else []
+    place = pathlib.Path(shutil.which(launcher) or launcher).resolve()
+    more = ["--oversubscribe"] if "ompi" in place.name or "orte" in str(place) else []
     return [launcher, *more, "-n", str(ranks), program]
 
 
@@ -222,8 +223,8 @@ def main():
     parser.add_argument("what", choices=["devices", "shares", "mpi", "kills"])
     parser.add_argument("vdvr")
     parser.add_argument("--mpi", nargs=2, action="append", default=[])
-    parser.add_argument("--workers", type=int, default=3)
-    parser.add_argument("--leaders", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--leaders", type=int, default=1)
     args = parser.parse_args()
     if args.what in ("mpi", "kills") and not args.mpi:
         print(f"crew_{args.what}_test skipped: vdvr-mpi is not built, no MPI was found")

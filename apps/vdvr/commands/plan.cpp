@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "apps/common/progress.hpp"
@@ -20,6 +21,59 @@ namespace {
 // Files on the disk while planning, which build will need again.
 std::uint64_t scratch_bytes(const ProjectionSet& scan) {
   return scan.data.scratch() ? scan.data.scratch()->peak_bytes() : 0;
+}
+
+// What a build takes that is spread over ranks of vdvr-mpi (docs/scaling.md, How it scales), from what one
+// device takes alone.
+struct Spread {
+  std::int64_t ranks = 1, machines = 1;
+  double seconds = 0;
+  std::uint64_t first_machine = 0, other_machine = 0;  // bytes of memory, of all ranks there
+  std::uint64_t messages = 0;                          // bytes
+};
+
+Spread spread_over(const Planned& p, std::int64_t ranks, std::int64_t machines) {
+  const Plan& plan = p.plan;
+  Spread s{ranks, machines};
+  // The scan and what is filtered of it are the leader's, and kept gold is a machine's: of that, no more is
+  // taken to be spread than among ranks that are all on machines of their own.
+  s.seconds = plan.seconds_of_rows + (plan.seconds - plan.seconds_of_rows) / static_cast<double>(ranks);
+  const std::uint64_t scan = p.scan.data.resident_bytes(),
+                      of_all = std::min(plan.memory_bytes, 2 * scan + plan.memory_of_rows),
+                      of_rank = plan.memory_bytes - of_all;
+  const auto here = static_cast<std::uint64_t>((ranks + machines - 1) / machines),
+             others = static_cast<std::uint64_t>(ranks - 1);
+  s.first_machine = plan.memory_bytes + (here - 1) * of_rank;
+  s.other_machine = machines > 1 ? scan + plan.memory_of_rows + here * of_rank : 0;
+  const std::uint64_t base = 4 * static_cast<std::uint64_t>(plan.grid.sample_count()),
+                      field = base + plan.tile_bytes;
+  s.messages =
+      others > 0 ? others * (base + field) + plan.tile_bytes + static_cast<std::uint64_t>(machines - 1) * scan
+                 : 0;
+  return s;
+}
+
+std::optional<Spread> spread_of(const Arguments& args, const Planned& p) {
+  constexpr std::int64_t most = 100000;
+  if (!args.has("ranks")) return std::nullopt;
+  const std::int64_t ranks = args.integer_or("ranks", 1, 1, most);
+  return spread_over(p, ranks, args.integer_or("machines", 1, 1, ranks));
+}
+
+Json spread_json(const Spread& s) {
+  return {{"ranks", s.ranks},
+          {"machines", s.machines},
+          {"seconds", s.seconds},
+          {"memory_bytes", {{"first_machine", s.first_machine}, {"other_machine", s.other_machine}}},
+          {"message_bytes", s.messages}};
+}
+
+void print_spread(const Spread& s) {
+  fmt::print("  {} ranks on {}: at most {:.1f} s, {} of memory on the first machine{}, {} of messages\n",
+             s.ranks, s.machines == 1 ? "one machine" : fmt::format("{} machines", s.machines), s.seconds,
+             bytes_text(s.first_machine),
+             s.machines == 1 ? "" : fmt::format(" and {} on each other", bytes_text(s.other_machine)),
+             bytes_text(s.messages));
 }
 
 Json plan_json(const Planned& p) {
@@ -104,7 +158,9 @@ void print_pictures(const Json& pictures) {
 
 int plan_command(Arguments& args) {
   args.positional("IN", "projections")
-      .value("pictures", "DIR", "pictures of spectra, error maps and their products");
+      .value("pictures", "DIR", "pictures of spectra, error maps and their products")
+      .value("ranks", "N", "also what N ranks of vdvr-mpi would take, each with a device as this one")
+      .value("machines", "M", "on which these ranks are, alike on each (default 1)");
   add_plan_options(args);
   add_build(args);
   add_common(args);
@@ -116,6 +172,7 @@ int plan_command(Arguments& args) {
   refuse(args, {"picture-tolerance", "views", "picture-finest"},
          "a plan foresees one tolerance for all bricks; build refines for pictures, and prints each round");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
+  if (!args.has("ranks")) refuse(args, {"machines"}, "give --ranks with it");
   Wanted wanted = wanted_of(args);
   // Pictures show the whole volume.
   wanted.options.plan.estimate = !args.has("pictures");
@@ -129,6 +186,8 @@ int plan_command(Arguments& args) {
   ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   Json json = plan_json(planned), pictures;
+  const std::optional<Spread> spread = spread_of(args, planned);
+  if (spread) json["foreseen"]["spread"] = spread_json(*spread);
   if (folder) {
     pictures = write_pictures(device, *folder, planned, progress.callback());
     pictures["folder"] = args.path("pictures").string();
@@ -137,6 +196,7 @@ int plan_command(Arguments& args) {
   progress.clear();
   print_result(common, json, [&] {
     print_plan(planned);
+    if (spread) print_spread(*spread);
     if (folder) print_pictures(pictures);
   });
   return 0;
