@@ -150,7 +150,7 @@ std::vector<float> PictureRefinement::Impl::ask(const MixedVolume& volume, const
   std::vector<float> asked;
   if (round.worst > options.levels && static_cast<int>(rounds.size()) < options.most_rounds) {
     const double allowed = std::max(aim * options.levels, round_share * round.worst);
-    asked = spend(loosest, demands_of(pixels, bounds, allowed));
+    asked = spend(loosest, demands_of(pixels, bounds, allowed), options.finest_abs);
     for (std::size_t i = 0; i < asked.size(); ++i)
       if (!(asked[i] < loosest[i])) asked[i] = std::numeric_limits<float>::infinity();
     grade_bounds(asked, volume.bricks());
