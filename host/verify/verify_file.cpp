@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {
