@@ -72,6 +72,14 @@ def devices(work, _):
     if "\n1: " in listed:  # PoCL, which shows the same device twice when it is asked to
         for given in ("0,1", "1,0", "all"):
             work.same(expected, "--device", given, **two)
+    plan = ["plan", work.scan, "--epsilon", "15%", "--granularity", "2", "--json"]
+    alone = json.loads(work.run(plan).stdout)["foreseen"]
+    spread = json.loads(work.run([*plan, "--ranks", "4", "--machines", "2"]).stdout)["foreseen"]["spread"]
+    memory = spread["memory_bytes"]
+    check("spread" not in alone and spread["ranks"] == 4 and spread["machines"] == 2, f"{spread}")
+    check(memory["first_machine"] >= alone["memory_bytes"] > memory["other_machine"] / 2 > 0, f"{spread}, {alone}")
+    refused = work.run([*plan, "--machines", "2"], expected=2)
+    check("give --ranks" in refused.stderr, refused.stderr)
     refused = work.run(work.build("--device", "0,,1"), expected=2)
     check("--device" in refused.stderr and "empty" in refused.stderr, refused.stderr)
     check(not work.out.exists(), "something was written")
