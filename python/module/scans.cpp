@@ -4,6 +4,7 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -32,13 +33,23 @@ namespace {
 
 using Projections = nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
+/// Holds a Python object until the last copy is gone, in whatever thread that is.
+std::shared_ptr<const void> kept_alive(nb::object object) {
+  return {object.release().ptr(), [](PyObject* held) {
+            if (!Py_IsInitialized()) return;
+            const nb::gil_scoped_acquire interpreter;
+            Py_DECREF(held);
+          }};
+}
+
 std::shared_ptr<ProjectionSet> scan_of(const Projections& array, ArrayScan described) {
   described.rows = static_cast<std::int64_t>(array.shape(1));
   described.columns = static_cast<std::int64_t>(array.shape(2));
   auto scan = std::make_shared<ProjectionSet>();
-  run_long(nb::none(), [&](const Progress&) {
-    *scan = scan_of_array(std::vector<float>(array.data(), array.data() + array.size()), described);
-  });
+  // The array itself: nothing writes to a scan's samples, though their type has no const.
+  const std::span<float> samples(const_cast<float*>(array.data()), array.size());
+  SampleArray data(samples, kept_alive(nb::find(array)));
+  run_long(nb::none(), [&](const Progress&) { *scan = scan_of_array(std::move(data), described); });
   return scan;
 }
 
@@ -245,6 +256,20 @@ void add_plans(nb::module_& m) {
       .value("f32", StorageChoice::f32)
       .value("u16", StorageChoice::u16)
       .value("u8", StorageChoice::u8);
+  nb::enum_<Coefficients>(m, "Coefficients")
+      .value("midrange", Coefficients::midrange)
+      .value("sampled", Coefficients::sampled);
+  nb::enum_<Terms>(m, "Terms").value("all", Terms::all).value("grid", Terms::grid);
+  nb::enum_<Closing>(m, "Closing")
+      .value("coarse", Closing::coarse)
+      .value("paper", Closing::paper)
+      .value("none", Closing::none);
+  nb::class_<Comparison>(m, "Comparison")
+      .def(nb::init<>())
+      .def_rw("coefficients", &Comparison::coefficients)
+      .def_rw("terms", &Comparison::terms)
+      .def_rw("closing", &Comparison::closing)
+      .def_rw("epsilon_of_max", &Comparison::epsilon_of_max);
   nb::class_<Tolerance>(m, "Tolerance")
       .def(nb::init<>())
       .def_rw("relative", &Tolerance::relative)
@@ -285,6 +310,16 @@ void add_plans(nb::module_& m) {
       .def_prop_rw(
           "granularity", [](const CertifyOptions& o) { return o.plan.granularity; },
           [](CertifyOptions& o, int n) { o.plan.granularity = n; })
+      .def_prop_rw(
+          "comparison", [](const CertifyOptions& o) { return o.plan.comparison; },
+          [](CertifyOptions& o, const Comparison& c) { o.plan.comparison = c; })
+      .def_prop_rw(
+          "coarsening", [](const CertifyOptions& o) { return o.plan.coarsening; },
+          [](CertifyOptions& o, std::optional<LevelTriple> c) { o.plan.coarsening = c; }, nb::arg().none())
+      .def_prop_rw(
+          "window", [](const CertifyOptions& o) { return o.build.window; },
+          [](CertifyOptions& o, std::optional<std::pair<double, double>> w) { o.build.window = w; },
+          nb::arg().none())
       .def_prop_rw(
           "storage", [](const CertifyOptions& o) { return o.build.storage; },
           [](CertifyOptions& o, StorageChoice s) { o.build.storage = s; })

@@ -21,6 +21,7 @@
 #include "vdvr/error_slice.hpp"
 #include "vdvr/export_vtk.hpp"
 #include "vdvr/framing.hpp"
+#include "vdvr/journal.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -49,6 +50,22 @@ Held build(Device& device, const ProjectionSet& scan, const Tolerance& tolerance
   Held held;
   run_long(progress, [&](const Progress& report) {
     held = held_of(certify(device, scan, tolerance, options, report));
+  });
+  return held;
+}
+
+/// The same into a file, with a journal of what is finished beside it, as `vdvr build` has them.
+Held build_into(Device& device, const ProjectionSet& scan, const Tolerance& tolerance, CertifyOptions options,
+                const std::filesystem::path& path, bool deflate, bool resume, nb::handle progress) {
+  Held held;
+  run_long(progress, [&](const Progress& report) {
+    Journal journal(path.string() + ".journal", resume);
+    options.build.journal = &journal;
+    held = held_of(certify(device, scan, tolerance, options, report));
+    const std::lock_guard turn(hdf5_turn());
+    write_vdvr(path, held->file().volume, held->file().certificate,
+               deflate ? Compression::deflate : Compression::none);
+    journal.remove();
   });
   return held;
 }
@@ -254,6 +271,8 @@ void add_volumes(nb::module_& m) {
           },
           "path"_a, "deflate"_a);
   m.def("build", &build, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "progress"_a.none());
+  m.def("build_into", &build_into, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "path"_a, "deflate"_a,
+        "resume"_a, "progress"_a.none());
   m.def("open", &open, "path"_a, "max_memory_bytes"_a, "unverified"_a);
   add_verification(m);
 }

@@ -2,33 +2,53 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence, Union
+import inspect
+import os
+from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar, Union
 
 from . import _core
 from ._choices import Path, choice, number, numbers, tolerance
 from ._devices import DeviceLike, device as open_device
 from ._scans import Progress, Scan
-from ._volume import Volume, path_or_volume
+from ._volume import Volume, compressed, path_or_volume
+
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def _options(
-    scan: Scan,
     *,
-    filter: str,
-    cutoff: float,
-    size: Optional[Sequence[int]],
-    spacing: Union[float, Sequence[float], None],
-    origin: Optional[Sequence[float]],
-    roi: Optional[Sequence[float]],
-    upsampling: Optional[int],
-    u_filter: Optional[str],
-    gold: Optional[int],
-    levels: str,
-    granularity: int,
-    storage: str,
+    filter: str = "ram-lak",
+    cutoff: float = 1.0,
+    size: Optional[Sequence[int]] = None,
+    spacing: Union[float, Sequence[float], None] = None,
+    origin: Optional[Sequence[float]] = None,
+    roi: Optional[Sequence[float]] = None,
+    window: Optional[Tuple[float, float]] = None,
+    upsampling: Optional[int] = None,
+    u_filter: Optional[str] = None,
+    gold: Optional[int] = None,
+    levels: Optional[str] = None,
+    granularity: int = 4,
+    base: Optional[Sequence[int]] = None,
+    storage: str = "auto",
+    closing: str = "coarse",
+    coefficients: str = "midrange",
+    terms: str = "all",
+    epsilon_of: str = "range",
 ) -> "_core.CertifyOptions":
-    if not isinstance(scan, Scan):
-        raise _core.InputError(f"scan: a {type(scan).__name__}; give a vdvr.Scan, or what read_scan returns")
+    """
+    filter, cutoff : of the ramp ("ram-lak", "shepp-logan", "cosine", "hamming", "hann"); they define F.
+    size : cells x, y, z of the grid; by default the covered region's.
+    spacing : of samples, or that in x and y and that in z, in the scan's unit; by default the detector's pitch.
+    origin : x, y, z of the first sample.
+    roi : x0, y0, z0, x1, y1, z1: certify the points of this box alone.
+    window : (lo, hi): test only where the field meets these densities.
+    upsampling, u_filter, gold : rates; by default the plan chooses.
+    levels, granularity, base, storage : how V is stored: "anisotropic" (the default) or "isotropic", cells of a
+        brick, cells x, y, z per base sample, "auto", "f32", "u16" or "u8".
+    closing, coefficients, terms, epsilon_of : of comparisons with the paper, as `vdvr build` has them. With closing
+        "none" or terms "grid" nothing is certified.
+    """
     options = _core.CertifyOptions()
     field = _core.FieldOptions()
     field.filter = choice(_core.RampWindow, filter, "filter")
@@ -41,34 +61,68 @@ def _options(
         options.spacing, options.spacing_z = numbers(spacing, 2, "spacing")
     options.origin = None if origin is None else list(numbers(origin, 3, "origin"))
     options.roi = None if roi is None else list(numbers(roi, 6, "roi"))
+    options.window = None if window is None else _window(window)
     options.upsampling = None if upsampling is None else int(upsampling)
     options.u_filter = None if u_filter is None else choice(_core.Interpolation, u_filter, "u_filter")
     options.gold = None if gold is None else int(gold)
+    # The paper's closing is defined for these alone.
+    levels = levels or ("isotropic" if closing == "paper" else "anisotropic")
     options.levels = choice(_core.Levels, levels, "levels")
     options.granularity = int(granularity)
+    options.coarsening = None if base is None else _coarsening(base)
     options.storage = choice(_core.StorageChoice, storage, "storage")
+    comparison = _core.Comparison()
+    comparison.closing = choice(_core.Closing, closing, "closing")
+    comparison.coefficients = choice(_core.Coefficients, coefficients, "coefficients")
+    comparison.terms = choice(_core.Terms, terms, "terms")
+    if epsilon_of not in ("range", "max"):
+        raise _core.InputError(f"epsilon_of: '{epsilon_of}' is none of range, max")
+    comparison.epsilon_of_max = epsilon_of == "max"
+    options.comparison = comparison
     return options
 
 
+def _window(given: Sequence[float]) -> Tuple[float, float]:
+    lo, hi = numbers(given, 2, "window")
+    if lo > hi:
+        raise _core.InputError(f"window: {lo} lies above {hi}")
+    return lo, hi
+
+
+def _coarsening(base: Sequence[int]) -> Sequence[int]:
+    """log2 of cells per base sample, z, y, x."""
+    cells = numbers(base, 3, "base")
+    if not all(n in (1, 2, 4, 8) for n in cells):
+        raise _core.InputError(f"base: {tuple(base)}; cells x, y, z per base sample are 1, 2, 4 or 8")
+    return [int(n).bit_length() - 1 for n in reversed(cells)]
+
+
+def _takes_options(function: _F) -> _F:
+    """Gives a function with **options the names, defaults and words of _options, which owns them."""
+    own = [p for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
+    theirs = inspect.signature(_options)
+    function.__signature__ = inspect.signature(function).replace(  # type: ignore[attr-defined]
+        parameters=[*own, *theirs.parameters.values()])
+    head, words = inspect.getdoc(_options), inspect.getdoc(function) or ""
+    function.__doc__ = words.replace("OPTIONS", (head or "").strip())
+    return function
+
+
+def _checked(scan: Any) -> Any:
+    if not isinstance(scan, Scan):
+        raise _core.InputError(f"scan: a {type(scan).__name__}; give a vdvr.Scan, or what read_scan returns")
+    return scan._core
+
+
+@_takes_options
 def plan(
     scan: Scan,
     epsilon: Union[str, float, None] = None,
     *,
     epsilon_abs: Optional[float] = None,
-    filter: str = "ram-lak",
-    cutoff: float = 1.0,
-    size: Optional[Sequence[int]] = None,
-    spacing: Union[float, Sequence[float], None] = None,
-    origin: Optional[Sequence[float]] = None,
-    roi: Optional[Sequence[float]] = None,
-    upsampling: Optional[int] = None,
-    u_filter: Optional[str] = None,
-    gold: Optional[int] = None,
-    levels: str = "anisotropic",
-    granularity: int = 4,
-    storage: str = "auto",
     device: DeviceLike = None,
     progress: Optional[Progress] = None,
+    **options: Any,
 ) -> "_core.Plan":
     """What `build` with the same arguments would do, store and cost. Builds nothing.
 
@@ -76,31 +130,23 @@ def plan(
     ------
     ToleranceError : the tolerance is out of reach; the message says what would do.
     """
-    options = _options(scan, filter=filter, cutoff=cutoff, size=size, spacing=spacing, origin=origin, roi=roi,
-                       upsampling=upsampling, u_filter=u_filter, gold=gold, levels=levels,
-                       granularity=granularity, storage=storage)
-    return _core.make_plan(open_device(device), scan._core, tolerance(epsilon, epsilon_abs), options, progress)
+    wanted = _options(**options)
+    return _core.make_plan(open_device(device), _checked(scan), tolerance(epsilon, epsilon_abs), wanted, progress)
 
 
+@_takes_options
 def build(
     scan: Scan,
     epsilon: Union[str, float, None] = None,
     *,
     epsilon_abs: Optional[float] = None,
-    filter: str = "ram-lak",
-    cutoff: float = 1.0,
-    size: Optional[Sequence[int]] = None,
-    spacing: Union[float, Sequence[float], None] = None,
-    origin: Optional[Sequence[float]] = None,
-    roi: Optional[Sequence[float]] = None,
-    upsampling: Optional[int] = None,
-    u_filter: Optional[str] = None,
-    gold: Optional[int] = None,
-    levels: str = "anisotropic",
-    granularity: int = 4,
-    storage: str = "auto",
+    save: Optional[Path] = None,
+    overwrite: bool = False,
+    compression: str = "deflate",
+    resume: bool = False,
     device: DeviceLike = None,
     progress: Optional[Progress] = None,
+    **options: Any,
 ) -> Volume:
     """Builds the certified volume V: |V - F| is at most epsilon at every covered point.
 
@@ -108,25 +154,29 @@ def build(
     ----------
     epsilon : "3%" or 0.03 of F's range; or
     epsilon_abs : a density.
-    filter, cutoff : of the ramp ("ram-lak", "shepp-logan", "cosine", "hamming", "hann"); they define F.
-    size : cells x, y, z of the grid; by default the covered region's.
-    spacing : of samples, or that in x and y and that in z, in the scan's unit; by default the detector's pitch.
-    origin : x, y, z of the first sample.
-    roi : x0, y0, z0, x1, y1, z1: certify the points of this box alone.
-    upsampling, u_filter, gold : rates; by default the plan chooses.
-    levels, granularity, storage : how V is stored.
+    save : path of a .vdvr file that is written too. While the build goes on `SAVE.journal` keeps what is finished;
+        it is removed once the file is in place.
+    overwrite, compression : as `Volume.save` has them.
+    resume : continue what an interrupted build left in that journal.
     progress : called with a stage's name and how much of it is done, about 20 times a second.
+    OPTIONS
 
     Raises
     ------
     ToleranceError : the tolerance is out of reach; the message says what would do.
     KeyboardInterrupt : Ctrl-C, within about a second.
     """
-    options = _options(scan, filter=filter, cutoff=cutoff, size=size, spacing=spacing, origin=origin, roi=roi,
-                       upsampling=upsampling, u_filter=u_filter, gold=gold, levels=levels,
-                       granularity=granularity, storage=storage)
-    options.foresee = False
-    held = _core.build(open_device(device), scan._core, tolerance(epsilon, epsilon_abs), options, progress)
+    wanted = _options(**options)
+    wanted.foresee = False
+    projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs)
+    if save is None:
+        if resume:
+            raise _core.InputError("resume: give save=, beside which the journal lies")
+        return Volume(_core.build(open_device(device), projections, asked, wanted, progress), device)
+    if not overwrite and os.path.exists(save):
+        raise _core.InputError(f"{os.fspath(save)}: exists already; overwrite=True replaces it")
+    held = _core.build_into(open_device(device), projections, asked, wanted, save, compressed(compression), resume,
+                            progress)
     return Volume(held, device)
 
 
@@ -158,4 +208,4 @@ def verify(
     options.exhaustive = exhaustive
     where: Any = path_or_volume(volume)
     work = _core.verify_held if isinstance(where, _core.HeldVolume) else _core.verify_path
-    return work(open_device(device), where, scan._core, options, progress)
+    return work(open_device(device), where, _checked(scan), options, progress)

@@ -36,7 +36,8 @@ class Scan:
     Parameters
     ----------
     projections : array [view, row, column], line integrals (after -log), row 0 on top. float32 as it is, any
-        other type of number rounded to float32.
+        other type of number rounded to float32. A float32 array in C's order is not copied: do not write to it while
+        the scan, or a build from it, is used.
     angles_deg : one angle a view, degrees.
     center : column onto which the axis of rotation projects; columns' middles are integers. By default it is
         found from the views, and where they do not tell it is the detector's middle.
@@ -144,8 +145,9 @@ def read_scan(
     binning: int = 1,
     median: int = 1,
     gaussian: Tuple[float, float] = (0.0, 0.0),
-    stripes: bool = False,
-    outliers: Optional[float] = None,
+    stripes: Union[bool, float, Sequence[float]] = False,
+    outliers: Union[float, Sequence[float], None] = None,
+    phase: Optional[Sequence[float]] = None,
     follow_links: bool = False,
     max_memory: Optional[int] = None,
     progress: Optional[Progress] = None,
@@ -161,9 +163,11 @@ def read_scan(
     beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
     binning : columns and rows that become one.
     median, gaussian : side of the median's window; standard deviations in columns and rows.
-    stripes : takes stripes of sinograms (rings of slices) out.
+    stripes : takes stripes of sinograms (rings of slices) out: True, the ratio of a stripe to noise, or (ratio,
+        large window, small window).
     outliers : takes out pixels whose transmission is above their neighbours' median by more than this fraction
-        of the open beam.
+        of the open beam; or (fraction, side of the window).
+    phase : (distance from object to detector in mm, energy in keV, delta / beta) of Paganin's phase retrieval.
     max_memory : bytes; by default half of what is free.
     """
     options = _core.ScanOptions()
@@ -176,14 +180,30 @@ def read_scan(
     preparation.binning = int(binning)
     preparation.median = int(median)
     preparation.gaussian = list(numbers(gaussian, 2, "gaussian"))
-    if stripes:
-        preparation.stripes = _core.Stripes()
+    if stripes is not False:
+        preparation.stripes = _step(_core.Stripes(), ("ratio", "large", "small"), stripes, "stripes")
     if outliers is not None:
-        wanted = _core.Outliers()
-        wanted.threshold = number(outliers, "outliers")
-        preparation.outliers = wanted
+        preparation.outliers = _step(_core.Outliers(), ("threshold", "window"), outliers, "outliers")
+    if phase is not None:
+        members = ("distance_mm", "energy_kev", "delta_beta")
+        preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     options.preparation = preparation
     return Scan._of(_core.read_scan(path, options, progress))
+
+
+def _step(step: Any, members: Sequence[str], given: Any, name: str) -> Any:
+    """A step of preparation with its numbers: True leaves them as they are, one number is the first of them."""
+    if given is True:
+        return step
+    values = [given] if np.ndim(given) == 0 else list(given)
+    if len(values) not in (1, len(members)):
+        raise _core.InputError(f"{name}: {len(values)} numbers; give {len(members)} ({', '.join(members)}) or the first")
+    for member, value in zip(members, values):
+        whole = isinstance(getattr(step, member), int)
+        if whole and number(value, name) != int(value):
+            raise _core.InputError(f"{name}: {member} {value} is not a whole number of pixels")
+        setattr(step, member, int(value) if whole else number(value, name))
+    return step
 
 
 def find_center(scan: Scan) -> Optional["_core.CenterEstimate"]:

@@ -263,9 +263,7 @@ class Volume:
         """
         if not overwrite and os.path.exists(path):
             raise _core.InputError(f"{os.fspath(path)}: exists already; overwrite=True replaces it")
-        if compression not in ("deflate", "none"):
-            raise _core.InputError(f"compression: '{compression}' is none of deflate, none")
-        self._held.save(path, compression == "deflate")
+        self._held.save(path, compressed(compression))
 
     def to_vtk(self, blocks: int = 2000) -> Any:
         """V as a vtkMultiBlockDataSet of vtkImageData with point data `density`, as fine as each brick is:
@@ -309,6 +307,13 @@ def _window(given: Sequence[float]) -> Tuple[float, float]:
     if not lo < hi:
         raise _core.InputError(f"transfer_range: {lo} is not below {hi}")
     return lo, hi
+
+
+def compressed(compression: str) -> bool:
+    """Whether a word asks for compression."""
+    if compression not in ("deflate", "none"):
+        raise _core.InputError(f"compression: '{compression}' is none of deflate, none")
+    return compression == "deflate"
 
 
 def path_or_volume(volume: Union[Volume, Path]) -> Union["_core.HeldVolume", Path]:

@@ -3,6 +3,7 @@
 
   module.py
 """
+import inspect
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import threading
 import time
 
 import numpy as np
+import pyvista
 import vdvr
 from skimage.transform import iradon
 
@@ -76,7 +78,26 @@ angles = np.arange(12) * 15.0
 scan = vdvr.Scan(noise, angles, center=6.0)
 for other in (noise.astype(np.float64), np.asfortranarray(noise), noise[::-1][::-1], noise.astype(">f4")):
     assert vdvr.Scan(other, angles, center=6.0).sha256 == scan.sha256
-assert not scan.data.flags.writeable and np.shares_memory(scan.data, scan.data)
+assert not scan.data.flags.writeable and np.shares_memory(scan.data, noise)
+
+
+def resident():
+    return int(open("/proc/self/statm").read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+# What lies in memory as a scan has it is not copied, and is let go with the scan.
+big = rng.random((16, 512, 1024), dtype=np.float32)
+holders, before = sys.getrefcount(big), resident()
+held = vdvr.Scan(big, np.arange(16) * 11.25, center=511.5)
+grown = (resident() - before) / big.nbytes
+print(f"a scan of {big.nbytes >> 20} MiB takes {100 * grown:.1f} % more")
+assert grown < 0.1 and np.shares_memory(held.data, big)
+view = held.data
+del held
+assert view[3, 4, 5] == big[3, 4, 5]
+del view
+assert sys.getrefcount(big) == holders, "the array is held after its scan is gone"
+del big
 
 # --- errors ---
 bad = noise.copy()
@@ -88,6 +109,17 @@ raises(vdvr.InputError, "center", lambda: vdvr.Scan(noise, angles, center=99.0))
 raises(vdvr.InputError, "300%", lambda: vdvr.build(scan, "300%"))
 raises(vdvr.ToleranceError, "out of reach", lambda: vdvr.build(scan, 1e-9))
 raises(vdvr.FileError, "no-such.h5", lambda: vdvr.read_scan("no-such.h5"))
+for kind, usual in ((vdvr.InputError, ValueError), (vdvr.FileError, OSError), (vdvr.FileError, ValueError),
+                    (vdvr.MismatchError, ValueError), (vdvr.ToleranceError, ValueError),
+                    (vdvr.DeviceError, RuntimeError), (vdvr.ResourceError, MemoryError)):
+    assert issubclass(kind, usual) and issubclass(kind, vdvr.Error)
+raises(OSError, "no-such.h5", lambda: vdvr.read_scan("no-such.h5"))
+raises(ValueError, "phase", lambda: vdvr.read_scan("no-such.h5", phase=(1, 2)))
+raises(vdvr.InputError, "lies above", lambda: vdvr.build(scan, "20%", window=(2, 1)))
+raises(vdvr.InputError, "closing", lambda: vdvr.build(scan, "20%", closing="tight"))
+raises(TypeError, "windows", lambda: vdvr.build(scan, "20%", windows=(1, 2)))
+raises(vdvr.InputError, "save", lambda: vdvr.build(scan, "20%", resume=True))
+assert "window" in vdvr.build.__doc__ and "closing" in str(inspect.signature(vdvr.plan))
 raises(vdvr.DeviceError, "no-such-device", lambda: vdvr.build(scan, "20%", device="no-such-device"))
 volume = vdvr.build(scan, "20%")
 raises(vdvr.InputError, "none of dvr", lambda: volume.render(mode="sideways"))
@@ -116,9 +148,37 @@ def stop(stage, fraction):
 raises(Enough, "", lambda: vdvr.build(scan, "20%", progress=stop))
 assert vdvr.build(scan, "20%").content_sha256 == volume.content_sha256, "a stop has left something behind"
 
+# --- a journal beside the file: what was interrupted goes on ---
+middle = vdvr.Scan(rng.random((60, 40, 49)).astype(np.float32), np.arange(60) * 3.0, center=24.0)
+
+
+def stop_late(stage, fraction):
+    if stage == "classify" and fraction > 0.5:
+        raise Enough
+
+
+raises(Enough, "", lambda: vdvr.build(middle, "10%", save="middle.vdvr", progress=stop_late))
+assert os.path.getsize("middle.vdvr.journal") > 0 and not os.path.exists("middle.vdvr")
+resumed = vdvr.build(middle, "10%", save="middle.vdvr", resume=True)
+assert not os.path.exists("middle.vdvr.journal")
+assert vdvr.open("middle.vdvr").content_sha256 == resumed.content_sha256 == vdvr.build(middle, "10%").content_sha256
+raises(vdvr.InputError, "exists already", lambda: vdvr.build(middle, "10%", save="middle.vdvr"))
+
+# --- VTK's boxes are V's own samples ---
+boxes, seen = pyvista.wrap(volume.to_vtk()), {}
+assert boxes.n_blocks > 0 and boxes.field_data["unit"][0] == "pixel"
+assert boxes.field_data["epsilon_abs"][0] == volume.epsilon_abs
+for box in boxes:
+    if box.spacing not in seen:
+        seen[box.spacing] = volume.to_numpy(spacing=box.spacing)
+    first = np.rint((np.array(box.bounds[::2]) - volume.grid.origin) / box.spacing).astype(int)
+    part = tuple(slice(f, f + n) for f, n in zip(first[::-1], box.dimensions[::-1]))
+    assert np.array_equal(box["density"].reshape(box.dimensions[::-1]), seen[box.spacing][part])
+assert np.isclose(boxes.volume, np.prod([n * s for n, s in zip(volume.grid.cells, volume.grid.spacing)]))
+
 # --- Ctrl-C, and the interpreter's lock: other threads run meanwhile ---
 large = vdvr.Scan(rng.random((180, 96, 129)).astype(np.float32), np.arange(180.0), center=64.0)
-counted, sent = [0], [0.0]
+counted, sent = [0], [0.0, 0.0]
 
 
 def count():
@@ -127,7 +187,7 @@ def count():
     while time.monotonic() < end:
         counted[0] += 1
         time.sleep(0.01)
-    sent[0] = time.monotonic()
+    sent[:] = time.monotonic(), time.process_time()
     os.kill(os.getpid(), signal.SIGINT)
 
 
@@ -137,10 +197,10 @@ try:
     vdvr.build(large, "10%")
     raise SystemExit("the build ended before it was interrupted")
 except KeyboardInterrupt:
-    waited = time.monotonic() - sent[0]
+    waited, worked = time.monotonic() - sent[0], time.process_time() - sent[1]
 thread.join()
-print(f"interrupted after {waited:.2f} s; another thread ran {counted[0]} times meanwhile")
+print(f"interrupted after {waited:.2f} s and {worked:.2f} s of work; another thread ran {counted[0]} times meanwhile")
 assert counted[0] > 10, "the interpreter's lock was held"
-# A second, as promised; five where this machine has other work, which a test cannot know.
-assert waited < 5, f"Ctrl-C took {waited} s"
+# A second of a machine that has nothing else to do: of the work that this process did meanwhile, on all cores.
+assert worked < 1.0 * len(os.sched_getaffinity(0)), f"Ctrl-C took {worked} s of work"
 print("module: recon, layouts, errors, progress and interruption are as documented")

@@ -85,6 +85,21 @@ run("render", "theirs.vdvr", "-o", "errors.npy", *size, "--show", "error")
 assert np.array_equal(np.load("errors.npy"), space["errors"], equal_nan=True)
 Image.fromarray(space["picture"]).save("page.png")
 
+# Prepared and windowed, from a file with lengths.
+with h5py.File("ball.h5") as file, h5py.File("mm.h5", "w") as other:
+    for name in ("/exchange/data", "/exchange/theta"):
+        file.copy(name, other.require_group("/exchange"))
+    other["/exchange/data"].attrs["unit"] = "mm"
+options = ["--phase", "20,25,100", "--stripes", "on", "--window", "0.1,0.6", "--size", "32x32x20", "--base", "2x1x2"]
+run("build", "mm.h5", "--epsilon", "10%", "-o", "prepared.vdvr", *options)
+prepared = space["vdvr"].build(
+    space["vdvr"].read_scan("mm.h5", phase=(20, 25, 100), stripes=True), "10%", window=(0.1, 0.6), size=(32, 32, 20),
+    base=(2, 1, 2))
+theirs = space["vdvr"].open("prepared.vdvr")
+assert prepared.content_sha256 == theirs.content_sha256
+assert prepared.certificate["window"] == theirs.certificate["window"] == [0.1, 0.6]
+assert prepared.certificate["total"] == theirs.certificate["total"]
+
 # What Python wrote, the program reads and verifies; the program's file, Python.
 vdvr = space["vdvr"]
 assert vdvr.verify(vdvr.open("theirs.vdvr"), vdvr.read_scan("ball.h5"))
