@@ -153,6 +153,8 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
       std::uint64_t n = 0;
       for (const RenderOptions& o : pictures(c.volume)) {
         if ((o.gradient == GradientKind::stored) != lit) continue;
+        // Compilers take longer than pictures: what does not depend on types is drawn of floats alone.
+        if (&c != &cases().front() && (o.output != RenderOutput::colour || o.clip)) continue;
         BOOST_TEST_CONTEXT(c.name << (lit ? ", lit" : "") << ", picture " << n) {
           const RenderResult expected = reference.render(o), found = by_bricks.render(o);
           BOOST_TEST((expected.image.rgb == found.image.rgb));
