@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "host/system/casts.hpp"
+#include "host/system/scratch_pass.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -182,6 +183,8 @@ VolumePart PagedVolume::Impl::part_of(std::vector<std::uint8_t> here) const {
   part.here = std::move(here);
   const auto offsets = tile_offsets(p);
   part.fill = [this, tiles = std::move(tiles), offsets](std::span<std::uint8_t> to) {
+    ScratchPass pass;
+    pass.add(*volume);
     std::memcpy(to.data(), volume->base.data(), volume->base.bytes());
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
       const Kind& kind = kinds_[k];
@@ -190,6 +193,7 @@ VolumePart PagedVolume::Impl::part_of(std::vector<std::uint8_t> here) const {
       for (const std::uint32_t t : tiles[k]) {
         std::memcpy(at, from + t * kind.tile_bytes, kind.tile_bytes);
         at += kind.tile_bytes;
+        pass.touched(kind.tile_bytes);
       }
     }
   };

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/system/scratch_pass.hpp"
+
 namespace vdvr {
 namespace {
 
@@ -263,10 +265,13 @@ FieldFacts facts_of(const MixedVolume& v) {
   for (const auto& [triple, block] : v.tiles)
     for (std::size_t a = 0; a < 3; ++a)
       f.highest_level = std::max(f.highest_level, triple.level[a] - v.coarsening[a]);
+  ScratchPass pass;
+  pass.add(v);
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     f.has_tile.push_back(v.level[i] == LevelTriple{0, 0, 0} ? 0 : 1);
     const BrickSamples stored(v, position_of(v, i));
     f.ranges.push_back(range_of(stored));
+    pass.touched(sizeof(float) * static_cast<std::uint64_t>(v.tile_size(v.level[i])));
     const VdvrBrick& r = stored.record();
     if (r.type == VDVR_F32) continue;
     // Beside a tile's own samples a texel can decode to anything that its type can hold.

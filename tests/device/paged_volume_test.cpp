@@ -153,6 +153,12 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
       std::uint64_t n = 0;
       for (const RenderOptions& o : pictures(c.volume)) {
         if ((o.gradient == GradientKind::stored) != lit) continue;
+        // Compilers take longer than pictures: what does not depend on types is drawn of floats alone.
+        if (&c != &cases().front() &&
+            (o.output != RenderOutput::colour || o.clip || o.mode == RenderMode::mip ||
+             o.mode == RenderMode::slice || o.gradient == GradientKind::analytic ||
+             o.step_mode == StepMode::level || o.classification == Classification::preintegrated))
+          continue;
         BOOST_TEST_CONTEXT(c.name << (lit ? ", lit" : "") << ", picture " << n) {
           const RenderResult expected = reference.render(o), found = by_bricks.render(o);
           BOOST_TEST((expected.image.rgb == found.image.rgb));
@@ -179,8 +185,8 @@ BOOST_AUTO_TEST_CASE(several_devices_draw_the_picture_of_one) {
   const PagedVolume paged(first, v, budget), paged_again(second, v, budget);
   RenderCrew by_bricks({{&first, nullptr, &paged}, {&second, nullptr, &paged_again}});
   const std::vector<RenderOptions> all = pictures(v);
-  // Fixed and adaptive steps, surfaces, a slice.
-  for (const std::size_t i : {0u, 1u, 5u, 11u, 14u}) {
+  // Gradients where they are needed and stored ones, surfaces.
+  for (const std::size_t i : {0u, 1u, 11u}) {
     RenderOptions o = all.at(i);
     o.height = 150;  // several bands, the last one cut
     const RenderResult expected = alone.render(o), found = crew.render(o), bricks = by_bricks.render(o);
