@@ -343,7 +343,11 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
-  Show show{args.text_or("show", "colour"), o.mode == RenderMode::slice, false, {}, o.width, o.height};
+  Show show;
+  show.what = args.text_or("show", "colour");
+  show.slice = o.mode == RenderMode::slice;
+  show.width = o.width;
+  show.height = o.height;
   show.framed = show.slice && !overlay.plain && show.what == "colour";
   if (show.slice) {
     show.frame = set_slice(o, scene, !show.framed);
