@@ -92,6 +92,7 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wante
   if (!wanted.pictures) return planned;
   PictureRefinementOptions options;
   options.levels = wanted.pictures->levels;
+  options.finest_abs = planned.plan.epsilon_abs;
   planned.pictures = std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan,
                                                          planned.plan.field, std::move(options), progress);
   return planned;

@@ -310,6 +310,9 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
   std::optional<ClassifyBricks> test;
   test.emplace(in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
+  if (!tolerance.by_brick.empty())
+    for (std::size_t i = 0; i < bricks.level.size(); ++i)
+      bricks.tolerance.push_back(static_cast<float>(tolerance.of(i)));
   classify(in, *test, bricks, tolerance, share.value_or(BuildShare{}));
   if (share) return {};
   return close_and_measure(in, *test, bricks, tolerance, accept);

@@ -20,20 +20,9 @@ class Closer {
   Closer(const StoredAs& stored, const Surroundings& of, const TileView& own, const std::array<int, 3>& side,
          std::vector<float>& tile)
       : stored_(stored), entity_(stored, of, side), own_(own), tile_(tile) {
-    lowest_ = own_.level;
-    for (const std::int64_t i : entity_.incident())
-      for (std::size_t a = 0; a < 3; ++a) lowest_[a] = std::min<int>(lowest_[a], stored.level[at(i)][2 - a]);
-    // The coarsest of those that have the entity's own lattice, if any has: its samples are fitted to that.
-    // Only one that reads the base is as coarse as one can be.
-    const auto rank = [&](std::int64_t i) {
-      const LevelTriple& l = stored.level[at(i)];
-      bool same = true;
-      for (const std::size_t a : entity_.along()) same = same && l[2 - a] == lowest_[a];
-      return std::pair(same ? 0 : 1, l[0] + l[1] + l[2]);
-    };
-    owner_ = entity_.incident().front();
-    for (const std::int64_t i : entity_.incident())
-      if (rank(i) < rank(owner_)) owner_ = i;
+    const SharedPart shared = shared_part(stored.open, stored.level, entity_.incident(), side);
+    lowest_ = shared.level;
+    owner_ = shared.owner;
     bool unchanged = owner_ == of.brick && stored.open.lattice.step == 0;
     for (const std::size_t a : entity_.along()) unchanged = unchanged && lowest_[a] == own_.level[a];
     if (unchanged) return;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
@@ -42,6 +43,39 @@ FewBricks incident_bricks(const OpenBricks& b, const Surroundings& of, const std
 
 FewBricks incident_bricks(const OpenBricks& b, std::int64_t brick, const std::array<int, 3>& side, bool all) {
   return incident_bricks(b, Surroundings(b, brick), side, all);
+}
+
+namespace {
+
+// Half powers of two of a tolerance: a brick whose own is hardly larger may own what it shares, and a coarse
+// one costs the others less.
+int looseness(const OpenBricks& b, std::int64_t brick) {
+  if (b.tolerance.empty()) return 0;
+  return static_cast<int>(std::floor(2 * std::log2(std::max(b.tolerance[at(brick)], 0x1p-100f))));
+}
+
+}  // namespace
+
+SharedPart shared_part(const OpenBricks& b, const std::vector<LevelTriple>& level, const FewBricks& incident,
+                       const std::array<int, 3>& side) {
+  SharedPart out;
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.level[a] = level[at(incident.front())][2 - a];
+    for (const std::int64_t i : incident) out.level[a] = std::min<int>(out.level[a], level[at(i)][2 - a]);
+  }
+  // One that reads the base, since nothing else can be stored there. Then the strictest, since what the
+  // others fitted may err by what they are allowed. Then those that have the part's own lattice, if any has:
+  // their samples are fitted to that. Then the coarsest.
+  const auto rank = [&](std::int64_t i) {
+    const LevelTriple& l = level[at(i)];
+    bool same = true;
+    for (std::size_t a = 0; a < 3; ++a) same = same && (side[a] != 1 || l[2 - a] == out.level[a]);
+    return std::array{l == LevelTriple{0, 0, 0} ? 0 : 1, looseness(b, i), same ? 0 : 1, l[0] + l[1] + l[2]};
+  };
+  out.owner = incident.front();
+  for (const std::int64_t i : incident)
+    if (rank(i) < rank(out.owner)) out.owner = i;
+  return out;
 }
 
 TileView::TileView(const OpenBricks& b, const Index3& brick, const LevelTriple& l)

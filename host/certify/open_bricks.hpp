@@ -28,6 +28,8 @@ struct OpenBricks {
   TileStore samples;                   ///< per brick: its tile at its level; empty at level 0
   Lattice lattice;
   bool sampled = true;  ///< the samples are gold itself, whatever the level
+  /// What |V - F| may be in each brick; empty: the same in all.
+  std::vector<float> tolerance;
 
   /// Bricks per axis.
   [[nodiscard]] Index3 counts() const;
@@ -73,6 +75,15 @@ FewBricks incident_bricks(const OpenBricks& bricks, const Surroundings& of, cons
                           bool all = false);
 FewBricks incident_bricks(const OpenBricks& bricks, std::int64_t brick, const std::array<int, 3>& side,
                           bool all = false);
+
+/// What the bricks that share a part store there.
+struct SharedPart {
+  std::array<int, 3> level{};  ///< x, y, z: the lowest of theirs, of meaning along the part
+  std::int64_t owner = 0;      ///< whose samples all of them take at that level
+};
+/// `level`: of all bricks, as stored; `incident`: of the part `side`, as incident_bricks() has them.
+SharedPart shared_part(const OpenBricks& bricks, const std::vector<LevelTriple>& level,
+                       const FewBricks& incident, const std::array<int, 3>& side);
 
 /// One brick's samples at some level, under their own index.
 struct TileView {

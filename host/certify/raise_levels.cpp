@@ -83,6 +83,18 @@ class Raise {
     return any;
   }
 
+  // Bricks have tolerances of their own, and one that is looser, or reads the base, has what all store here.
+  bool looser_owner(const std::array<int, 3>& side) {
+    const auto incident = incident_bricks(bricks_, brick_, side);
+    const std::int64_t owner = shared_part(bricks_, bricks_.level, incident, side).owner;
+    if (owner == brick_ || bricks_.tolerance[at(owner)] <= bricks_.tolerance[at(brick_)]) return false;
+    const LevelTriple in_base{0, 0, 0};
+    if (bricks_.level[at(owner)] != in_base) return rise_along_worst(owner);
+    for (const std::int64_t j : incident)
+      if (j != brick_ && bricks_.level[at(j)] == in_base) rise_along_worst(j);
+    return true;
+  }
+
   bool itself() { return rise_along_worst(brick_); }
 
  private:
@@ -121,14 +133,29 @@ class Raise {
 bool raise_levels(const OpenBricks& bricks, std::int64_t brick, std::uint32_t violated,
                   const AxisErrors* along, std::vector<LevelTriple>& to) {
   Raise raise(bricks, brick, along, to);
+  const bool own_tolerances = !bricks.tolerance.empty();
   constexpr int inside = 13;
-  bool neighbours = false;
-  for (int part = 0; part < 27; ++part) {
-    if (part == inside || !(violated >> part & 1)) continue;
-    const std::array<int, 3> side{part % 3, part / 3 % 3, part / 9};
-    if (raise.coarser_neighbours(side) || raise.owners_of_corner(side)) neighbours = true;
-    else if (!raise.itself() && !raise.others(side)) return false;
-  }
+  bool neighbours = false, done = true;
+  std::vector<std::array<int, 3>> mending;
+  // What a corner or an edge does not hold is seen beside it too, and mends with it.
+  const auto waits = [&](const std::array<int, 3>& side) {
+    return own_tolerances && std::any_of(mending.begin(), mending.end(), [&](const auto& other) {
+             for (std::size_t a = 0; a < 3; ++a)
+               if (side[a] != 1 && side[a] != other[a]) return false;
+             return true;
+           });
+  };
+  for_each_part([&](const std::array<int, 3>& side) {
+    if (!done || !(violated >> (9 * side[2] + 3 * side[1] + side[0]) & 1) || waits(side)) return;
+    if (raise.coarser_neighbours(side) || (own_tolerances && raise.looser_owner(side)) ||
+        raise.owners_of_corner(side)) {
+      neighbours = true;
+      mending.push_back(side);
+    } else if (!raise.itself() && !raise.others(side)) {
+      done = false;
+    }
+  });
+  if (!done) return false;
   // What a border does not hold is seen inside too, and mends with it.
   return neighbours || !(violated >> inside & 1) || raise.itself();
 }

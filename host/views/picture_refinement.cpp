@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -41,23 +40,21 @@ std::vector<float> bounds_of(const Certificate& certificate) {
   return bounds;
 }
 
-// A brick beside much coarser ones is raised, and raises them, beyond need: closing gives it their values on
-// all that they share, and repair finds out a level at a time. So bricks near one that must be fine are held
-// to what it is, and those behind them to twice that and so on.
+// Closing gives a brick what coarser ones beside it have along all that they share, so these are raised
+// there. To ask twice as much of them as of the brick between them finds most of that at once: repair goes a
+// level at a time.
 void grade_bounds(std::vector<float>& bounds, const Index3& n) {
-  constexpr std::array<float, 5> steps{1, 1, 2, 2, 2};
-  for (const float step : steps) {
-    const std::vector<float> before = bounds;
-    for (std::int64_t z = 0; z < n[2]; ++z)
-      for (std::int64_t y = 0; y < n[1]; ++y)
-        for (std::int64_t x = 0; x < n[0]; ++x) {
-          float& own = bounds[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)];
-          for (std::int64_t k = std::max<std::int64_t>(0, z - 1); k <= std::min(n[2] - 1, z + 1); ++k)
-            for (std::int64_t j = std::max<std::int64_t>(0, y - 1); j <= std::min(n[1] - 1, y + 1); ++j)
-              for (std::int64_t i = std::max<std::int64_t>(0, x - 1); i <= std::min(n[0] - 1, x + 1); ++i)
-                own = std::min(own, step * before[static_cast<std::size_t>((k * n[1] + j) * n[0] + i)]);
-        }
-  }
+  constexpr float beside = 2;
+  const std::vector<float> before = bounds;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) {
+        float& own = bounds[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)];
+        for (std::int64_t k = std::max<std::int64_t>(0, z - 1); k <= std::min(n[2] - 1, z + 1); ++k)
+          for (std::int64_t j = std::max<std::int64_t>(0, y - 1); j <= std::min(n[1] - 1, y + 1); ++j)
+            for (std::int64_t i = std::max<std::int64_t>(0, x - 1); i <= std::min(n[0] - 1, x + 1); ++i)
+              own = std::min(own, beside * before[static_cast<std::size_t>((k * n[1] + j) * n[0] + i)]);
+      }
 }
 
 }  // namespace
@@ -85,6 +82,7 @@ struct PictureRefinement::Impl {
   Progress progress;
   PictureViews views;
   std::vector<PictureRound> rounds;
+  std::vector<float> loosest;  // bounds of bricks, of all volumes that were looked at
 };
 
 // Certified bounds beside what V's own picture shows there; shares of those that are above the tolerance.
@@ -146,19 +144,19 @@ std::vector<float> PictureRefinement::Impl::ask(const MixedVolume& volume, const
     round.mean += p.bound / static_cast<double>(pixels.size());
     round.over += (p.bound > options.levels ? 1.0 : 0.0) / static_cast<double>(pixels.size());
   }
+  // A brick may be finer than it was asked to be, for others beside it, and need not stay so.
+  if (loosest.empty()) loosest = bounds;
+  for (std::size_t i = 0; i < bounds.size(); ++i) loosest[i] = std::max(loosest[i], bounds[i]);
   std::vector<float> asked;
   if (round.worst > options.levels && static_cast<int>(rounds.size()) < options.most_rounds) {
     const double allowed = std::max(aim * options.levels, round_share * round.worst);
-    asked = spend(bounds, demands_of(pixels, bounds, allowed));
+    asked = spend(loosest, demands_of(pixels, bounds, allowed), options.finest_abs);
     for (std::size_t i = 0; i < asked.size(); ++i)
-      if (!(asked[i] < bounds[i])) asked[i] = std::numeric_limits<float>::infinity();
+      if (!(asked[i] < loosest[i])) asked[i] = std::numeric_limits<float>::infinity();
     grade_bounds(asked, volume.bricks());
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      // What is asked already, and what closing and rounding make of it anyway.
-      constexpr float same = 0.98f;
-      if (!(asked[i] < same * bounds[i])) asked[i] = std::numeric_limits<float>::infinity();
-      else ++round.asked;
-    }
+    // What is asked already, and what closing and rounding make of it anyway.
+    constexpr float same = 0.98f;
+    for (std::size_t i = 0; i < asked.size(); ++i) round.asked += asked[i] < same * bounds[i] ? 1 : 0;
     if (round.asked == 0) asked.clear();
   }
   rounds.push_back(round);

@@ -14,9 +14,10 @@ struct PixelDemand {
   std::vector<std::pair<std::uint32_t, float>> slopes;
 };
 
-/// Bounds by brick, none above `bounds`, under which every pixel's sum of slope times bound is at most what
-/// it allows, and the sum over bricks of bound^(-3/2), which samples go with, is about the least. Cost: some
-/// tens of passes over the demands.
-std::vector<float> spend(const std::vector<float>& bounds, const std::vector<PixelDemand>& demands);
+/// Bounds by brick, none above `bounds` nor below `finest` where these are not, under which every pixel's sum
+/// of slope times bound is at most what it allows, and the sum over bricks of bound^(-3/2), which samples go
+/// with, is about the least. Cost: some tens of passes over the demands.
+std::vector<float> spend(const std::vector<float>& bounds, const std::vector<PixelDemand>& demands,
+                         double finest);
 
 }  // namespace vdvr

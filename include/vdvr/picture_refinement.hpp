@@ -62,6 +62,7 @@ struct PictureRound {
 struct PictureRefinementOptions {
   double levels = 8;  ///< what a pixel may differ by from the ideal one's, of 255
   int most_rounds = 12;
+  double finest_abs = 0;  ///< the least bound that a brick is asked for
 };
 
 /// Looks at volumes, and asks less of |V - F| in bricks by their share in pixels that are above the

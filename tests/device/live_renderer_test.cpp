@@ -131,23 +131,25 @@ BOOST_AUTO_TEST_CASE(moving_frames_have_the_shape_asked_for_and_fewer_pixels_whe
   BOOST_TEST(patient.draw(view, 640, 320, false).full);
 }
 
+constexpr double seconds_a_frame = 0.02;
+
 BOOST_AUTO_TEST_CASE(the_pace_keeps_its_budget_at_any_speed) {
   for (double per_pixel = 1e-9; per_pixel < 1e-5; per_pixel *= 1.7) {
-    FramePace pace(0.02);
+    FramePace pace(seconds_a_frame);
     pace.observe(1000, 1000 * per_pixel);
     const auto [width, height] = pace.size(1920, 1080);
     const double seconds = static_cast<double>(width * height) * per_pixel;
     // Rounding of a side to whole pixels may add half a pixel to each.
     const double slack = (1 + 0.5 / static_cast<double>(width)) * (1 + 0.5 / static_cast<double>(height));
     const bool coarsest = width <= 1920 / 16;
-    BOOST_TEST((coarsest || seconds <= 0.02 * slack));
+    BOOST_TEST((coarsest || seconds <= seconds_a_frame * slack));
     // No coarser than it must be: a step of the side is 2^(1/4), of the pixels its square.
-    BOOST_TEST((width == 1920 || seconds * std::sqrt(2.0) * slack * slack >= 0.02));
+    BOOST_TEST((width == 1920 || seconds * std::sqrt(2.0) * slack * slack >= seconds_a_frame));
   }
 }
 
 BOOST_AUTO_TEST_CASE(what_got_slower_is_followed_at_once) {
-  FramePace pace(0.02);
+  FramePace pace(seconds_a_frame);
   for (int i = 0; i < 10; ++i) pace.observe(100000, 0.01);
   const auto before = pace.size(512, 512);
   pace.observe(100000, 0.5);

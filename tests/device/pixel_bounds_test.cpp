@@ -269,3 +269,30 @@ BOOST_AUTO_TEST_CASE(range_tables_hold_every_value_of_the_transfer_function) {
     }
   }
 }
+
+BOOST_AUTO_TEST_CASE(bins_have_the_colours_of_what_shows_and_no_others) {
+  const TransferFunction f{"fog behind a gap",
+                           {{0.0, {0, 0, 1}, 0},
+                            {0.31, {0.2, 0.9, 0.4}, 0},
+                            {0.6, {0.7, 0.1, 0.3}, 0.5},
+                            {0.7, {0.7, 0.1, 0.3}, 0.5},
+                            {0.7, {0.1, 1, 0.1}, 0},
+                            {1.0, {0.1, 1, 0.1}, 0}}};
+  const RangeTable t = make_range_table(f, 0.05);
+  const auto row_at = [&](double value) {
+    const auto bin = static_cast<std::size_t>((static_cast<float>(value) - t.lo) * t.scale);
+    return std::pair{t.rows[2 * bin], t.rows[2 * bin + 1]};
+  };
+  for (const double clear : {0.1, 0.3, 0.8, 0.95}) {
+    const auto [low, high] = row_at(clear);
+    BOOST_TEST(low.s[0] == 0);
+    for (const float colour : {low.s[2], low.s[3], high.s[0], high.s[1], high.s[2], high.s[3]})
+      BOOST_TEST(colour == -std::numeric_limits<float>::infinity());
+  }
+  // Opacity begins in this bin, whose colour is that of the point where it is still 0.
+  const auto [low, high] = row_at(0.31);
+  BOOST_TEST(low.s[0] > 0);
+  BOOST_TEST(static_cast<double>(low.s[3]) >= 0.9);
+  BOOST_TEST(static_cast<double>(low.s[3]) < 0.91);
+  BOOST_TEST(static_cast<double>(-high.s[1]) <= 0.2);
+}

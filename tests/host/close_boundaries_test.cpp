@@ -26,6 +26,7 @@ struct Case {
   unsigned seed = 1;
   double offset_of_levels = 0;  ///< samples of level l lie this much times l beside gold, as fitted ones do
   LevelTriple coarsening{};
+  bool tolerances = false;  ///< bricks have tolerances of their own
 };
 
 const std::vector<LevelTriple> isotropic{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
@@ -86,6 +87,8 @@ OpenBricks random_bricks(const Case& c) {
           tile.push_back(own * gold_at({node(0, x), node(1, y), node(2, z)}, c.rate) + beside);
     b.samples.put(b.level.size() - 1, tile);
   }
+  for (std::size_t i = 0; c.tolerances && i < b.level.size(); ++i)
+    b.tolerance.push_back(std::exp2(-6 * static_cast<float>(unit(random))));
   return b;
 }
 
@@ -325,6 +328,42 @@ BOOST_AUTO_TEST_CASE(coefficients_that_differ_between_levels_close_too) {
       c.triples = anisotropic;
       check_closed(c, {Closing::coarse, storage});
     }
+}
+
+BOOST_AUTO_TEST_CASE(bricks_with_tolerances_of_their_own_close_too) {
+  for (const StorageChoice storage : storages)
+    for (const double involved : {1.0, 0.7})
+      for (const unsigned seed : {31u, 32u})
+        check_closed({{12, 10, 8}, 2, 4, anisotropic, involved, seed, 0.1, {}, true},
+                     {Closing::coarse, storage});
+}
+
+BOOST_AUTO_TEST_CASE(the_strictest_that_is_not_of_the_base_owns_what_is_shared) {
+  // Two bricks side by side along x, alike along the face; what they fitted differs.
+  Case c{{4, 2, 2}, 2, 4, {{1, 1, 1}, {1, 1, 2}}, 1.0, 1, 0.1};
+  OpenBricks open = random_bricks(c);
+  while (open.level[0] == open.level[1]) {
+    ++c.seed;
+    open = random_bricks(c);
+  }
+  const std::size_t coarse = open.level[0] == LevelTriple{1, 1, 1} ? 0 : 1, fine = 1 - coarse;
+  const auto on_face = [&](std::size_t brick, const MixedVolume& v) {
+    return *stored_at(v, {static_cast<std::int64_t>(brick), 0, 0}, {8, 2, 2});
+  };
+  const auto own = [&](std::size_t brick) { return on_face(brick, close_boundaries(open, Closing::none)); };
+  BOOST_REQUIRE(own(coarse) != own(fine));
+  BOOST_TEST(on_face(fine, close_boundaries(open)) == own(coarse));
+  open.tolerance.assign(2, 0.25f);
+  BOOST_TEST(on_face(fine, close_boundaries(open)) == own(coarse));
+  open.tolerance[fine] = 0.01f;
+  BOOST_TEST(on_face(fine, close_boundaries(open)) == own(fine));
+  BOOST_TEST(on_face(coarse, close_boundaries(open)) == own(fine));
+  // Nobody can give the base another value.
+  open.level[coarse] = {0, 0, 0};
+  open.samples.put(coarse, {});
+  const MixedVolume v = close_boundaries(open);
+  BOOST_TEST(*stored_at(v, {static_cast<std::int64_t>(fine), 0, 0}, {8, 4, 4}) ==
+             open.base[(1 * 3 + 1) * 5 + 2]);
 }
 
 BOOST_AUTO_TEST_CASE(integers_are_within_half_a_step_of_what_float32_stores) {

@@ -85,6 +85,39 @@ BOOST_AUTO_TEST_CASE(inside_waits_for_a_border_that_raises_others) {
   BOOST_TEST((raised(pair_of({1, 2, 2}, {1, 0, 0}), 0, inside)[0] == LevelTriple{2, 2, 2}));
 }
 
+// What a looser brick fitted lies beside F by what it is allowed: finer samples of the strict one do not mend
+// it.
+BOOST_AUTO_TEST_CASE(a_part_whose_samples_a_looser_brick_gives_raises_that_one) {
+  OpenBricks b = pair_of({1, 1, 1}, {1, 1, 0});
+  b.tolerance = {0.008f, 0.0105f};  // nearly alike: the coarser owns the face
+  BOOST_TEST((raised(b, 0, high_x)[0] == LevelTriple{1, 1, 1}));
+  BOOST_TEST((raised(b, 0, high_x)[1] == LevelTriple{1, 1, 1}));
+  // The strict one owns it.
+  b.tolerance = {0.008f, 0.2f};
+  BOOST_TEST((raised(b, 0, high_x)[0] == LevelTriple{2, 2, 2}));
+  BOOST_TEST((raised(b, 0, high_x)[1] == LevelTriple{1, 1, 0}));
+  // Whoever reads the base keeps it from that.
+  b.level = {{0, 0, 2}, {0, 0, 0}};
+  BOOST_TEST((raised(b, 0, high_x)[0] == LevelTriple{0, 0, 2}));
+  BOOST_TEST((raised(b, 0, high_x)[1] == LevelTriple{1, 1, 1}));
+}
+
+BOOST_AUTO_TEST_CASE(a_face_waits_for_its_edges_where_bricks_have_tolerances) {
+  // Four bricks around an edge along z; the one across it is coarser along z.
+  OpenBricks b;
+  b.grid.cells = {8, 8, 4};
+  b.grid.spacing = {1, 1, 1};
+  b.level = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {0, 1, 1}};
+  b.involved = {1, 1, 1, 1};
+  b.samples.resize(4);
+  const std::uint32_t edge = bit(2, 2, 1);
+  BOOST_TEST((raised(b, 0, edge | high_x)[0] == LevelTriple{2, 2, 2}));
+  b.tolerance = {0.01f, 0.01f, 0.01f, 0.2f};
+  const auto to = raised(b, 0, edge | high_x);
+  BOOST_TEST((to[0] == LevelTriple{1, 1, 1}));
+  BOOST_TEST((to[3] == LevelTriple{1, 1, 1}));
+}
+
 BOOST_AUTO_TEST_CASE(at_the_gold_rate_the_others_rise_until_all_are_there) {
   const LevelTriple gold{top, top, top};
   BOOST_TEST((raised(pair_of(gold, {3, 3, 1}), 0, high_x) == std::vector<LevelTriple>{gold, {3, 3, 2}}));
