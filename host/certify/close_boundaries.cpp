@@ -9,6 +9,7 @@
 
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
+#include "host/system/scratch_pass.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
@@ -97,7 +98,12 @@ MixedVolume CloseBoundaries::volume(const MixedVolume* before) {
   v.step = open_.lattice.step;
   v.tile.assign(v.level.size(), 0);
   number_tiles(v);
+  ScratchPass pass;
+  open_.samples.add_to(pass);
+  pass.add(v);
+  if (before) pass.add(*before);
   for_each_tile([&](std::int64_t i) {
+    pass.touched(3 * sizeof(float) * count(v.tile_size(v.level[at(i)])));
     const StoredTile to = stored_tile(v, at(i));
     SampleBlock& block = v.tiles.at(to.kind);
     if (made_[at(i)]) pack(tile_of(i), open_.lattice, shift_[at(i)], to.number, block);
@@ -196,14 +202,19 @@ void CloseBoundaries::find_steps() {
   for (bool stable = false; !stable;) {
     update_units();
     Pass pass{type_, shift_, std::vector<std::int8_t>(shift_.size(), 0)};
+    ScratchPass touched;
+    open_.samples.add_to(touched);
     const Pass* known = passes_.size() < before.size() ? &before[passes_.size()]
                         : passes_.empty()              ? nullptr
                                                        : &passes_.back();
     const std::vector<std::uint8_t> open =
         known ? with_neighbours(unlike(*known, passes_.size() < before.size()))
               : std::vector<std::uint8_t>(shift_.size(), 1);
-    for_each_tile(
-        [&](std::int64_t i) { pass.needed[at(i)] = open[at(i)] ? needed_shift(i) : known->needed[at(i)]; });
+    const MixedVolume shape = open_.shape();
+    for_each_tile([&](std::int64_t i) {
+      if (open[at(i)]) touched.touched(sizeof(float) * count(shape.tile_size(stored_.level[at(i)])));
+      pass.needed[at(i)] = open[at(i)] ? needed_shift(i) : known->needed[at(i)];
+    });
     stable = pass.needed == shift_;
     shift_ = pass.needed;
     passes_.push_back(std::move(pass));
@@ -260,8 +271,12 @@ std::vector<std::uint8_t> changed_bricks(const MixedVolume& before, const MixedV
                                          const std::vector<std::uint8_t>& among) {
   std::vector<std::uint8_t> changed(after.level.size(), 0);
   const Bricks bricks(after.grid, after.granularity);
+  ScratchPass pass;
+  pass.add(before);
+  pass.add(after);
   for_each_brick(changed.size(), [&](std::int64_t i) {
     if (!among.empty() && !among[at(i)]) return;
+    pass.touched(2 * sizeof(float) * count(after.tile_size(after.level[at(i)])));
     if (before.level[at(i)] != after.level[at(i)]) {
       changed[at(i)] = 1;
       return;

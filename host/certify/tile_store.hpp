@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/system/scratch_pass.hpp"
 #include "vdvr/sample_array.hpp"
 
 namespace vdvr {
@@ -48,6 +49,9 @@ class TileStore {
     std::fill(places_.begin(), places_.end(), Place{});
     parts_.clear();
     bytes_ = memory_bytes_ = used_ = 0;
+  }
+  void add_to(ScratchPass& pass) const {
+    for (const Samples<float>& part : parts_) pass.add(part);
   }
   /// Of what lies in memory.
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }

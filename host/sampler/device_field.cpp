@@ -1,6 +1,10 @@
 // Uploads a stored field as it is stored: integers stay integers.
 #include "host/sampler/device_field.hpp"
 
+#include <algorithm>
+
+#include "host/system/scratch_pass.hpp"
+
 namespace vdvr {
 
 opencl::Defines field_defines(const MixedVolume& v, RecordKind records) {
@@ -24,8 +28,15 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
       grid(sampler_grid(v)),
       defines(field_defines(v, records.kind())),
       highest_place(vdvr::highest_place(v)) {
+  ScratchPass pass;
+  pass.add(v);
   const auto put = [&](const SampleBlock& block, std::uint64_t first) {
-    samples.write({static_cast<const std::uint8_t*>(block.data()), block.bytes()}, first);
+    const auto* from = static_cast<const std::uint8_t*>(block.data());
+    for (std::uint64_t at = 0; at < block.bytes(); at += ScratchPass::at_once) {
+      const std::uint64_t n = std::min(ScratchPass::at_once, block.bytes() - at);
+      samples.write({from + at, n}, first + at);
+      pass.touched(n);
+    }
   };
   put(v.base, 0);
   const auto offsets = tile_offsets(v);

@@ -10,6 +10,7 @@
 
 #include "host/sampler/resident_volume.hpp"
 #include "host/system/parallel.hpp"
+#include "host/system/scratch_pass.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {
@@ -20,11 +21,16 @@ FieldSlopes field_slopes(const MixedVolume& v) {
   out.bricks.resize(v.level.size());
   out.integers = sample_types(v) != 1 << VDVR_F32;
   std::mutex lock;
+  ScratchPass pass;
+  pass.add(v);
   parallel_for(bricks[2] * bricks[1], {}, "slopes", [&](std::int64_t row) {
     std::array<double, 3> per_cell{0, 0, 0};
     const std::int64_t bz = row / bricks[1], by = row % bricks[1];
     for (std::int64_t bx = 0; bx < bricks[0]; ++bx) {
       const BrickSamples stored(v, {bx, by, bz});
+      pass.touched(sizeof(float) *
+                   static_cast<std::uint64_t>(v.tile_size(
+                       v.level[static_cast<std::size_t>((bz * bricks[1] + by) * bricks[0] + bx)])));
       const std::array<int, 3> finer = stored.per_cell();
       const Index3& end = stored.end();
       std::array<float, 3> largest{0, 0, 0};

@@ -19,6 +19,7 @@
 #include "host/hdf5/hdf5_writer.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
+#include "host/system/scratch_pass.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
@@ -470,13 +471,23 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
 
 std::string content_sha256(const MixedVolume& v) {
   Sha256 hash;
+  ScratchPass pass;
+  pass.add(v);
+  const auto add_samples = [&](const SampleBlock& block) {
+    const auto* from = static_cast<const std::byte*>(block.data());
+    for (std::uint64_t at = 0; at < block.bytes(); at += ScratchPass::at_once) {
+      const std::uint64_t n = std::min(ScratchPass::at_once, block.bytes() - at);
+      hash.update(from + at, n);
+      pass.touched(n);
+    }
+  };
   add_grid(hash, v);
   const bool integers = has_integers(v);
   if (integers) hash.update(&v.step, sizeof v.step);
-  hash.update(v.base.data(), v.base.bytes());
+  add_samples(v.base);
   add(hash, std::span<const LevelTriple>(v.level));
   add(hash, std::span<const std::uint32_t>(v.tile));
-  for (const auto& [triple, block] : v.tiles) hash.update(block.data(), block.bytes());
+  for (const auto& [triple, block] : v.tiles) add_samples(block);
   // The base's offset and shift are attributes: 64 bits.
   if (v.base.type != SampleType::f32) {
     const std::array<std::int64_t, 1> offset{v.base.offset.front()};
