@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "vdvr/error.hpp"
 
@@ -26,13 +27,17 @@ std::vector<double> shares(const std::vector<float>& samples, double lo, double 
   return bins;
 }
 
-double diameter(const Grid& grid) {
-  double squares = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double side = static_cast<double>(grid.cells[a]) * grid.spacing[a];
-    squares += side * side;
-  }
-  return std::sqrt(squares);
+/// Of the sphere that fits the picture at zoom 1.
+double diameter(const OrbitFrame& frame) {
+  return 2 * frame.distance * std::sin(Camera{}.view_angle_deg / 2 * std::numbers::pi / 180);
+}
+
+OrbitFrame first_frame(const MixedVolume& volume, const Brightness& brightness) {
+  if (is_thin(volume.grid)) return frame_grid(volume.grid);
+  RenderOptions o;
+  o.height = o.width;
+  o.transfer = two_material_transfer(brightness);
+  return frame_turn(volume, o, LiveView{}.elevation_deg);
 }
 
 void require(bool good, const std::string& what) {
@@ -54,6 +59,7 @@ LiveScene live_scene(const MixedVolume& volume, const std::optional<Certificate>
   LiveScene scene;
   scene.grid = volume.grid;
   scene.brightness = brightness_of(volume);
+  scene.frame = first_frame(volume, scene.brightness);
   const std::vector<float> samples = on_grid(volume).samples;
   const auto [lo, hi] = std::minmax_element(samples.begin(), samples.end());
   scene.range = {static_cast<double>(*lo), static_cast<double>(*hi)};
@@ -104,13 +110,13 @@ void check_view(const LiveView& v, const LiveScene& scene) {
           "the volume has no certificate to take a bound from");
 }
 
-Camera camera_of(const LiveView& view, const Grid& grid) {
-  Camera camera = orbit_camera(grid, view.azimuth_deg, view.elevation_deg, view.zoom);
+Camera camera_of(const LiveView& view, const OrbitFrame& frame) {
+  Camera camera = orbit_camera(frame, view.azimuth_deg, view.elevation_deg, view.zoom);
   if (view.pan[0] == 0 && view.pan[1] == 0) return camera;
   const Vec3 forward{camera.focal_point[0] - camera.position[0], camera.focal_point[1] - camera.position[1],
                      camera.focal_point[2] - camera.position[2]};
   const Vec3 right = unit(cross(forward, camera.view_up)), up = unit(camera.view_up);
-  const double d = diameter(grid);
+  const double d = diameter(frame);
   for (std::size_t a = 0; a < 3; ++a) {
     const double shift = d * (view.pan[1] * up[a] - view.pan[0] * right[a]);
     camera.position[a] += shift;
@@ -125,7 +131,7 @@ RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int6
   o.mode = view.mode;
   o.width = width;
   o.height = height;
-  o.camera = camera_of(view, scene.grid);
+  o.camera = camera_of(view, scene.frame);
   o.transfer = view.transfer;
   o.surfaces = {{view.iso}};
   o.slice_axis = view.slice_axis;
@@ -165,7 +171,7 @@ std::vector<std::string> render_words(const LiveView& v, const LiveScene& scene,
   if (!v.shading && v.mode != RenderMode::mip) words.emplace_back("--no-shading");
   if (v.clip) add("--clip", fmt::format("{}", fmt::join(*v.clip, ",")));
   // In full, so that nothing depends on what `render` frames by itself.
-  const Camera c = camera_of(v, scene.grid);
+  const Camera c = camera_of(v, scene.frame);
   const auto vec = [](const Vec3& p) { return fmt::format("{},{},{}", p[0], p[1], p[2]); };
   add("--camera-position", vec(c.position));
   add("--camera-focal-point", vec(c.focal_point));

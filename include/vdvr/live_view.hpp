@@ -12,6 +12,7 @@
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/export.hpp"
+#include "vdvr/framing.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
@@ -24,18 +25,22 @@ struct LiveScene {
   Brightness brightness;
   std::pair<double, double> range{0, 0};  ///< of the samples on the grid
   std::vector<double> histogram;          ///< shares of these samples in equal bins over `range`
+  /// What orbits look at, and from how far at zoom 1: all that the first transfer function shows in a whole
+  /// turn of a picture as high as wide; of thin volumes the grid.
+  OrbitFrame frame;
   SamplerKind sampler = SamplerKind::automatic;
   bool has_bounds = false;  ///< there is a certificate, with bounds by brick
   double epsilon_abs = 0;   ///< of it
 };
-/// Cost: brightness_of and one more pass over the samples. Host only.
+/// Cost: brightness_of, shown_points and one more pass over the samples. Host only.
 VDVR_API LiveScene live_scene(const MixedVolume& volume, const std::optional<Certificate>& certificate = {});
 
 /// Of one view; angles as orbit_camera has them.
 struct LiveView {
   RenderMode mode = RenderMode::dvr;  ///< error: the certificate's bound on the slice
   double azimuth_deg = 30, elevation_deg = 20, zoom = 1;
-  /// Where the picture shows the volume's centre, to the right and down, in diameters of the bounding sphere.
+  /// Where the picture shows the middle of the scene's frame, to the right and down, in diameters of the
+  /// sphere that fits the picture from there.
   std::array<double, 2> pan{0, 0};
   TransferFunction transfer;                    ///< of modes dvr and mip; opacities of one base cell
   double iso = 0;                               ///< the surface's density
@@ -54,7 +59,7 @@ VDVR_API LiveView first_view(const LiveScene& scene, std::int64_t width, std::in
 VDVR_API void check_view(const LiveView& view, const LiveScene& scene);
 
 /// Without a pan it is orbit_camera() to the bit.
-VDVR_API Camera camera_of(const LiveView& view, const Grid& grid);
+VDVR_API Camera camera_of(const LiveView& view, const OrbitFrame& frame);
 /// What the still picture of a view is drawn with: by Renderer::render, but for mode error and the bound's
 /// colours (live_renderer.hpp).
 VDVR_API RenderOptions options_of(const LiveView& view, const LiveScene& scene, std::int64_t width,

@@ -15,6 +15,7 @@ constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 LiveScene scene() {
   LiveScene s;
   s.grid = Grid{{20, 30, 40}, {-10, -15, -20}, {1, 1, 1}};
+  s.frame = frame_grid(s.grid);
   s.brightness = Brightness{0, 1, 0.1, 0.9, 0.5, 0.2, {1, 2, 3}};
   s.range = {-0.25, 1.75};
   s.histogram = {1};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "tests/support/fields.hpp"
 #include "tests/support/tolerance.hpp"
@@ -18,6 +19,7 @@ namespace {
 LiveScene scene_of_a_box() {
   LiveScene s;
   s.grid = Grid{{20, 30, 40}, {-10, -15, -20}, {1, 1, 1}};
+  s.frame = frame_grid(s.grid);
   s.brightness = Brightness{0, 1, 0.1, 0.9, 0.5, 0.2, {1, 2, 3}};
   s.range = {-0.25, 1.75};
   s.histogram = {0.5, 0.5};
@@ -97,6 +99,27 @@ const Vec3 kCentre{0, 0, 0};
 
 }  // namespace
 
+BOOST_AUTO_TEST_CASE(what_is_shown_is_orbited_not_the_grid) {
+  // A ball of radius 16, dense in its middle, aside of the middle of a grid of 64 cells.
+  const Grid grid{{64, 64, 64}, {-32, -32, -32}, {1, 1, 1}, "mm"};
+  const Vec3 middle{10, -12, 8};
+  const auto density = [&](double x, double y, double z) {
+    const Vec3 d{x - middle[0], y - middle[1], z - middle[2]};
+    return static_cast<float>(std::max(0.0, 1 - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / 256));
+  };
+  Volume v{grid, {}};
+  for (int z = -32; z <= 32; ++z)
+    for (int y = -32; y <= 32; ++y)
+      for (int x = -32; x <= 32; ++x) v.samples.push_back(density(x, y, z));
+  const OrbitFrame frame = live_scene(as_mixed(v)).frame;
+  // A cell around what is shown counts, and blocks of a few cells.
+  for (std::size_t a = 0; a < 3; ++a) BOOST_TEST(std::abs(frame.middle[a] - middle[a]) <= 2);
+  BOOST_TEST(frame.distance < frame_grid(grid).distance / 2);
+  // The denser half of it is in the picture, whichever way it is turned: within half the view angle, 15
+  // degrees.
+  BOOST_TEST(frame.distance * std::sin(std::numbers::pi / 12) >= 8);
+}
+
 BOOST_AUTO_TEST_CASE(left_drag_turns_the_volume_with_the_hand) {
   const LiveState right = dragged(start(), 1, 200, 0);
   BOOST_TEST(near(right.view.azimuth_deg, 30 - 180));
@@ -107,8 +130,8 @@ BOOST_AUTO_TEST_CASE(left_drag_turns_the_volume_with_the_hand) {
   LiveState s = start();
   s.view.azimuth_deg = s.view.elevation_deg = 0;  // seen from +y
   const Vec3 front{0, 10, 0};
-  const auto before = seen_at(camera_of(s.view, scene().grid), front);
-  const auto after = seen_at(camera_of(dragged(s, 1, 10, 10).view, scene().grid), front);
+  const auto before = seen_at(camera_of(s.view, scene().frame), front);
+  const auto after = seen_at(camera_of(dragged(s, 1, 10, 10).view, scene().frame), front);
   BOOST_TEST(after[0] > before[0]);
   BOOST_TEST(after[1] > before[1]);
 }
@@ -132,7 +155,7 @@ BOOST_AUTO_TEST_CASE(a_pan_moves_the_centre_by_the_way_of_the_pointer) {
     LiveState s = start();
     s.view.zoom = zoom;
     for (const auto& moved : {dragged(s, 3, 60, -20), dragged(s, 1, 60, -20, true)}) {
-      const auto at = seen_at(camera_of(moved.view, scene().grid), kCentre);
+      const auto at = seen_at(camera_of(moved.view, scene().frame), kCentre);
       BOOST_TEST(near(at[0], 60.0 / 200));
       BOOST_TEST(near(at[1], -20.0 / 200));
       BOOST_TEST(moved.view.azimuth_deg == s.view.azimuth_deg);
@@ -142,7 +165,7 @@ BOOST_AUTO_TEST_CASE(a_pan_moves_the_centre_by_the_way_of_the_pointer) {
 
 BOOST_AUTO_TEST_CASE(without_a_pan_the_camera_is_that_of_render_to_the_bit) {
   const LiveState s = start();
-  const Camera a = camera_of(s.view, scene().grid), b = orbit_camera(scene().grid, 30, 20, 1);
+  const Camera a = camera_of(s.view, scene().frame), b = orbit_camera(scene().grid, 30, 20, 1);
   BOOST_TEST((a.position == b.position && a.focal_point == b.focal_point && a.view_up == b.view_up));
   BOOST_TEST(a.view_angle_deg == b.view_angle_deg);
 }
@@ -231,7 +254,7 @@ BOOST_AUTO_TEST_CASE(a_high_picture_shows_the_whole_volume) {
 BOOST_AUTO_TEST_CASE(views_along_an_axis_have_the_others_where_slices_have_them) {
   for (const int axis : {0, 1, 2}) {
     const LiveState s = pressed(start(), std::string(1, "xyz"[axis]));
-    const Camera c = camera_of(s.view, scene().grid);
+    const Camera c = camera_of(s.view, scene().frame);
     Vec3 across{}, down{};
     across[axis == 0 ? 1 : 0] = 1;
     down[axis == 2 ? 1 : 2] = 1;
