@@ -1,4 +1,4 @@
-// Frames of a D2vrScene, and what the classes hold on the device. Called by: render_crew.cpp,
+// Frames of a D2vrScene, and what the classes hold on the device. Called by: renderer.cpp,
 // tests/device/d2vr_test.cpp.
 #pragma once
 

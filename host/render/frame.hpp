@@ -1,6 +1,6 @@
 // What a renderer keeps on the device from one picture to the next, so that a turntable allocates and
 // computes nothing twice: picture, transfer function, which bricks can be leapt over, bounds. Called by:
-// raycast.cpp, d2vr.cpp, render_crew.cpp.
+// raycast.cpp, d2vr.cpp, renderer.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Frames of volumes that are brought to the device by bricks: which bricks the rays of a part of the picture
-// may read, and parts small enough that theirs fit. Called by: render_crew.cpp.
+// may read, and parts small enough that theirs fit. Called by: renderer.cpp.
 #pragma once
 
 #include <optional>

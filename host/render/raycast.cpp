@@ -1,5 +1,5 @@
 // Launches the ray-caster over resident volumes: chooses sampler, gradients and packets. Called by
-// render_crew.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive,
+// renderer.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive,
 // raycast_iso, raycast_mip, slice of kernels/render/raycast.cl.
 #include "host/render/raycast.hpp"
 

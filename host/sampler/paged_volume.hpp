@@ -1,5 +1,5 @@
 // What a PagedVolume knows of its bricks, and how the tiles of some of them become a volume on the device.
-// Called by paged_frame.cpp, render_crew.cpp.
+// Called by paged_frame.cpp, renderer.cpp.
 #pragma once
 
 #include <cstdint>

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "vdvr/error.hpp"
+#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {

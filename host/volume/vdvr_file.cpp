@@ -25,6 +25,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {

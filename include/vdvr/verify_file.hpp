@@ -15,10 +15,6 @@ namespace vdvr {
 /// numbers do not follow from each other. Throws as read_vdvr, MismatchError naming the path.
 VDVR_API VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
-/// The same of read_large_vdvr: samples that do not fit the limit lie in scratch files.
-VDVR_API VdvrFile read_large_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
-                                       const std::filesystem::path& scratch);
-
 /// The same for verify_file: altered samples stay in VdvrFile::altered, since they can be measured. Throws
 /// MismatchError for a broken seal over samples that are whole, since a certificate that is not the one
 /// written has nothing to compare with, for one that contradicts itself, and for a volume for comparison,

@@ -8,6 +8,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/read_large.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {

@@ -1,5 +1,5 @@
-// Renderers of one device and of several, and the one-shot forms: draws by raycast.cpp, paged_frame.cpp or
-// d2vr.cpp, converts pixels to values and 8 bits. Called by the render, run and bench commands.
+// Renderers and the one-shot forms: draws by raycast.cpp or d2vr.cpp, converts pixels to values and 8 bits.
+// Called by the render, run and bench commands.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
