@@ -6,7 +6,7 @@
 // What rays may read: the pixels of a part span a pyramid from the eye. Every brick that meets it, made wider
 // by what rounding can move a ray, holds samples or belongs to none; gradients reach half a cell beyond, into
 // bricks that touch those.
-#include "host/render/paged_frame.hpp"
+#include "host/render/raycast.hpp"
 
 #include <fmt/format.h>
 

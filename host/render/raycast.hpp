@@ -6,12 +6,14 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "host/opencl/kernel.hpp"
 #include "host/render/frame.hpp"
+#include "host/sampler/paged_volume.hpp"
 #include "host/sampler/resident_volume.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -104,5 +106,23 @@ struct FloatPicture {
 FloatPicture read_frame(const Frame& frame, const Enqueued& enqueued);
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
+
+/// Values and picture of a frame's pixels (renderer.cpp).
+void convert(std::span<const cl_float4> pixels, const RenderOptions& options, RenderResult& result);
+
+// --- volumes that come by bricks (paged_frame.cpp) ---
+
+DrawnField drawn_field(const PagedVolume& volume);
+/// Always `buffer`. Throws ResourceError for image3d: the positions of samples in an atlas have the rounding
+/// of their coordinates there, so that other tiles beside them would change bits.
+std::pair<SamplerKind, std::string> choose_sampler(SamplerKind asked);
+/// Whether GradientKind::automatic takes stored gradients: what a device of which half is free
+/// would do for the whole volume.
+bool stored_would_fit(const PagedVolume& volume);
+/// Draws part after part, and waits for each: bricks of the next take the place of those before. `frame` is
+/// of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render, and ResourceError
+/// where the bricks of a few pixels do not fit.
+Enqueued enqueue_frame(Frame& frame, Device& device, const PagedVolume& volume, const RenderOptions& options,
+                       const RaycastTuning& tuning = {}, std::optional<Rows> rows = std::nullopt);
 
 }  // namespace vdvr

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {
@@ -16,13 +15,6 @@ void check_consistency(const std::filesystem::path& path, const Certificate& c) 
 }
 
 }  // namespace
-
-VdvrFile read_large_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
-                              const std::filesystem::path& scratch) {
-  VdvrFile file = read_large_vdvr(path, max_memory_bytes, scratch, Altered::refuse);
-  check_consistency(path, file.certificate);
-  return file;
-}
 
 VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   VdvrFile file = read_vdvr(path, max_memory_bytes, Altered::refuse);

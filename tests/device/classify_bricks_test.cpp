@@ -44,7 +44,7 @@ struct Case {
     tolerance = tolerance_of_range * static_cast<double>(*high - *low);
     const GoldSettings& s = gold.fine().settings();
     const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
-    bricks = {grid, s.granularity, s.rate, {}, base.samples, {}, {}, {}, {}, false};
+    bricks = {grid, s.granularity, s.rate, {}, base.samples, {}, {}, {}, {}, false, {}};
     bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
     bricks.involved.assign(near.size(), 0);
     bricks.samples.resize(near.size());
