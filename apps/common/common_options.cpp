@@ -9,7 +9,7 @@ namespace vdvr::cli {
 void add_common(Arguments& args) {
   args.group("Common")
       .value("device", "INDEX|cpu|gpu|NAME",
-             "OpenCL device; build and run take several, as 0,1 or all (default: a GPU if "
+             "OpenCL device; build, run and render take several, as 0,1 or all (default: a GPU if "
              "there is one)")
       .value("max-memory", "2G",
              "limit of our host and device allocations together (default: half of what is free)")

@@ -1,5 +1,5 @@
-// vdvr-mpi: plan, build, verify and run as ranks of an MPI job (docs/scaling.md). Rank 0 is the program
-// `vdvr` with the other ranks at hand; these compute blocks until it is done.
+// vdvr-mpi: plan, build, verify, render and run as ranks of an MPI job (docs/scaling.md). Rank 0 is the
+// program `vdvr` with the other ranks at hand; these compute blocks until it is done.
 #include <fmt/format.h>
 #include <mpi.h>
 
@@ -16,6 +16,7 @@
 #include "apps/mpi/mpi_messenger.hpp"
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/frames.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -28,7 +29,7 @@ std::vector<Command> commands_of_ranks() {
   std::vector<Command> out;
   for (Command command : commands()) {
     const std::string name = command.name;
-    if (name != "plan" && name != "build" && name != "verify" && name != "run") continue;
+    if (name != "plan" && name != "build" && name != "verify" && name != "run" && name != "render") continue;
     command.program = program;
     out.push_back(command);
   }
@@ -47,7 +48,9 @@ void print_overview() {
       VDVR_VERSION, purpose);
   for (const Command& c : known()) fmt::print("  {:<16} {}\n", c.name, c.purpose);
   fmt::print(
-      "\nbuild and run spread their blocks over all ranks; plan and verify are rank 0's alone.\n"
+      "\nbuild and run spread their blocks over all ranks, render the frames of a turntable in a folder; "
+      "plan,\n"
+      "verify and single pictures are rank 0's alone.\n"
       "Options are those of vdvr, whose man pages have them: man vdvr-build.\n");
 }
 
@@ -91,9 +94,23 @@ int lead(const std::vector<std::string>& words) {
   return fail(program, fmt::format("unknown command '{}'; `vdvr-mpi --help` lists them", words[0]), 2);
 }
 
+// Frames that this rank does not draw rank 0 will, and say why it could not.
+int follow_render(MpiMessenger& messenger, std::vector<std::string> words) {
+  if (!wait_for_frames(messenger)) return 0;
+  set_messenger(&messenger);
+  follow_frames(messenger, messenger.rank());
+  std::erase(words, "--json");
+  words.emplace_back("--quiet");
+  for (const Command& command : known())
+    if (words[0] == command.name) run_guarded(command, {words.begin() + 1, words.end()});
+  end_frames(messenger);
+  return 0;
+}
+
 // What a rank could not do, rank 0 has said, and has given to others.
-int follow(MpiMessenger& messenger) {
+int follow(MpiMessenger& messenger, const std::vector<std::string>& words) {
   try {
+    if (!words.empty() && words[0] == "render") return follow_render(messenger, words);
     serve(messenger);
     return 0;
   } catch (const std::exception& e) {
@@ -108,7 +125,7 @@ int run(const std::vector<std::string>& words) {
   {
     MpiMessenger messenger;
     if (messenger.rank() != 0) {
-      code = follow(messenger);
+      code = follow(messenger, words);
     } else {
       if (messenger.others() > 0) set_messenger(&messenger);
       code = lead(words);

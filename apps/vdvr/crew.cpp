@@ -17,8 +17,9 @@ Messenger* the_messenger = nullptr;
 
 constexpr std::int64_t longest_wait = 86400;
 
-// What one Device is opened with, each.
-std::vector<std::string> selectors(const std::string& text) {
+}  // namespace
+
+std::vector<std::string> device_selectors(const std::string& text) {
   std::vector<std::string> out;
   if (text == "all") {
     for (const DeviceInfo& info : Device::list()) out.push_back(std::to_string(info.index));
@@ -39,8 +40,6 @@ std::vector<std::string> selectors(const std::string& text) {
   return out;
 }
 
-}  // namespace
-
 void add_crew(Arguments& args) {
   args.group("Several devices (--device 0,1 or all)")
       .flag("mixed-devices",
@@ -51,9 +50,15 @@ void add_crew(Arguments& args) {
              "elsewhere (default 300)");
 }
 
-std::string first_device(const Arguments& args) { return selectors(args.text_or("device", "")).front(); }
+std::string first_device(const Arguments& args) {
+  return device_selectors(args.text_or("device", "")).front();
+}
 
 void set_messenger(Messenger* messenger) { the_messenger = messenger; }
+
+Messenger* frames_messenger() { return the_messenger; }
+int processes_here() { return the_messenger ? std::max(1, the_messenger->neighbours()) : 1; }
+int place_here() { return the_messenger ? the_messenger->place() : 0; }
 
 Devices::Devices(const Arguments& args, const CommonOptions& common) {
   options_.messenger = the_messenger;
@@ -61,7 +66,7 @@ Devices::Devices(const Arguments& args, const CommonOptions& common) {
   options_.give_up = std::chrono::seconds(args.integer_or("give-up", 300, 1, longest_wait));
   const std::string who = args.who();
   options_.say = [who](const std::string& text) { say(fmt::format("{}: {}\n", who, text)); };
-  std::vector<std::string> all = selectors(common.device);
+  std::vector<std::string> all = device_selectors(common.device);
   std::uint64_t sharing = all.size();
   if (the_messenger) {
     // Each process takes one of the list, this one the first.

@@ -18,6 +18,15 @@ void add_crew(Arguments& args);
 /// To the other processes of this program; none: it is alone. Set before a command runs.
 void set_messenger(Messenger* messenger);
 
+/// What render uses of it: none where this process is alone, or follows (frames.hpp).
+Messenger* frames_messenger();
+/// Processes of this program on this machine, which share --max-memory, and the place of this one.
+int processes_here();
+int place_here();
+
+/// What each of the devices that --device names is opened with: of "0,1" or "all" several. Throws InputError.
+std::vector<std::string> device_selectors(const std::string& text);
+
 /// Of --device, what a command that takes one device would be given; empty: the default.
 std::string first_device(const Arguments& args);
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/read_large.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/verify_file.hpp"
@@ -87,8 +89,9 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
 
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {
   const CommonOptions common = common_options(args);
-  if (unverified) return read_vdvr(path, common.max_memory, Altered::report);
-  VdvrFile file = read_certified(path, common.max_memory);
+  const std::uint64_t memory = common.max_memory / static_cast<std::uint64_t>(processes_here());
+  if (unverified) return read_large_vdvr(path, memory, common.scratch, Altered::report);
+  VdvrFile file = read_large_certified(path, memory, common.scratch);
   if (file.seal == Seal::none && !common.quiet)
     say(
         fmt::format("{}: {} is unsealed: of an earlier version, or edited since; `vdvr verify` compares "

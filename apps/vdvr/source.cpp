@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
@@ -52,9 +55,45 @@ Source::Source(const Arguments& args, const CommonOptions& common, const std::st
     return;
   }
   scene_ = open_scene(args.path("FILE"), args, method, unverified);
-  device_.emplace(open_device(common));
-  resident_.emplace(*device_, scene_->volume);
-  renderer_.emplace(*device_, *resident_);
+  std::vector<std::string> selectors = device_selectors(common.device);
+  if (processes_here() > 1)  // each takes one of the list, in turn
+    selectors = {selectors[static_cast<std::size_t>(place_here()) % selectors.size()]};
+  const std::uint64_t memory =
+      common.max_memory / (selectors.size() * static_cast<std::uint64_t>(processes_here()));
+  device_.emplace(selectors.front(), memory);
+  // A volume without tiles has nothing that could come brick by brick: what it lacks, its own error says.
+  if (scene_->volume.tiles.empty() || fits(*device_, scene_->volume)) {
+    resident_.emplace(*device_, scene_->volume);
+    renderer_.emplace(*device_, *resident_);
+  } else {
+    report(progress, "find ranges", 0);
+    paged_.emplace(*device_, scene_->volume);
+  }
+  if (paged_ || selectors.size() > 1) open_others({selectors.begin() + 1, selectors.end()}, memory, progress);
+}
+
+void Source::open_others(const std::vector<std::string>& selectors, std::uint64_t memory,
+                         const Progress& progress) {
+  std::vector<RenderCrew::Member> members{
+      {&*device_, resident_ ? &*resident_ : nullptr, paged_ ? &*paged_ : nullptr}};
+  for (const std::string& selector : selectors) {
+    others_.push_back(
+        std::unique_ptr<Other>(new Other{Device(selector, memory), std::nullopt, std::nullopt}));
+    Other& other = *others_.back();
+    const DeviceInfo &a = device_->info(), &b = other.device.info();
+    if (a.name != b.name || a.driver != b.driver)
+      throw InputError(
+          fmt::format("--device: '{}' ({}) and '{}' ({}) may round differently, and pictures are those of "
+                      "one device: name "
+                      "devices of one kind",
+                      a.name, a.driver, b.name, b.driver));
+    report(progress, "open devices", 0);
+    if (resident_) other.resident.emplace(other.device, scene_->volume);
+    else other.paged.emplace(other.device, scene_->volume);
+    members.push_back(
+        {&other.device, other.resident ? &*other.resident : nullptr, other.paged ? &*other.paged : nullptr});
+  }
+  crew_.emplace(members);
 }
 
 void Source::open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress) {
@@ -64,6 +103,8 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
   const ProjectionSet scan = load_scan(args.path("FILE"), args, options.field, progress);
   ParallelGeometry geometry = scan.geometry;
   geometry.center = center_of(options.field, geometry);
+  if (device_selectors(common.device).size() > 1)
+    throw InputError("--device: --method d2vr draws on one device; volumes are drawn on several");
   // --size is the picture's.
   const Grid grid = make_grid(geometry, grid_options(args, "cells"));
   device_.emplace(open_device(common));
@@ -77,20 +118,33 @@ RenderResult Source::draw(const RenderOptions& options) {
   if (options.output == RenderOutput::error && !bounds_set_) {
     if (!scene_->certificate)
       throw InputError("--show error: the volume has no certificate to take bounds from");
-    const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
-    renderer_->set_bounds(brick_bounds(*scene_->certificate, image3d));
+    // By bricks it is always the buffer.
+    const bool image3d = renderer_ && renderer_->sampler(options.sampler) == SamplerKind::image3d;
+    const std::vector<float> bounds = brick_bounds(*scene_->certificate, image3d);
+    if (crew_) crew_->set_bounds(bounds);
+    else renderer_->set_bounds(bounds);
     bounds_set_ = true;
   }
-  return renderer_->render(options);
+  return crew_ ? crew_->render(options) : renderer_->render(options);
 }
 
 PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                             const Progress& progress) {
+  if (paged_)
+    throw ResourceError(
+        "--certify: intervals of pixels need the whole volume on the device, which has no room for it: raise "
+        "--max-memory, or take another --device");
   const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
   return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify,
                         progress);
 }
 
-std::uint64_t Source::bytes() const { return field_ ? field_->bytes() : resident_->bytes(); }
+std::uint64_t Source::bytes() const {
+  return field_ ? field_->bytes() : paged_ ? device_->peak_memory() : resident_->bytes();
+}
+
+std::optional<PagingCounts> Source::paging() const {
+  return paged_ ? std::optional(paged_->counts()) : std::nullopt;
+}
 
 }  // namespace vdvr::cli

@@ -1,6 +1,7 @@
 // What `render` and `bench render` draw: a volume on the device or, with --method d2vr, projections.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,7 +9,9 @@
 #include "apps/vdvr/pictures.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/d2vr.hpp"
+#include "vdvr/paged_volume.hpp"
 #include "vdvr/progress.hpp"
+#include "vdvr/render_crew.hpp"
 
 namespace vdvr::cli {
 
@@ -34,15 +37,29 @@ class Source {
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
   [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                                     const Progress& progress);
-  /// On the device beside what a frame needs: volume, or projections.
+  /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most
+  /// so far.
   [[nodiscard]] std::uint64_t bytes() const;
+  /// Of a volume that is brought to the device by bricks.
+  [[nodiscard]] std::optional<PagingCounts> paging() const;
 
  private:
   void open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress);
 
+  /// A further device of --device, with the volume on it.
+  struct Other {
+    Device device;
+    std::optional<ResidentVolume> resident;  ///< or
+    std::optional<PagedVolume> paged;
+  };
+  void open_others(const std::vector<std::string>& selectors, std::uint64_t memory, const Progress& progress);
+
   std::optional<Scene> scene_;
   std::optional<Device> device_;
-  std::optional<ResidentVolume> resident_;
+  std::optional<ResidentVolume> resident_;  ///< or
+  std::optional<PagedVolume> paged_;        ///< or
+  std::vector<std::unique_ptr<Other>> others_;
+  std::optional<RenderCrew> crew_;  ///< of all devices, where there are several, or of one by bricks
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;

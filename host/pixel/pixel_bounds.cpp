@@ -75,7 +75,7 @@ VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPic
   q.deep = static_cast<float>(std::log2(1 / c.theta));
   q.theta = static_cast<float>(c.theta);
   // docs/pixel-bounds.md, theorem 6: corners 7.5 u M, averages 3 u M, each cut of three lerps 8 u M.
-  const double largest = static_cast<double>(v.largest);
+  const double largest = static_cast<double>(v.facts->largest);
   q.slack = static_cast<float>(16 * kUnit * largest);
   q.part_slack = static_cast<float>(8 * kUnit * largest);
   // Entry and product: 4 u of the cells of an axis.
@@ -105,7 +105,7 @@ VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPic
 /// By brick 1 where F can show nothing, whatever is done to V in fp32.
 std::vector<std::uint8_t> clear_bricks(const Impl& v, const VdvrCertify& q, const RangeTable& table,
                                        const std::vector<float>& bounds, bool windowed) {
-  const float reach = std::ldexp(q.reach[0] + q.reach[1] + q.reach[2], v.highest_level);
+  const float reach = std::ldexp(q.reach[0] + q.reach[1] + q.reach[2], v.facts->highest_level);
   std::vector<std::uint8_t> clear(bounds.size());
   for (std::size_t i = 0; i < clear.size(); ++i) {
     const cl_float2 r = v.host_ranges[i];
@@ -167,8 +167,13 @@ class Launch {
                         {}, lanes),
         certify_, o_.shading);
     const BakedTransfer baked = bake(o_.transfer, o_.step, 1);
-    const DrawnField drawn{v_.state,       v_.grid,          v_.field.grid, v_.host_ranges,
-                           v_.value_range, v_.highest_level, v_.has_tile};
+    const DrawnField drawn{v_.state,
+                           v_.grid,
+                           v_.field.grid,
+                           v_.host_ranges,
+                           v_.facts->value_range,
+                           v_.facts->highest_level,
+                           v_.facts->has_tile};
     const VdvrRaycast p = make_params(drawn, o_, baked, q_.slack);
     const int height = static_cast<int>(o_.height);
     if (certify_.fast) {

@@ -20,7 +20,8 @@ using Impl = ResidentVolume::Impl;
 
 DrawnField drawn_field(const ResidentVolume& volume) {
   const Impl& v = volume.impl();
-  return {v.state, v.grid, v.field.grid, v.host_ranges, v.value_range, v.highest_level, v.has_tile};
+  const FieldFacts& f = *v.facts;
+  return {v.state, v.grid, v.field.grid, f.ranges, f.value_range, f.highest_level, f.has_tile};
 }
 
 // --- the sampler ---
@@ -42,12 +43,10 @@ std::pair<SamplerKind, std::string> choose_sampler(Device& device, const Residen
       fmt::format("measured {:.3g} samples/s by buffer, {:.3g} by image3d", p.buffer_rate, p.image3d_rate)};
 }
 
-namespace {
-
 // How far a sample may leave the range of its brick's samples: three nested lerps in fp32 stay within 14 u of
 // the largest (docs/error-bounds.md); the texture unit adds what the probe measured on constants, taken
 // twice.
-float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
+float range_slack(Device& device, const FieldFacts& v, SamplerKind sampler) {
   const double magnitude = std::max(std::abs(v.value_range.first), std::abs(v.value_range.second));
   double slack = 0x1p-20 * magnitude;
   if (sampler == SamplerKind::image3d)
@@ -55,31 +54,31 @@ float range_slack(Device& device, const Impl& v, SamplerKind sampler) {
   return static_cast<float>(slack);
 }
 
-}  // namespace
-
 // Packets address samples and records by 32-bit numbers.
-int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
+int lanes_for(const opencl::State& state, std::uint64_t highest_place, std::uint64_t record_words,
+              SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
   const bool lit = gradient == GradientKind::stored;  // then LitLayout::is_addressable() holds
-  if (sampler == SamplerKind::image3d || (!lit && v.field.highest_place > most) ||
-      v.field.bricks.size() > most)
-    return 1;
+  if (sampler == SamplerKind::image3d || (!lit && highest_place > most) || record_words > most) return 1;
   // Lit samples come in wide loads, of which twice as many keep the shuffles busy.
-  return tuning.lanes.value_or(!v.state->info.is_cpu ? 1 : gradient == GradientKind::stored ? 16 : 8);
+  return tuning.lanes.value_or(!state.info.is_cpu ? 1 : gradient == GradientKind::stored ? 16 : 8);
+}
+int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
+  return lanes_for(*v.state, v.field.highest_place, v.field.bricks.size(), sampler, gradient, tuning);
 }
 
-namespace {
-
-GradientKind choose_gradient(const Impl& v, const RenderOptions& o, SamplerKind sampler) {
+GradientKind choose_gradient(const RenderOptions& o, SamplerKind sampler, bool stored_fit) {
   const bool needed = o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour);
   if (o.gradient == GradientKind::automatic)
-    return o.mode == RenderMode::dvr && needed && sampler == SamplerKind::buffer && v.lit_fits()
+    return o.mode == RenderMode::dvr && needed && sampler == SamplerKind::buffer && stored_fit
                ? GradientKind::stored
                : GradientKind::central;
   if (o.gradient == GradientKind::stored && sampler == SamplerKind::image3d)
     throw InputError("`gradient` stored: the image3d sampler has none; use `sampler` buffer");
   return o.gradient;
 }
+
+namespace {
 
 struct KernelName {
   const char *name, *number;  // VDVR_KERNEL: the number
@@ -154,23 +153,28 @@ namespace {
 // `field`: the sample buffer, or the three images of the atlas; `bricks` the records that go with it.
 template <class... Field>
 void launch(const Frame& f, const Impl& v, const RenderOptions& o, const opencl::Defines& defines,
-            const opencl::Range& range, const BakedTransfer& table, float slack, const VdvrGrid& grid,
-            const cl::Buffer& bricks, const Field&... field) {
+            const opencl::Range& range, const PixelBox& pixels, const BakedTransfer& table, float slack,
+            const VdvrGrid& grid, const cl::Buffer& bricks, const Field&... field) {
   const auto& picture = f.picture().buffer();
   if (o.mode == RenderMode::slice) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, VdvrSlice, cl::Buffer, cl::Buffer> kernel(
         *v.state, "render/raycast", kernel_of(o).name, defines);
-    kernel(range, field..., bricks, grid, make_slice(f.field(), o), picture, f.row_samples());
+    VdvrSlice slice = make_slice(f.field(), o);
+    slice.pixel_x = static_cast<int>(pixels.x0);
+    slice.pixel_y = static_cast<int>(pixels.y0);
+    kernel(range, field..., bricks, grid, slice, picture, f.row_samples());
     return;
   }
   // dvr and iso leap by distances, mip by the bricks' maxima.
+  VdvrRaycast params = make_params(f.field(), o, table, slack);
+  params.pixel_x = static_cast<int>(pixels.x0);
+  params.pixel_y = static_cast<int>(pixels.y0);
   const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : f.distance();
   const auto draw = [&](const auto&... bounds) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
                    cl::Buffer, std::remove_cvref_t<decltype(bounds)>...>
         kernel(*v.state, "render/raycast", kernel_of(o).name, defines);
-    kernel(range, field..., bricks, grid, guide, f.table(), make_params(f.field(), o, table, slack), picture,
-           f.row_samples(), bounds...);
+    kernel(range, field..., bricks, grid, guide, f.table(), params, picture, f.row_samples(), bounds...);
   };
   if (o.output == RenderOutput::error) draw(f.bounds());
   else draw();
@@ -178,31 +182,49 @@ void launch(const Frame& f, const Impl& v, const RenderOptions& o, const opencl:
 
 }  // namespace
 
+void draw_pixels(Frame& frame, const Impl& v, const RenderOptions& o, const FramePlan& plan,
+                 const BakedTransfer& table, const PixelBox& pixels) {
+  RenderOptions drawn = o;
+  drawn.width = pixels.x1 - pixels.x0;
+  drawn.height = pixels.y1 - pixels.y0;
+  const opencl::Range range = packet_range(drawn, plan.tuning, plan.lanes);
+  const auto defines = raycast_defines(v, o, plan.sampler, plan.gradient, plan.tuning, plan.lanes);
+  const auto draw = [&](const VdvrGrid& grid, const cl::Buffer& bricks, const auto&... field) {
+    launch(frame, v, o, defines, range, pixels, table, plan.slack, grid, bricks, field...);
+  };
+  if (plan.sampler == SamplerKind::image3d) {
+    const Atlas& atlas = v.atlas();
+    draw(v.field.grid, atlas.bricks.buffer(), atlas.images[0], atlas.images[1], atlas.images[2]);
+  } else if (plan.gradient == GradientKind::stored) {
+    const LitSamples& lit = v.lit();
+    draw(lit.grid(), lit.bricks(), lit.samples());
+  } else {
+    draw(v.field.grid, v.field.bricks.buffer(), v.field.samples.buffer());
+  }
+}
+
 Enqueued enqueue_frame(Frame& frame, Device& device, const ResidentVolume& volume, const RenderOptions& o,
-                       const RaycastTuning& tuning) {
+                       const RaycastTuning& tuning, std::optional<Rows> rows) {
   check_options(o);
   const Impl& v = volume.impl();
   if (o.output == RenderOutput::error && !frame.has_bounds())
     throw InputError("`show` error: the renderer has no bounds by brick");
-  Enqueued result;
-  std::tie(result.sampler, result.sampler_reason) = choose_sampler(device, volume, o.sampler);
-  const float slack = range_slack(device, v, result.sampler);
-  result.gradient = choose_gradient(v, o, result.sampler);
-  const int lanes = lanes_for(v, result.sampler, result.gradient, tuning);
-  const BakedTransfer& table = frame.prepare(o, slack, base_first(o, result.gradient, lanes));
+  FramePlan plan;
+  plan.tuning = tuning;
+  std::tie(plan.sampler, plan.sampler_reason) = choose_sampler(device, volume, o.sampler);
+  plan.slack = range_slack(device, *v.facts, plan.sampler);
+  plan.gradient = choose_gradient(o, plan.sampler, v.lit_fits());
+  plan.lanes = lanes_for(v, plan.sampler, plan.gradient, tuning);
+  const BakedTransfer& table = frame.prepare(o, plan.slack, base_first(o, plan.gradient, plan.lanes));
 
-  const auto defines = raycast_defines(v, o, result.sampler, result.gradient, tuning, lanes);
-  const Atlas* atlas = result.sampler == SamplerKind::image3d ? &v.atlas() : nullptr;
-  const LitSamples* lit = result.gradient == GradientKind::stored ? &v.lit() : nullptr;
+  // What is made on first use is not the frame's time.
+  if (plan.sampler == SamplerKind::image3d) static_cast<void>(v.atlas());
+  else if (plan.gradient == GradientKind::stored) static_cast<void>(v.lit());
   opencl::finish(*v.state, "preparing a frame");
-  result.start = std::chrono::steady_clock::now();
-  const auto draw = [&](const VdvrGrid& grid, const cl::Buffer& bricks, const auto&... field) {
-    launch(frame, v, o, defines, packet_range(o, tuning, lanes), table, slack, grid, bricks, field...);
-  };
-  if (atlas) draw(v.field.grid, atlas->bricks.buffer(), atlas->images[0], atlas->images[1], atlas->images[2]);
-  else if (lit) draw(lit->grid(), lit->bricks(), lit->samples());
-  else draw(v.field.grid, v.field.bricks.buffer(), v.field.samples.buffer());
-  return result;
+  const auto start = std::chrono::steady_clock::now();
+  const Rows all = rows.value_or(Rows{0, o.height});
+  draw_pixels(frame, v, o, plan, table, {0, all.first, o.width, all.end});
+  return {plan.sampler, std::move(plan.sampler_reason), plan.gradient, start};
 }
 
 FloatPicture read_frame(const Frame& frame, const Enqueued& enqueued) {

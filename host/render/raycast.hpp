@@ -6,12 +6,14 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "host/opencl/kernel.hpp"
 #include "host/render/frame.hpp"
+#include "host/sampler/paged_volume.hpp"
 #include "host/sampler/resident_volume.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -44,14 +46,42 @@ DrawnField drawn_field(const ResidentVolume& volume);
 /// had.
 std::pair<SamplerKind, std::string> choose_sampler(Device& device, const ResidentVolume& volume,
                                                    SamplerKind asked);
-/// `frame` is of the volume's drawn_field(). Throws as Renderer::render.
+/// What is chosen for a frame before anything is drawn, and holds for all its parts.
+struct FramePlan {
+  SamplerKind sampler = SamplerKind::buffer;
+  std::string sampler_reason;
+  GradientKind gradient = GradientKind::central;
+  float slack = 0;  ///< how far a sample may leave the range of its brick's samples
+  int lanes = 1;
+  RaycastTuning tuning;
+};
+/// How far samples may leave ranges.
+float range_slack(Device& device, const FieldFacts& facts, SamplerKind sampler);
+/// What `automatic` stands for, stored ones having room or not. Throws InputError for stored ones of images.
+GradientKind choose_gradient(const RenderOptions& options, SamplerKind sampler, bool stored_fit);
+/// Pixels [x0, x1) x [y0, y1).
+struct PixelBox {
+  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+/// Launches the kernel over pixels, and over more to the right and below: up to whole work-groups. `table` as
+/// Frame::prepare gave it.
+void draw_pixels(Frame& frame, const ResidentVolume::Impl& volume, const RenderOptions& options,
+                 const FramePlan& plan, const BakedTransfer& table, const PixelBox& pixels);
+/// Of a picture, from `first` on and below `end`; multiples of 16 but for the picture's own end.
+struct Rows {
+  std::int64_t first = 0, end = 0;
+};
+/// `frame` is of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render.
 Enqueued enqueue_frame(Frame& frame, Device& device, const ResidentVolume& volume,
-                       const RenderOptions& options, const RaycastTuning& tuning = {});
+                       const RenderOptions& options, const RaycastTuning& tuning = {},
+                       std::optional<Rows> rows = std::nullopt);
 /// Pixels of one work-group along an axis, of which `asked` are asked for.
 int group_for(int asked, int lanes);
 /// Pixels that work-items take.
 opencl::Range packet_range(const RenderOptions& options, const RaycastTuning& tuning, int lanes);
-/// How many rays a work-item takes.
+/// How many rays a work-item takes, of a volume no sample of which has a higher place.
+int lanes_for(const opencl::State& state, std::uint64_t highest_place, std::uint64_t record_words,
+              SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning);
 int lanes_for(const ResidentVolume::Impl& volume, SamplerKind sampler, GradientKind gradient,
               const RaycastTuning& tuning);
 /// Whether packets ask first which of their bricks read the base (VDVR_BASE_FIRST). It needs the guide that
@@ -76,5 +106,23 @@ struct FloatPicture {
 FloatPicture read_frame(const Frame& frame, const Enqueued& enqueued);
 FloatPicture raycast_float(Device& device, const ResidentVolume& volume, const RenderOptions& options,
                            const RaycastTuning& tuning = {});
+
+/// Values and picture of a frame's pixels (renderer.cpp).
+void convert(std::span<const cl_float4> pixels, const RenderOptions& options, RenderResult& result);
+
+// --- volumes that come by bricks (paged_frame.cpp) ---
+
+DrawnField drawn_field(const PagedVolume& volume);
+/// Always `buffer`. Throws ResourceError for image3d: the positions of samples in an atlas have the rounding
+/// of their coordinates there, so that other tiles beside them would change bits.
+std::pair<SamplerKind, std::string> choose_sampler(SamplerKind asked);
+/// Whether GradientKind::automatic takes stored gradients: what a device of which half is free
+/// would do for the whole volume.
+bool stored_would_fit(const PagedVolume& volume);
+/// Draws part after part, and waits for each: bricks of the next take the place of those before. `frame` is
+/// of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render, and ResourceError
+/// where the bricks of a few pixels do not fit.
+Enqueued enqueue_frame(Frame& frame, Device& device, const PagedVolume& volume, const RenderOptions& options,
+                       const RaycastTuning& tuning = {}, std::optional<Rows> rows = std::nullopt);
 
 }  // namespace vdvr

@@ -16,7 +16,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrRaycast) == 456 && sizeof(VdvrSlice) == 48);
+static_assert(sizeof(VdvrRaycast) == 464 && sizeof(VdvrSlice) == 52);
 
 namespace {
 

@@ -64,13 +64,12 @@ Image shown(const FloatImage& values) {
   return image;
 }
 
-// Values and picture.
+}  // namespace
+
 void convert(Pixels pixels, const RenderOptions& o, RenderResult& r) {
   r.values = values_of(pixels, o);
   r.image = o.output == RenderOutput::colour ? coloured(pixels, o) : shown(r.values);
 }
-
-}  // namespace
 
 struct Renderer::Impl {
   Device* device;

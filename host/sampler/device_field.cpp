@@ -43,6 +43,16 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
   for (const auto& [triple, block] : v.tiles) put(block, offsets.at(triple));
 }
 
+DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const PackedRecords& records,
+                         const std::function<void(std::span<std::uint8_t>)>& fill)
+    : samples(state, sample_buffer_bytes(v), "certified samples"),
+      bricks(state, std::span<const std::uint32_t>(records.words()), "brick records"),
+      grid(sampler_grid(v)),
+      defines(field_defines(v, records.kind())),
+      highest_place(vdvr::highest_place(v)) {
+  samples.write_mapped(fill);
+}
+
 opencl::Defines coarse_defines(const VdvrGrid& grid) {
   return {{"VDVR_COARSE_X", std::to_string(grid.coarse_x)},
           {"VDVR_COARSE_Y", std::to_string(grid.coarse_y)},

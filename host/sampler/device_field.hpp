@@ -3,7 +3,9 @@
 // mixed_sampler.h.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <span>
 
 #include "host/opencl/array.hpp"
 #include "host/volume/brick_layout.hpp"
@@ -23,6 +25,9 @@ struct DeviceField {
               const std::shared_ptr<Scratch>& scratch = nullptr);
   DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records,
               const std::shared_ptr<Scratch>& scratch = nullptr);
+  /// The samples are written by `fill`, into all of the buffer.
+  DeviceField(opencl::State& state, const MixedVolume& volume, const PackedRecords& records,
+              const std::function<void(std::span<std::uint8_t>)>& fill);
   opencl::DeviceArray<std::uint8_t> samples;  ///< host/volume/brick_layout.hpp
   opencl::DeviceArray<std::uint32_t> bricks;  ///< [bz][by][bx][words]
   VdvrGrid grid;

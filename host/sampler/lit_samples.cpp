@@ -44,10 +44,11 @@ VdvrLitBlock block_of_tiles(const MixedVolume& v, const LevelTriple& triple) {
 
 }  // namespace
 
-LitLayout::LitLayout(const MixedVolume& v) {
+LitLayout::LitLayout(const MixedVolume& v, std::span<const std::uint8_t> here) {
   std::map<LevelTriple, std::vector<std::uint32_t>> bricks;
   for (std::size_t i = 0; i < v.level.size(); ++i)
-    if (v.level[i] != LevelTriple{0, 0, 0}) bricks[v.level[i]].push_back(static_cast<std::uint32_t>(i));
+    if (v.level[i] != LevelTriple{0, 0, 0} && (here.empty() || here[i] != 0))
+      bricks[v.level[i]].push_back(static_cast<std::uint32_t>(i));
 
   // Places: of base bricks where they lie in the base, of tiles in the order of their bricks.
   const Bricks all(v.grid, v.granularity);
@@ -70,12 +71,13 @@ LitLayout::LitLayout(const MixedVolume& v) {
       place[brick] = samples_;
       samples_ += size;
     }
-    blocks_.push_back({params, std::move(of_triple)});
+    blocks_.push_back({params, of_triple});
   }
 
   records_.resize(2 * v.level.size());
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     const LevelTriple& l = v.level[i];
+    if (!here.empty() && here[i] == 0 && l != LevelTriple{0, 0, 0}) place[i] = place[bricks.at(l).front()];
     records_[2 * i] = static_cast<std::uint32_t>(place[i]);
     records_[2 * i + 1] =
         l[2] | static_cast<std::uint32_t>(l[1]) << 3 | static_cast<std::uint32_t>(l[0]) << 6;

@@ -3,6 +3,7 @@
 // is stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "host/sampler/device_field.hpp"
@@ -13,7 +14,9 @@ namespace vdvr {
 /// Where lit samples lie; from levels alone. Host only.
 class LitLayout {
  public:
-  explicit LitLayout(const MixedVolume& volume);
+  /// `here`: by brick 1 where its tile is there at all; empty: everywhere. The records of others lead to a
+  /// tile of their triple, which has one here.
+  explicit LitLayout(const MixedVolume& volume, std::span<const std::uint8_t> here = {});
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const;  ///< samples and records on the device
   /// Whether 31 bits number its samples and the words of its records, as kernels do.

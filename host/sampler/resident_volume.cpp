@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/system/scratch_pass.hpp"
+
 namespace vdvr {
 namespace {
 
@@ -258,17 +260,63 @@ std::vector<std::uint8_t> distance_to_other(const std::vector<std::uint8_t>& cla
   return d;
 }
 
+FieldFacts facts_of(const MixedVolume& v) {
+  FieldFacts f;
+  for (const auto& [triple, block] : v.tiles)
+    for (std::size_t a = 0; a < 3; ++a)
+      f.highest_level = std::max(f.highest_level, triple.level[a] - v.coarsening[a]);
+  ScratchPass pass;
+  pass.add(v);
+  for (std::size_t i = 0; i < v.level.size(); ++i) {
+    f.has_tile.push_back(v.level[i] == LevelTriple{0, 0, 0} ? 0 : 1);
+    const BrickSamples stored(v, position_of(v, i));
+    f.ranges.push_back(range_of(stored));
+    pass.touched(sizeof(float) * static_cast<std::uint64_t>(v.tile_size(v.level[i])));
+    const VdvrBrick& r = stored.record();
+    if (r.type == VDVR_F32) continue;
+    // Beside a tile's own samples a texel can decode to anything that its type can hold.
+    const float top = (r.type == VDVR_U16 ? 65535.0f : 255.0f) * r.scale;
+    f.largest = std::max({f.largest, std::abs(r.bias), top, std::abs(r.bias + top)});
+  }
+  f.value_range = {f.ranges.front().s[0], f.ranges.front().s[1]};
+  for (const auto& r : f.ranges) {
+    f.value_range.first = std::min(f.value_range.first, r.s[0]);
+    f.value_range.second = std::max(f.value_range.second, r.s[1]);
+  }
+  f.largest = std::max({f.largest, std::abs(f.value_range.first), std::abs(f.value_range.second)});
+  return f;
+}
+
 ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimits& limits)
     : state(&device.state()),
       grid(v.grid),
+      facts((check_sizes(v), std::make_shared<const FieldFacts>(facts_of(v)))),
       is_uniform(v.base.type == SampleType::f32 && v.tiles.empty() && v.coarsening == LevelTriple{0, 0, 0}),
-      lit_layout((check_sizes(v), v)),
+      lit_layout(v),
       field(*state, v, marked_records(v)),
       base_samples_(v.base_samples()),
       offsets_(tile_offsets(v)) {
+  lay_atlas(v, limits);
+  // Last, because a constructor that throws runs no destructor to give it back.
+  const std::uint64_t bytes = host_ranges.size() * sizeof(cl_float2);
+  state->memory.take(bytes, "ranges of bricks");
+  counted_ = bytes;
+}
+
+ResidentVolume::Impl::Impl(opencl::State& of, const VolumePart& part, const ImageLimits& limits)
+    : state(&of),
+      grid(part.volume.grid),
+      facts(part.facts),
+      lit_layout(part.volume, part.here),
+      field(of, part.volume, marked_records(part.volume), part.fill),
+      base_samples_(part.volume.base_samples()),
+      offsets_(tile_offsets(part.volume)) {
+  lay_atlas(part.volume, limits);
+}
+
+void ResidentVolume::Impl::lay_atlas(const MixedVolume& v, ImageLimits left) {
   types_[{}] = v.base.type;
   for (const auto& [triple, block] : v.tiles) types_[triple] = block.type;
-  ImageLimits left = limits;
   left.bytes = std::min(left.bytes, state->memory.left());
   layout = pack_atlas(v, left);
   if (layout.fits) {
@@ -277,35 +325,10 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
     texel_records_ = texels.words();
     atlas_defines_ = field_defines(v, texels.kind());
   }
-  for (const auto& [triple, block] : v.tiles)
-    for (std::size_t a = 0; a < 3; ++a)
-      highest_level = std::max(highest_level, triple.level[a] - v.coarsening[a]);
-  for (const LevelTriple& level : v.level) has_tile.push_back(level == LevelTriple{0, 0, 0} ? 0 : 1);
-  find_ranges(v);
-  // Last, because a constructor that throws runs no destructor to give it back.
-  state->memory.take(host_ranges.size() * sizeof(cl_float2), "ranges of bricks");
-}
-
-void ResidentVolume::Impl::find_ranges(const MixedVolume& v) {
-  for (std::size_t i = 0; i < v.level.size(); ++i) {
-    const BrickSamples stored(v, position_of(v, i));
-    host_ranges.push_back(range_of(stored));
-    const VdvrBrick& r = stored.record();
-    if (r.type == VDVR_F32) continue;
-    // Beside a tile's own samples a texel can decode to anything that its type can hold.
-    const float top = (r.type == VDVR_U16 ? 65535.0f : 255.0f) * r.scale;
-    largest = std::max({largest, std::abs(r.bias), top, std::abs(r.bias + top)});
-  }
-  value_range = {host_ranges.front().s[0], host_ranges.front().s[1]};
-  for (const auto& r : host_ranges) {
-    value_range.first = std::min(value_range.first, r.s[0]);
-    value_range.second = std::max(value_range.second, r.s[1]);
-  }
-  largest = std::max({largest, std::abs(value_range.first), std::abs(value_range.second)});
 }
 
 ResidentVolume::Impl::~Impl() {
-  state->memory.give(host_ranges.size() * sizeof(cl_float2));
+  state->memory.give(counted_);
   if (atlas_) state->memory.give(layout.bytes());
 }
 
@@ -395,7 +418,8 @@ bool ResidentVolume::Impl::lit_fits() const {
 
 const LitSamples& ResidentVolume::Impl::lit() const {
   const std::lock_guard guard(lock_);
-  if (!lit_) lit_.emplace(*state, field, lit_layout, grid, value_range.second - value_range.first);
+  if (!lit_)
+    lit_.emplace(*state, field, lit_layout, grid, facts->value_range.second - facts->value_range.first);
   return *lit_;
 }
 
@@ -424,7 +448,7 @@ ResidentVolume& ResidentVolume::operator=(ResidentVolume&&) noexcept = default;
 
 bool ResidentVolume::has_image3d() const { return impl_->layout.fits; }
 std::string ResidentVolume::image3d_reason() const { return impl_->layout.reason; }
-std::pair<float, float> ResidentVolume::value_range() const { return impl_->value_range; }
+std::pair<float, float> ResidentVolume::value_range() const { return impl_->facts->value_range; }
 const Grid& ResidentVolume::grid() const { return impl_->grid; }
 std::uint64_t ResidentVolume::bytes() const { return impl_->bytes(); }
 

@@ -9,9 +9,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -71,9 +74,30 @@ struct Atlas {
   opencl::DeviceArray<std::uint32_t> bricks;  ///< records whose places are texels
 };
 
+/// What is said of all samples of a volume, whichever of them are on the device.
+struct FieldFacts {
+  std::vector<cl_float2> ranges;       ///< [bz][by][bx] min, max over the samples of the closed brick
+  std::vector<std::uint8_t> has_tile;  ///< [bz][by][bx] 1: a level of its own, 0: reads the base
+  std::pair<float, float> value_range{0, 0};
+  float largest = 0;      ///< that a texel can decode to, in magnitude
+  int highest_level = 0;  ///< of any brick and axis: log2 of samples per cell
+};
+/// Looks at every sample once.
+FieldFacts facts_of(const MixedVolume& volume);
+
+/// A volume with the tiles of some of its bricks: the others' records lead to other tiles of their triples.
+struct VolumePart {
+  MixedVolume volume;              ///< sizes, index and tables of what is here; its samples are not looked at
+  std::vector<std::uint8_t> here;  ///< by brick 1: its tile is here
+  std::function<void(std::span<std::uint8_t>)> fill;  ///< writes the sample buffer (brick_layout.hpp)
+  std::shared_ptr<const FieldFacts> facts;            ///< of the whole volume
+};
+
 /// Whatever is const may be called from several threads: what is made on first use is made under a lock.
 struct ResidentVolume::Impl {
   Impl(Device& device, const MixedVolume& volume, const ImageLimits& limits);
+  /// `limits`: without images there is no atlas.
+  Impl(opencl::State& state, const VolumePart& part, const ImageLimits& limits);
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -92,18 +116,15 @@ struct ResidentVolume::Impl {
 
   opencl::State* state;
   Grid grid;
-  std::vector<cl_float2> host_ranges;  ///< what ranges() holds
-  std::vector<std::uint8_t> has_tile;  ///< [bz][by][bx] 1: a level of its own, 0: reads the base
-  std::pair<float, float> value_range{0, 0};
-  float largest = 0;        ///< that a texel can decode to, in magnitude
-  int highest_level = 0;    ///< of any brick and axis: log2 of samples per cell
+  std::shared_ptr<const FieldFacts> facts;
+  const std::vector<cl_float2>& host_ranges = facts->ranges;  ///< what ranges() holds
   bool is_uniform = false;  ///< every brick reads a float32 base as fine as the grid
   AtlasLayout layout;
   LitLayout lit_layout;
   DeviceField field;
 
  private:
-  void find_ranges(const MixedVolume& volume);
+  void lay_atlas(const MixedVolume& volume, ImageLimits limits);
   void set_texels(const MixedVolume& volume, PackedRecords& records) const;
   void fill_image(const cl::Image3D& image, SampleType type) const;
   [[nodiscard]] std::array<cl::Image3D, 3> make_images() const;
@@ -111,6 +132,7 @@ struct ResidentVolume::Impl {
   Index3 base_samples_{};
   std::map<TileKind, std::uint64_t> offsets_;
   std::map<TileKind, SampleType> types_;  ///< of the tiles; base under none
+  std::uint64_t counted_ = 0;             ///< of the memory account, for facts
   std::vector<std::uint32_t> texel_records_;
   opencl::Defines atlas_defines_;
 

@@ -25,6 +25,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {
@@ -241,16 +242,38 @@ Contents open_contents(const h5::Reader& file, const MixedVolume& v) {
   return c;
 }
 
+/// Limits of a reading.
+struct Reading {
+  std::uint64_t max_memory_bytes = 0;  ///< 0: none
+  std::optional<std::filesystem::path> scratch_folder;
+  std::shared_ptr<Scratch> scratch;  ///< where samples lie; none: in memory
+
+  [[nodiscard]] std::shared_ptr<Scratch> for_block(const h5::Dataset& d) const {
+    return d.bytes > max_memory_bytes / 64 ? scratch : nullptr;
+  }
+};
+
+/// Samples of more than a quarter of the limit: whoever draws them needs most of it.
+void choose_scratch(const Contents& c, Reading& reading) {
+  std::uint64_t bytes = c.base.bytes;
+  for (const auto& [triple, d] : c.tiles) bytes += d.bytes;
+  if (reading.scratch_folder && bytes > reading.max_memory_bytes / 4)
+    reading.scratch = scratch_for(bytes, reading.max_memory_bytes, *reading.scratch_folder);
+}
+
 /// Memory by declared sizes, before any of it is taken.
 void check_memory(const h5::Reader& file, const std::string& path, const Contents& c,
-                  std::uint64_t max_memory_bytes) {
+                  const Reading& reading) {
+  const std::uint64_t max_memory_bytes = reading.max_memory_bytes;
+  const auto in_memory = [&](const h5::Dataset& d) { return reading.for_block(d) ? 0 : d.bytes; };
   std::uint64_t stored = c.base.stored_bytes + c.level.stored_bytes + c.tile.stored_bytes;
-  std::uint64_t needed = c.base.bytes + c.level.bytes + c.tile.bytes + c.tile.count / 8;
+  std::uint64_t needed = in_memory(c.base) + c.level.bytes + c.tile.bytes + c.tile.count / 8;
+  if (reading.scratch) needed += reading.scratch->resident_bytes();
   std::uint64_t for_chunks = std::max({c.base.chunk_memory, c.level.chunk_memory, c.tile.chunk_memory});
   for (const auto* datasets : {&c.tiles, &c.offsets, &c.shifts})
     for (const auto& [triple, d] : *datasets) {
       stored += d.stored_bytes;
-      needed += d.bytes;
+      needed += datasets == &c.tiles ? in_memory(d) : d.bytes;
       for_chunks = std::max(for_chunks, d.chunk_memory);
     }
   needed += for_chunks;
@@ -264,9 +287,11 @@ void check_memory(const h5::Reader& file, const std::string& path, const Content
   io::require_memory(needed, 0, path);  // deflated, a small file may hold a large volume
 }
 
-void read_samples(const h5::Reader& file, const h5::Dataset& d, SampleBlock& b) {
+void read_samples(const h5::Reader& file, const h5::Dataset& d, const Reading& reading, SampleBlock& b) {
   const auto into = [&](auto& samples) {
-    samples.resize(d.count);
+    if (auto scratch = reading.for_block(d))
+      samples = {static_cast<std::size_t>(d.count), std::move(scratch), d.name};
+    else samples.resize(d.count);
     file.read(d, samples.data());
   };
   b.type = type_of(d);
@@ -332,13 +357,13 @@ void read_index(const h5::Reader& file, const Contents& c, MixedVolume& v) {
   if (const auto p = index_problem(v, c.counts)) file.refuse(p->where, p->what);
 }
 
-void read_volume_data(const h5::Reader& file, const Contents& c, MixedVolume& v) {
+void read_volume_data(const h5::Reader& file, const Contents& c, const Reading& reading, MixedVolume& v) {
   read_index(file, c, v);
-  read_samples(file, c.base, v.base);
+  read_samples(file, c.base, reading, v.base);
   if (v.base.type != SampleType::f32) read_base_table(file, v.base);
   for (const auto& [triple, d] : c.tiles) {
     SampleBlock& b = v.tiles[triple];
-    read_samples(file, d, b);
+    read_samples(file, d, reading, b);
     read_table(file, c, triple, b);
   }
   if (const auto p = block_problem("/base", v.base)) file.refuse(p->where, p->what);
@@ -445,7 +470,7 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
   add(hash, std::span<const std::int64_t>(coarsening));
 }
 
-VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
+VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
   const h5::Reader file(path, h5::Links::hard);
   VdvrFile result;
   result.file_bytes = file.file_bytes();
@@ -454,10 +479,11 @@ VdvrFile read_whole(const std::filesystem::path& path, std::uint64_t max_memory_
   read_grid(file, result.format_version, result.volume);
   const Contents contents = open_contents(file, result.volume);
   read_step(file, contents, result.volume);
-  check_memory(file, path.string(), contents, max_memory_bytes);
+  choose_scratch(contents, reading);
+  check_memory(file, path.string(), contents, reading);
   result.certificate = read_certificate(file, path.string(), result.certificate_json);
   try {
-    read_volume_data(file, contents, result.volume);
+    read_volume_data(file, contents, reading, result.volume);
     read_totals(file, result.volume, result.certificate);
   } catch (const std::bad_alloc&) {
     throw ResourceError(fmt::format("{}: not enough memory for the samples in its {} bytes", path.string(),
@@ -554,18 +580,35 @@ const char* text_of(Seal seal) {
   return "BROKEN SEAL";
 }
 
-VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered) {
+namespace {
+
+VdvrFile read_checked(const std::filesystem::path& path, const Reading& reading, Altered altered) {
   if (io::metadata_unchecked(path))
-    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
-  VdvrFile file = read_whole(path, max_memory_bytes);
+    // Scratch files take addresses, not memory.
+    io::rehearse(path, reading.scratch_folder ? 0 : reading.max_memory_bytes,
+                 [&] { static_cast<void>(read_whole(path, reading)); });
+  VdvrFile file = read_whole(path, reading);
   if (altered == Altered::refuse && !file.altered.empty())
     throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
   return file;
 }
 
+}  // namespace
+
+VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes, Altered altered) {
+  return read_checked(path, {max_memory_bytes, std::nullopt, nullptr}, altered);
+}
+
+VdvrFile read_large_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                         const std::filesystem::path& scratch, Altered altered) {
+  return read_checked(path, {max_memory_bytes, scratch, nullptr}, altered);
+}
+
 VdvrParts open_parts(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   if (io::metadata_unchecked(path))
-    io::rehearse(path, max_memory_bytes, [&] { static_cast<void>(read_whole(path, max_memory_bytes)); });
+    io::rehearse(path, max_memory_bytes, [&] {
+      static_cast<void>(read_whole(path, {max_memory_bytes, std::nullopt, nullptr}));
+    });
   VdvrParts parts;
   parts.reader = std::make_unique<h5::Reader>(path, h5::Links::hard);
   const h5::Reader& file = *parts.reader;

@@ -39,7 +39,7 @@ typedef struct {
 
 #define VDVR_LIGHTS 8
 
-// Scalars only: no alignment that two compilers could read differently. 456 bytes.
+// Scalars only: no alignment that two compilers could read differently. 464 bytes.
 typedef struct {
   float eye_x, eye_y, eye_z;              // cells
   float forward_x, forward_y, forward_z;  // unit vector, world axes
@@ -57,6 +57,7 @@ typedef struct {
   float slack;          // rounding allowance of the sampler on a brick's range
   float background_top[3], background_bottom[3];
   int width, height;
+  int pixel_x, pixel_y;  // the first one that is drawn
   int shading;
   int skip;
   int surfaces;  // in order of their values
@@ -79,7 +80,7 @@ typedef struct {
   int across, down;  // axes: 0 x, 1 y, 2 z
   float window_lo, window_scale;
   int width, height;
-  int pad;
+  int pixel_x, pixel_y;  // the first one that is drawn
 } VdvrSlice;
 
 #endif

@@ -225,8 +225,9 @@ BOOST_AUTO_TEST_CASE(samplers_agree_within_the_probe) {
       // 2^-24 texels); neighbours differ by 0.4 at most here, values are at most 1.
       const auto n = static_cast<double>(v.impl().layout.longest());
       const double delta = std::max({probe.delta, probe.u16.delta, probe.u8.delta});
-      const double field = 3 * (delta + 2 * n * u) * 0.4 + 14 * u +
-                           (probe.largest_constant_error() + 4 * u) * static_cast<double>(v.impl().largest);
+      const double field =
+          3 * (delta + 2 * n * u) * 0.4 + 14 * u +
+          (probe.largest_constant_error() + 4 * u) * static_cast<double>(v.impl().facts->largest);
       if (mode != RenderMode::dvr)
         for (std::size_t i = 0; i < by_buffer.pixels.size(); ++i)
           BOOST_REQUIRE(!(std::abs(static_cast<double>(by_buffer.pixels[i].s[3]) -

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One build by several devices, shares and MPI ranks, some of which are killed: always the same bytes.
 
-usage: crew.py devices|shares|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
+usage: crew.py devices|shares|frames|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
 
 `kills` kills N ranks that work and N times the one that leads (1 and 1 by default; scripts/crew-kills is the
 long form), at moments that a seed chooses. Without a launcher `mpi` and `kills` are skipped by name.
@@ -105,6 +105,66 @@ def shares(work, _):
     for bad in ("0/3", "4/3", "1", "x/2", "1/2/3"):
         refused = work.run(work.build("--share", bad), expected=2)
         check("--share" in refused.stderr, refused.stderr)
+
+
+def frames(work, launchers):
+    """Pictures and turntables by devices, ranks and pieces: the same files as by one."""
+    two = {"POCL_DEVICES": "pthread pthread"}
+    work.run(work.build())
+    picture, turn = work.folder / "p.png", work.folder / "turn"
+
+    def render(out, *more, before=None, expected=0, **environment):
+        words = ["render", work.out, "-o", out, "--size", "72x90", "--json", *more]
+        return work.run(words, before=before, expected=expected, **environment)
+
+    def files():
+        return {f.name: f.read_bytes() for f in turn.iterdir()}
+
+    def turned(*more, before=None, **environment):
+        result = json.loads(render(turn, "--turntable", "6", *more, before=before, **environment).stdout)
+        return files(), result
+
+    render(picture, "--device", "0")
+    one = picture.read_bytes()
+    render(picture, "--force", "--device", "0,0")
+    check(picture.read_bytes() == one, "two devices draw another picture")
+    if "\n1: " in work.call([work.vdvr, "devices"], **two).stdout:
+        render(picture, "--force", "--device", "all", **two)
+        check(picture.read_bytes() == one, "all devices draw another picture")
+    # Neither base nor index fit; that tiles need not is tests/device/paged_volume_test.cpp.
+    refused = render(picture, "--force", "--max-memory", "20K", expected=3)
+    check("max-memory" in refused.stderr, refused.stderr)
+    whole, _ = turned()
+    check(sorted(whole) == ["certificate.json", *(f"frame-{f:04}.png" for f in range(6))], f"{sorted(whole)}")
+    # What an interruption leaves: some frames, and what they are of.
+    (turn / "certificate.json").unlink()
+    (turn / "frame-0003.png").unlink()
+    refused = render(turn, "--turntable", "6", expected=2)
+    check("--force" in refused.stderr, refused.stderr)
+    refused = render(turn, "--turntable", "6", "--resume", expected=2)
+    check("--force" in refused.stderr, "frames of unknown origin were kept")
+    for job in ("same", "other"):
+        running = subprocess.Popen(
+            [str(w) for w in (work.vdvr, "render", work.out, "-o", turn, "--size", "72x90", "--json", "--force",
+                              "--turntable", "6")],
+            env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while running.poll() is None and not (turn / "frame-0001.png").exists():
+            time.sleep(0.002)
+        running.kill()
+        running.wait()
+        if not (turn / "turntable.json").exists():  # it was faster
+            continue
+        if job == "other":
+            refused = render(turn, "--turntable", "6", "--resume", "--zoom", "2", expected=2)
+            check("--force" in refused.stderr, "frames of another picture were kept")
+        again, result = turned("--resume")
+        check(again == whole, "a resumed turntable differs")
+        check(result["frames_kept"] >= 1, f"no frame was kept: {result['frames_kept']}")
+    for launcher in launchers:
+        for ranks in (1, 3):
+            again, _ = turned("--force", before=launch(launcher, ranks))
+            check(again == whole, f"{ranks} ranks draw another turntable")
+    print(f"frames by devices, pieces and {len(launchers)} kinds of MPI are those of one device")
 
 
 def launch(mpi, ranks):
@@ -238,7 +298,7 @@ def kills(work, launchers, workers, leaders):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=["devices", "shares", "mpi", "kills"])
+    parser.add_argument("what", choices=["devices", "shares", "frames", "mpi", "kills"])
     parser.add_argument("vdvr")
     parser.add_argument("--mpi", nargs=2, action="append", default=[])
     parser.add_argument("--workers", type=int, default=1)
@@ -254,7 +314,7 @@ def main():
             if args.what == "kills":
                 kills(work, args.mpi, args.workers, args.leaders)
             else:
-                {"devices": devices, "shares": shares, "mpi": mpi}[args.what](work, args.mpi)
+                {"devices": devices, "shares": shares, "frames": frames, "mpi": mpi}[args.what](work, args.mpi)
         except Failure as failure:
             print(f"crew.py {args.what}: {failure}", file=sys.stderr)
             messages = pathlib.Path(folder) / "messages"

@@ -8,6 +8,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/read_large.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
@@ -26,7 +27,7 @@ std::string seal_text(Seal seal) {
 }
 
 int certified_info(const std::filesystem::path& path, const CommonOptions& common) {
-  const VdvrFile file = read_vdvr(path, common.max_memory, Altered::report);
+  const VdvrFile file = read_large_vdvr(path, common.max_memory, common.scratch, Altered::report);
   std::string mismatch = file.altered;
   if (const std::string what = contradiction(file.certificate); mismatch.empty() && !what.empty())
     mismatch = "the certificate contradicts itself: " + what;

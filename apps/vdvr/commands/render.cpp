@@ -4,6 +4,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
+#include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
@@ -12,6 +13,7 @@
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
+#include "vdvr/vdvr_file.hpp"
 #include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
@@ -68,6 +70,7 @@ void add_options(Arguments& args) {
       .value("turntable", "N", "N pictures over a full turn, frame-0000.png and so on")
       .value("sampler", "auto|image3d|buffer", "default auto")
       .value("projections", "IN", "with --mode error: the projections to measure against")
+      .flag("resume", "keep the frames that an interrupted turntable of the same command left in the folder")
       .flag("unverified", "render although content and certificate do not match");
   add_certify(args);
   add_clip(args);
@@ -305,8 +308,6 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   return 0;
 }
 
-std::string frame_name(std::int64_t frame) { return fmt::format("frame-{:04}.png", frame); }
-
 /// What a turntable needs beside its frames.
 struct Stage {
   Source& source;
@@ -319,46 +320,57 @@ struct Stage {
   }
 };
 
-/// Renders `frames` pictures and hands each to `take`. Returns the last.
-template <class Take>
-RenderResult turn(const Arguments& args, const Stage& stage, RenderOptions o, std::int64_t frames,
-                  const Progress& progress, Take&& take) {
-  RenderResult last;
-  for (std::int64_t f = 0; f < frames; ++f) {
-    report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
-    Orbit orbit = orbit_options(args, kOrbit);
-    orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
-    o.camera = camera_for(args, stage.frame, orbit);
-    last = stage.draw(o);
-    take(f, last.image);
+/// Frame `f` of a turn of `frames`.
+RenderResult draw_frame(const Arguments& args, const Stage& stage, RenderOptions o, std::int64_t f,
+                        std::int64_t frames, const Progress& progress) {
+  report(progress, "turntable", static_cast<double>(f) / static_cast<double>(frames));
+  Orbit orbit = orbit_options(args, kOrbit);
+  orbit.azimuth += 360.0 * static_cast<double>(f) / static_cast<double>(frames);
+  o.camera = camera_for(args, stage.frame, orbit);
+  return stage.draw(o);
+}
+
+/// The words of a command but for those that do not change its pictures, and what they are pictures of.
+std::string key_of(const Arguments& args, const Scene& scene) {
+  static const std::vector<std::string> flags{"--force", "--resume", "--quiet", "--json"};
+  static const std::vector<std::string> values{"--device", "--max-memory", "--scratch", "--output", "-o"};
+  const auto is_in = [](const std::vector<std::string>& list, const std::string& word) {
+    return std::find(list.begin(), list.end(), word.substr(0, word.find('='))) != list.end();
+  };
+  Json words = Json::array();
+  const auto& all = args.words();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (is_in(flags, all[i])) continue;
+    if (!is_in(values, all[i])) words.push_back(all[i]);
+    else if (all[i].find('=') == std::string::npos) ++i;
   }
-  return last;
+  const Json key = {{"version", VDVR_VERSION},
+                    {"command", words},
+                    {"content_sha256", scene.verified && scene.certificate ? scene.certificate->content_sha256
+                                                                           : content_sha256(scene.volume)}};
+  return key.dump(1) + "\n";
 }
 
-/// Frames that an earlier, longer turn may have left in the folder go with it.
-std::vector<std::string> turntable_names(const std::filesystem::path& folder, std::int64_t frames,
-                                         bool certificate) {
-  std::vector<std::string> names;
-  for (std::int64_t f = 0; f < frames; ++f) names.push_back(frame_name(f));
-  std::error_code error;
-  for (std::int64_t f = frames; f <= 9999 && std::filesystem::exists(folder / frame_name(f), error); ++f)
-    names.push_back(frame_name(f));
-  if (certificate) names.emplace_back("certificate.json");
-  return names;
-}
+struct Turned {
+  RenderResult last;
+  FramesDrawn frames;
+};
 
-RenderResult turn_into_folder(const Arguments& args, const CommonOptions& common, const Stage& stage,
-                              const RenderOptions& o, std::int64_t frames, const Progress& progress) {
-  const auto path = args.path("output");
-  OutputFolder folder(path, turntable_names(path, frames, stage.source.scene().certificate.has_value()),
-                      common.force);
-  folder.begin();
-  RenderResult last = turn(args, stage, o, frames, progress, [&](std::int64_t f, const Image& image) {
-    write_png(folder.file(frame_name(f)), image);
+Turned turn_into_folder(const Arguments& args, const CommonOptions& common, const Stage& stage,
+                        const RenderOptions& o, std::int64_t frames, const Progress& progress) {
+  const Scene& scene = stage.source.scene();
+  FramesOptions options{
+      args.path("output"), frames, common.force, args.has("resume"), scene.certificate.has_value(),
+      key_of(args, scene)};
+  Turned turned;
+  const auto draw = [&](std::int64_t f, const std::filesystem::path& path) {
+    turned.last = draw_frame(args, stage, o, f, frames, progress);
+    write_png(path, turned.last.image);
+  };
+  turned.frames = draw_frames(options, draw, [&](OutputFolder& folder) {
+    if (scene.certificate) folder.finish(to_json(*scene.certificate));
   });
-  const auto& certificate = stage.source.scene().certificate;
-  if (certificate) folder.finish(to_json(*certificate));
-  return last;
+  return turned;
 }
 
 RenderResult turn_into_file(const Arguments& args, const CommonOptions& common, const Stage& stage,
@@ -373,8 +385,11 @@ RenderResult turn_into_file(const Arguments& args, const CommonOptions& common, 
         "{} frames need {:.0f} MiB together; take fewer, a smaller --size, or a folder as the output", frames,
         bytes / (1 << 20)));
   std::vector<Image> images;
-  RenderResult last = turn(args, stage, o, frames, progress,
-                           [&](std::int64_t, const Image& image) { images.push_back(image); });
+  RenderResult last;
+  for (std::int64_t f = 0; f < frames; ++f) {
+    last = draw_frame(args, stage, o, f, frames, progress);
+    images.push_back(last.image);
+  }
   report(progress, "encode", 0);
   if (kind == OutputKind::gif) write_gif(args.path("output"), images, kFrameMs);
   else write_apng(args.path("output"), images, kFrameMs);
@@ -383,6 +398,14 @@ RenderResult turn_into_file(const Arguments& args, const CommonOptions& common, 
 
 Json transfer_json(const TransferFunction& f) {
   return {{"name", f.name}, {"range", {f.points.front().value, f.points.back().value}}, {"note", f.note}};
+}
+
+Json paging_json(const std::optional<PagingCounts>& counts) {
+  if (!counts) return {};
+  return {{"parts", counts->parts},
+          {"bricks", counts->bricks},
+          {"bytes", counts->bytes},
+          {"largest_part_bytes", counts->largest_part}};
 }
 
 /// One picture, or the values behind it.
@@ -420,6 +443,8 @@ int render_command(Arguments& args) {
   const OutputKind kind = output_kind(output, turntable);
   if (kind == OutputKind::values)
     refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
+  if (kind != OutputKind::folder)
+    refuse(args, {"resume"}, "is of a turntable in a folder, whose frames are kept");
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   check_ray_certificate(args, o.mode, kind == OutputKind::values);
   // Colours are certified by the device, surfaces and maxima ray by ray on the host.
@@ -450,11 +475,17 @@ int render_command(Arguments& args) {
     return code;
   }
   const Stage stage{source, overlay, certified, frame};
-  const RenderResult result =
-      kind == OutputKind::folder ? turn_into_folder(args, common, stage, o, frames, progress.callback())
-      : turntable                ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
-      : certifies                ? source.draw(o)
-                                 : draw_one(stage, o, output, kind);
+  FramesDrawn turned{1, 0};
+  const auto into_folder = [&] {
+    Turned all = turn_into_folder(args, common, stage, o, frames, progress.callback());
+    turned = all.frames;
+    return std::move(all.last);
+  };
+  const RenderResult result = kind == OutputKind::folder ? into_folder()
+                              : turntable
+                                  ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
+                              : certifies ? source.draw(o)
+                                          : draw_one(stage, o, output, kind);
   Json ray_certificate;
   if (certifies)
     ray_certificate = write_ray_certificate(args, scene, o, result.image, output, progress.callback());
@@ -471,6 +502,7 @@ int render_command(Arguments& args) {
                    (o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour));
   const Json json = {{"output", output.string()},
                      {"frames", frames},
+                     {"frames_kept", turned.kept},
                      {"verified", certified},
                      {"sampler", sampler_name(result.sampler)},
                      {"sampler_reason", result.sampler_reason},
@@ -483,11 +515,17 @@ int render_command(Arguments& args) {
                      {"method", method},
                      {"certificate", ray_certificate},
                      {"resident_bytes", source.bytes()},
+                     {"paging", paging_json(source.paging())},
                      {"device", source.device().info().name}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
+    if (const auto paging = source.paging())
+      fmt::print(
+          "  by bricks    {} parts of pictures, {:.1f} MiB of tiles for the largest, {:.1f} MiB in all\n",
+          paging->parts, static_cast<double>(paging->largest_part) / (1 << 20),
+          static_cast<double>(paging->bytes) / (1 << 20));
     if (result.gradient == GradientKind::stored)
       fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n",
                  static_cast<double>(source.bytes()) / (1 << 20));
