@@ -20,7 +20,7 @@ std::string certificate_of(RenderMode mode) {
   Certificate certificate;
   certificate.epsilon = 0.03;
   if (mode == RenderMode::iso) {
-    Json json = cli::certificate_head(picture, certificate, cli::statement_of(mode));
+    cli::Json json = cli::certificate_head(picture, certificate, cli::statement_of(mode));
     const FloatImage depth{2, 1, {1, 2}, 1};
     json["iso"] = cli::surface_json({{1, 2}, depth, depth}, "pixel");
     return json.dump();
