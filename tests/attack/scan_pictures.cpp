@@ -34,7 +34,7 @@ struct Line {
   reference::IdealRay ray;
   double first = 0, h = 0;
   std::vector<double> values;
-  [[nodiscard]] bool empty() const { return values.size() < 2 * points; }
+  [[nodiscard]] bool empty() const { return values.empty(); }
   [[nodiscard]] double at(double t) const {
     const double x = (t - first) / h;
     const auto last = static_cast<std::int64_t>(values.size()) - points;
@@ -103,7 +103,9 @@ Line line_of(const ExactField& exact, const reference::IdealRay& ray, double uni
   Line line;
   line.ray = ray;
   if (!(ray.first < ray.last)) return line;
-  const auto n = static_cast<std::size_t>(std::ceil((ray.last - ray.first) / unit * an_eighth)) + 1;
+  // Short rays, through a slab of a cell, have as many values as interpolation wants.
+  const auto n = std::max<std::size_t>(
+      static_cast<std::size_t>(std::ceil((ray.last - ray.first) / unit * an_eighth)) + 1, 2 * points);
   line.first = ray.first;
   line.h = (ray.last - ray.first) / static_cast<double>(n - 1);
   std::vector<Vec3> where;
