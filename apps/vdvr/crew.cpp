@@ -81,7 +81,8 @@ Devices::Devices(const Arguments& args, const CommonOptions& common) {
     devices_.push_back(std::make_unique<Device>(selector, common.max_memory / sharing));
 }
 
-CrewOptions Devices::crew() const {
+CrewOptions Devices::crew() {
+  wake(first(), options_);
   CrewOptions options = options_;
   for (std::size_t i = 1; i < devices_.size(); ++i) options.devices.push_back(devices_[i].get());
   return options;

@@ -36,8 +36,8 @@ class Devices {
   /// --max-memory is shared among those of this machine.
   Devices(const Arguments& args, const CommonOptions& common);
   [[nodiscard]] Device& first() { return *devices_.front(); }
-  /// The others, of this process and of others.
-  [[nodiscard]] CrewOptions crew() const;
+  /// The others, of this process and of others; these wake up.
+  [[nodiscard]] CrewOptions crew();
   [[nodiscard]] std::uint64_t peak_memory() const;
 
  private:

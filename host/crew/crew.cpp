@@ -168,6 +168,7 @@ Crew::Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, con
            bool all)
     : state_(std::make_unique<State>(leader.state(), options)) {
   State& s = *state_;
+  leader.state().on_program = nullptr;  // wake()
   kinds_.push_back({leader.info(), probe_filters(leader), 0});
   s.members.emplace_back().worker = std::make_unique<ThreadWorker>(s.inbox, 0, s.leader);
   for (Device* device : options.devices) {
@@ -184,12 +185,7 @@ Crew::Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, con
       State::Member& m = s.members.emplace_back();
       m.process = process;
       m.worker = std::make_unique<RemoteWorker>(messenger, process, s.traffic);
-      ByteWriter out;
-      put(out, CrewWord::open);
-      put(out, options.device_of_others);
-      out.put(options.memory_of_others);
-      put(out, options.scratch_of_others);
-      s.remote(m).send(out.take());
+      s.remote(m).send(message_to_open(CrewWord::open, options));
     }
     const std::span<const float> samples(from.filtered.samples.data(), from.filtered.samples.size());
     const std::uint64_t shared = messenger.others() > 0 ? messenger.share(std::as_bytes(samples)) : 0;

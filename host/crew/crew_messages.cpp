@@ -171,6 +171,15 @@ void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups,
   put(out, settings);
 }
 
+Bytes message_to_open(CrewWord word, const CrewOptions& options) {
+  ByteWriter out;
+  put(out, word);
+  put(out, options.device_of_others);
+  out.put(options.memory_of_others);
+  put(out, options.scratch_of_others);
+  return out.take();
+}
+
 void get_scan(ByteReader& in, FilteredScan& scan, FieldSups& sups, GoldSettings& settings) {
   scan.geometry = get_geometry(in);
   scan.views = get_struct<ViewMatrix>(in);

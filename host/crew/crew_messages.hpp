@@ -13,6 +13,8 @@
 namespace vdvr {
 
 enum class CrewWord : std::uint8_t {
+  wake,   // leader: the device that will be opened; no answer
+  warm,   // leader: a program that it has built; no answer
   open,   // leader: the device to open; answer: hello
   hello,  // what it is
   scan,   // leader: a new build; answer: ready
@@ -36,6 +38,9 @@ constexpr std::uint64_t part_bytes = std::uint64_t{8} << 20;
 void put(ByteWriter& out, const std::string& text);
 std::string get_text(ByteReader& in);
 void put(ByteWriter& out, CrewWord word);
+
+/// `wake` or `open`.
+Bytes message_to_open(CrewWord word, const CrewOptions& options);
 
 void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups, const GoldSettings& settings);
 /// Without the samples.

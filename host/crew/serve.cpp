@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "host/crew/crew_member.hpp"
@@ -90,6 +91,10 @@ class Server {
 
   void obey(CrewWord word, ByteReader& in) {
     switch (word) {
+      case CrewWord::wake:
+        return wake_up(in);
+      case CrewWord::warm:
+        return warm(in);
       case CrewWord::open:
         return open(in);
       case CrewWord::scan:
@@ -112,8 +117,36 @@ class Server {
     }
   }
 
+  // What fails here fails again when it counts.
+  void wake_up(ByteReader& in) {
+    try {
+      open_device(in);
+    } catch (const Error&) {
+      device_.reset();
+    }
+  }
+  void warm(ByteReader& in) {
+    if (!device_) return;
+    const std::string name = get_text(in);
+    opencl::Defines defines(in.get<std::uint64_t>());
+    for (auto& [key, value] : defines) {
+      key = get_text(in);
+      value = get_text(in);
+    }
+    try {
+      opencl::program(device_->state(), name, defines);
+    } catch (const BuildError&) {
+      return;
+    }
+  }
+
   void open(ByteReader& in) {
     failed_ = nullptr;
+    open_device(in);
+    say(CrewWord::hello, 0);
+  }
+
+  void open_device(ByteReader& in) {
     const std::string device = device_of(get_text(in), messenger_.place());
     auto memory = in.get<std::uint64_t>();
     scratch_folder_ = get_text(in);
@@ -125,7 +158,6 @@ class Server {
       device_.emplace(device, memory);
       opened_ = device;
     }
-    say(CrewWord::hello, 0);
   }
 
   void say(CrewWord word, double arithmetic) {
@@ -238,6 +270,28 @@ class Server {
 }  // namespace
 
 void serve(Messenger& messenger) { Server(messenger).run(); }
+
+void wake(Device& leader, const CrewOptions& options) {
+  Messenger* messenger = options.messenger;
+  if (!messenger || messenger->others() == 0) return;
+  const auto send = [messenger](const Bytes& message) {
+    for (int process = 1; process <= messenger->others(); ++process) messenger->send(process, message);
+  };
+  send(message_to_open(CrewWord::wake, options));
+  const auto thread = std::this_thread::get_id();
+  leader.state().on_program = [send, thread](const std::string& name, const opencl::Defines& defines) {
+    if (std::this_thread::get_id() != thread) return;  // a messenger has one
+    ByteWriter out;
+    put(out, CrewWord::warm);
+    put(out, name);
+    out.put(static_cast<std::uint64_t>(defines.size()));
+    for (const auto& [key, value] : defines) {
+      put(out, key);
+      put(out, value);
+    }
+    send(out.take());
+  };
+}
 
 void dismiss(Messenger& messenger) {
   for (int process = 1; process <= messenger.others(); ++process) {

@@ -76,6 +76,7 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
     throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
                                  name, state.info.name, options, e.what(), code_name(e.err()), log));
   }
+  if (state.on_program) state.on_program(name, defines);
   return state.programs_.emplace(cache_key, std::move(built)).first->second;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -72,6 +73,10 @@ struct State : std::enable_shared_from_this<State> {
   void take_host(std::uint64_t bytes, const std::string& what);
   /// On a CPU: waits until at most two kernels are unfinished, the latest included.
   void keep_pace(cl::Event latest);
+
+  /// Told of each program that was built, by the thread that built it, which holds a lock. Set before kernels
+  /// are made, and by the thread that makes them.
+  std::function<void(const std::string& name, const Defines&)> on_program;
 
  private:
   friend const cl::Program& program(State&, const std::string&, const Defines&);

@@ -76,6 +76,11 @@ struct CrewOptions {
   [[nodiscard]] bool alone() const { return devices.empty() && (!messenger || messenger->others() == 0); }
 };
 
+/// Has other processes open their devices, and build each kernel program that this device builds from now on,
+/// so that they need not when a build begins. For the time before it, while `leader` plans; called by the
+/// thread that does. What fails there is said when the build begins. Without a messenger nothing is done.
+VDVR_API void wake(Device& leader, const CrewOptions& options);
+
 /// Computes blocks for the leader until it says that it is done. Opens the device that the leader names.
 /// Throws what opening it throws, after the leader was told.
 VDVR_API void serve(Messenger& messenger);
