@@ -405,6 +405,17 @@ void KeptGold::back_project_heights(std::span<const TileAt> tiles, const Progres
   tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// The detector's rows [first, end), upsampled along columns, and the time that takes.
+UpsampledSlab KeptGold::upsampled(std::int64_t first, std::int64_t end) {
+  std::vector<double> heights;
+  for (std::int64_t r = first; r < end; ++r) heights.push_back(static_cast<double>(r));
+  const auto start = std::chrono::steady_clock::now();
+  UpsampledSlab slab = upsampler_(columns_, heights);
+  state_.queue.finish();
+  column_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return slab;
+}
+
 // Rows in runs whose upsampled columns fit beside the tiles; every run serves all tiles.
 void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress& progress) {
   const ParallelGeometry& g = scan_.geometry;
@@ -422,14 +433,9 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
                           std::min(state_.memory.left() / 3, state_.info.max_allocation))
     rows = static_cast<std::int64_t>(opencl::round_up(count(rows / 2), 16));
   for (std::int64_t first = 0; first < g.rows; first += rows) {
-    std::vector<double> heights;
-    for (std::int64_t r = first; r < std::min(g.rows, first + rows); ++r)
-      heights.push_back(static_cast<double>(r));
-    const auto start = std::chrono::steady_clock::now();
-    const UpsampledSlab slab = upsampler_(columns_, heights);
-    state_.queue.finish();
-    const auto upsampled = std::chrono::steady_clock::now();
-    column_seconds_ += std::chrono::duration<double>(upsampled - start).count();
+    const std::int64_t end = std::min(g.rows, first + rows);
+    const UpsampledSlab slab = upsampled(first, end);
+    const auto begun = std::chrono::steady_clock::now();
     for (std::size_t page = first_page; page < pages_.size(); ++page) {
       const std::size_t begin = (page - first_page) * each, n = std::min(each, tiles.size() - begin);
       ColumnBlocks blocks = blocks_of(tiles.subspan(begin, n));
@@ -438,13 +444,13 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
       blocks.out_row = first;
       back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
       report(progress, "gold",
-             (static_cast<double>(first) + static_cast<double>(heights.size()) *
+             (static_cast<double>(first) + static_cast<double>(end - first) *
                                                static_cast<double>(page - first_page + 1) /
                                                static_cast<double>(pages_.size() - first_page)) /
                  static_cast<double>(g.rows));
     }
     state_.queue.finish();  // before the next rows are allocated
-    tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - upsampled).count();
+    tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
@@ -539,20 +545,14 @@ void KeptGold::make_common(const Progress& progress) {
   common_->make_rows(
       [&](std::size_t i) {
         const std::int64_t first = static_cast<std::int64_t>(i) * CommonGold::chunk;
-        std::vector<double> heights;
-        for (std::int64_t r = first; r < std::min(g.rows, first + CommonGold::chunk); ++r)
-          heights.push_back(static_cast<double>(r));
-        const auto start = std::chrono::steady_clock::now();
-        const UpsampledSlab slab = upsampler_(columns_, heights);
-        state_.queue.finish();
-        const auto upsampled = std::chrono::steady_clock::now();
-        column_seconds_ += std::chrono::duration<double>(upsampled - start).count();
+        const UpsampledSlab slab = upsampled(first, std::min(g.rows, first + CommonGold::chunk));
+        const auto begun = std::chrono::steady_clock::now();
         for (auto& [page, blocks] : parts) {
           blocks.out_row = first;
           back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
         }
         state_.queue.finish();
-        tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - upsampled).count();
+        tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
       },
       progress);
   if (!few_rows()) make_common_heights(progress);

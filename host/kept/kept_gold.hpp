@@ -138,6 +138,7 @@ class KeptGold {
   [[nodiscard]] double margin_of(const TileAt& tile) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
+  [[nodiscard]] UpsampledSlab upsampled(std::int64_t first, std::int64_t end);
   void back_project_tiles(std::span<const TileAt> tiles, const Progress& progress);
   void make_common(const Progress& progress);
   void make_common_heights(const Progress& progress);

@@ -239,7 +239,7 @@ RAY_INLINE V opacity_of_share(V opacity, V share) {
   return opacity;
 }
 
-#define THE_PIXELS                                                       \
+#define THE_PIXELS                                                     \
   const I px = p.pixel_x + (int)get_global_id(0) * PACKET_X + COLUMNS; \
   const I py = p.pixel_y + (int)get_global_id(1) * PACKET_Y + ROWS;    \
   if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height) return

@@ -98,17 +98,6 @@ RenderOptions as_entered(RenderOptions o, const Grid& g) {
   return o;
 }
 
-// What fp32 makes of where a ray begins and ends, in base cells, times the largest extinction: eye and grid
-// are added, divided and multiplied, 8 u of them.
-double path_rounding(const RenderOptions& o, const Grid& g) {
-  double far = 0, densest = 0;
-  for (std::size_t a = 0; a < 3; ++a)
-    far += std::abs(o.camera.position[a] - g.origin[a]) / g.spacing[a] + static_cast<double>(g.cells[a]);
-  for (const TransferPoint& p : o.transfer.points)
-    densest = std::max(densest, reference::extinction(std::min(p.opacity, 0.9999)));
-  return 8 * tolerance::unit_roundoff * far * densest;
-}
-
 struct Tally {
   std::int64_t pictures = 0, rays = 0, values = 0, outside = 0;
   double worst = 0, rounding = 0;
@@ -128,7 +117,7 @@ void attack(const MixedVolume& v, const std::vector<float>& bounds, const Render
             const PixelBounds& b, std::mt19937& random, Tally& tally) {
   std::uniform_real_distribution<double> unit(0, 1);
   const RenderOptions entered = as_entered(o, v.grid);
-  tally.rounding = path_rounding(o, v.grid);
+  tally.rounding = support::path_rounding(o, v.grid);
   for (std::int64_t y = 0; y < o.height; y += 3)
     for (std::int64_t x = 0; x < o.width; x += 3) {
       const auto steps = support::steps_of(v, bounds, entered, x, y, 12);

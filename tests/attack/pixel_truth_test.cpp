@@ -91,17 +91,6 @@ std::vector<support::FieldOnRay> truth_of(const Scene& s) {
   return rays;
 }
 
-// What fp32 makes of where a ray begins and ends, in base cells, times the largest extinction: 8 u of eye and
-// grid.
-double path_rounding(const RenderOptions& o, const Grid& g) {
-  double far = 0, densest = 0;
-  for (std::size_t a = 0; a < 3; ++a)
-    far += std::abs(o.camera.position[a] - g.origin[a]) / g.spacing[a] + static_cast<double>(g.cells[a]);
-  for (const TransferPoint& p : o.transfer.points)
-    densest = std::max(densest, reference::extinction(std::min(p.opacity, 0.9999)));
-  return 8 * tolerance::unit_roundoff * far * densest;
-}
-
 }  // namespace
 
 // The field that is F in the middle of each step and constant on it lies within the bounds too, if they allow
@@ -124,7 +113,7 @@ BOOST_AUTO_TEST_CASE(every_pixel_of_the_ideal_picture_is_in_its_interval) {
       certify.fast = pictures % 5 == 4;
       certify.kappa = pictures % 3 == 0 ? 0.125 : 0.5;
       const PixelBounds b = certify_pixels(device(), resident, bounds, s.options, certify);
-      const double rounding = path_rounding(s.options, s.volume.grid);
+      const double rounding = support::path_rounding(s.options, s.volume.grid);
       std::int64_t outside = 0;
       for (std::size_t i = 0; i < rays.size(); ++i) {
         const auto behind = reference::background_of(s.options, static_cast<std::int64_t>(i) / side);

@@ -6,6 +6,7 @@
 
 #include "tests/reference/ideal_picture.hpp"
 #include "tests/support/mixed_volumes.hpp"
+#include "tests/support/tolerance.hpp"
 #include "vdvr/certify_picture.hpp"
 
 namespace vdvr::support {
@@ -127,6 +128,17 @@ inline TransferFunction random_transfer(std::mt19937& random) {
   std::stable_sort(f.points.begin(), f.points.end(),
                    [](const auto& a, const auto& b) { return a.value < b.value; });
   return f;
+}
+
+/// What fp32 makes of where a ray begins and ends, in base cells, times the largest extinction: eye and grid
+/// are added, divided and multiplied, 8 u of them.
+inline double path_rounding(const RenderOptions& o, const Grid& g) {
+  double far = 0, densest = 0;
+  for (std::size_t a = 0; a < 3; ++a)
+    far += std::abs(o.camera.position[a] - g.origin[a]) / g.spacing[a] + static_cast<double>(g.cells[a]);
+  for (const TransferPoint& p : o.transfer.points)
+    densest = std::max(densest, reference::extinction(std::min(p.opacity, 0.9999)));
+  return 8 * tolerance::unit_roundoff * far * densest;
 }
 
 }  // namespace vdvr::support
