@@ -2,13 +2,9 @@
 // interpolate_gold.cpp.
 #include "host/kept/kept_gold.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
-#include <numbers>
 #include <set>
 #include <stdexcept>
 
@@ -22,17 +18,10 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-// Kept nodes of a tile's side: positions in u are relative to its middle.
-constexpr std::int64_t side = 32;
-// Bytes of the tiles that are made together, which share one allocation.
-constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
 // Of the heights made of them: less is made that nobody asks for.
 constexpr std::uint64_t run_page_bytes = std::uint64_t{8} << 20;
 // Floats on the way from heights to gold: boxes that fit are made together, and stay in caches.
 constexpr std::uint64_t floats_together = std::uint64_t{1} << 20;
-// Kept heights around those asked for: boxes of other halos will read them.
-constexpr std::int64_t run_margin = 32;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
@@ -170,131 +159,6 @@ GoldLattice KeptGold::lattice(const Grid& grid, int rate) const {
     if (kept * out.phases[a] != std::int64_t{rate} * out.step[a])
       throw std::logic_error("KeptGold: rates that are no powers of two");
   }
-  return out;
-}
-
-// --- bounds ---
-
-const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
-  // x and y share theirs.
-  const std::pair key{phases, axis == 1 ? std::size_t{0} : axis};
-  if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
-  const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
-  const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
-  return filters_
-      .emplace(key, cone_ ? cone_->best_filter(phases, key.second, to_int(2 * half_taps_)).filter.value()
-                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch),
-                                               to_int(2 * half_taps_)))
-      .first->second;
-}
-
-namespace {
-
-// Second differences of what is not interpolated are those of nodes, each with an error of its own.
-double bend(const GoldFilter& f) { return f.rate > 1 ? f.second_difference : 4.0; }
-// Three second differences of nodes that each err by themselves, an eighth of them.
-constexpr double curved_apart = 1.5;
-
-}  // namespace
-
-KeptGold::ConeParts KeptGold::cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
-  // What the filters round: a product in runs along z, one more than taps in either filter across z.
-  const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double rounding = unit_roundoff * cone_->sup() *
-                          (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
-                           (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
-  return {cone_->errors(), cone_->filter_error(x, y, z), rounding};
-}
-
-// Every kept node errs by itself.
-GoldErrors KeptGold::cone_errors(const GoldLattice& lattice) {
-  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
-                   &z = filter_of(lattice.phases[2], 2);
-  const double nodes = x.norm * y.norm * z.norm,
-               curved =
-                   (bend(x) * y.norm * z.norm + x.norm * bend(y) * z.norm + x.norm * y.norm * bend(z)) / 8;
-  const ConeParts parts = cone_parts(x, y, z);
-  GoldErrors out;
-  out.ramp = cone_->largest_weight() * filter_error_bound(upsampler_, scan_);
-  out.interpolation = nodes * parts.kept.interpolation + parts.filters;
-  out.curved_interpolation = curved * parts.kept.interpolation + curved_apart * parts.filters;
-  out.rounding = nodes * parts.kept.rounding + parts.rounding;
-  out.curved_rounding = curved * parts.kept.rounding + curved_apart * parts.rounding;
-  return out;
-}
-
-// Of cone beam a kept node's error passes through the filters, whose interpolant hardly bends from one node
-// of gold to the next.
-std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
-  constexpr double weights = 16;  // magnitudes of a fourth difference's, pure or mixed
-  std::array<double, 6> out{};
-  if (!cone_) {
-    const GoldErrors e = errors(lattice);
-    out.fill(weights * (e.interpolation + e.rounding));
-    return out;
-  }
-  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
-                   &z = filter_of(lattice.phases[2], 2);
-  const ConeParts parts = cone_parts(x, y, z);
-  const double node = parts.kept.interpolation + parts.kept.rounding,
-               apart = weights * (parts.filters + parts.rounding);
-  const auto pure = [](const GoldFilter& f) { return f.rate > 1 ? f.fourth_difference : weights; };
-  out = {pure(x) * y.norm * z.norm,  x.norm * pure(y) * z.norm,  x.norm * y.norm * pure(z),
-         bend(x) * bend(y) * z.norm, bend(x) * y.norm * bend(z), x.norm * bend(y) * bend(z)};
-  for (double& of_nodes : out) of_nodes = of_nodes * node + apart;
-  return out;
-}
-
-std::pair<double, double> KeptGold::rounding_by_memory(const GoldLattice& lattice) {
-  const double own = errors(lattice).rounding;
-  if (!cone_) return {own, own};
-  const std::int64_t views = scan_.geometry.views();
-  const double nodes = filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
-                       filter_of(lattice.phases[2], 2).norm,
-               now = cone_->errors().rounding;
-  std::pair<double, double> out{own, own};
-  for (std::int64_t together = 1; together <= std::min(views, ConeTiles::most_views); ++together) {
-    const double other = own + nodes * (cone_->errors(together).rounding - now);
-    out.first = std::min(out.first, other);
-    out.second = std::max(out.second, other);
-  }
-  return out;
-}
-
-GoldErrors KeptGold::errors(const GoldLattice& lattice) {
-  if (cone_) return cone_errors(lattice);
-  const ParallelGeometry& g = scan_.geometry;
-  const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
-                   &z = filter_of(few_rows() ? 1 : lattice.phases[2], 2);
-  const double S = sups_.value;
-  // Along z, what the rows hold makes a band-limited function, whose second differences are at most (h pi /
-  // pitch)^2 of its largest value (Bernstein).
-  const double hz = spacing_[2] * lattice.step[2] / lattice.phases[2];
-  const double bend_z = g.rows > 1 ? std::min(4.0, std::pow(pi * hz / g.pitch_v, 2)) : 0.0;
-  const double nodes = x.norm * y.norm;
-  const double curved = (bend(x) * y.norm + x.norm * bend(y) + nodes * bend_z) / 8;
-
-  const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
-  const double gain_v = cosine_gain(g.rows);
-  const double filters = ((1 + x.sup) * (1 + y.sup) * (1 + z.sup) - 1) * S;
-  GoldErrors out;
-  out.ramp = chain.ramp;
-  out.interpolation = nodes * (1 + z.sup) * chain.interpolation + filters;
-  out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
-
-  // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
-  // height by itself, product and filter; of each node by itself, one more than taps in either filter across
-  // z.
-  const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
-  const double between = !few_rows() ? product_error(2 * half_taps_ + 8, AlongZ::run) + 2 : 0.0;
-  const double heights = unit_roundoff * S * z.norm *
-                         ((g.rows > 1 ? (product_error(g.rows, AlongZ::run) + 2) * gain_v : 0.0) + between);
-  const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double apart = (x.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
-                       (y.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * y.norm * S;
-  const double curved_heights = (bend(x) * y.norm + x.norm * bend(y) + 4 * nodes) / 8;
-  out.rounding = nodes * (shared + rows + heights) + apart + chain.underflow * nodes * gain_v;
-  out.curved_rounding = curved * (shared + rows) + curved_heights * heights + curved_apart * apart;
   return out;
 }
 
@@ -454,132 +318,6 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
-}
-
-// --- with others ---
-
-namespace {
-
-// Whether kernels read and write such memory where it lies: OpenCL allows a device of the host to copy it.
-bool is_in_place(opencl::State& state) {
-  constexpr std::size_t n = 1024;
-  const std::shared_ptr<void> memory(std::aligned_alloc(4096, 4 * n), std::free);
-  const std::span<float> values(static_cast<float*>(memory.get()), n);
-  std::fill(values.begin(), values.end(), 1.0f);
-  opencl::DeviceArray<float> array(state, values, memory, "memory of the host");
-  array.fill(2.0f);
-  state.queue.finish();
-  if (values[n - 1] != 2.0f) return false;
-  values[0] = 3.0f;
-  float first = 0;
-  array.read(std::span(&first, 1));
-  return first == 3.0f;
-}
-
-}  // namespace
-
-// Beyond the grid as far as halos and filters read: the first, and how many.
-std::pair<std::int64_t, std::int64_t> KeptGold::all_heights() const {
-  return {-run_margin, grid_.cells[2] * rates_[2] + 1 + 2 * run_margin};
-}
-
-std::optional<CommonGold::Shape> KeptGold::common_shape() const {
-  if (cone_ || scratch() || !state_.info.is_cpu) return std::nullopt;
-  CommonGold::Shape shape;
-  shape.tiles = all_tiles();
-  shape.tile = count(side * side * stride_);
-  const auto [low, heights] = all_heights();
-  if (!few_rows()) shape.heights = count(side * side * column_stride(heights));
-  shape.rows = scan_.geometry.rows;
-  shape.more = {low, heights, rates_[0], rates_[1], rates_[2], static_cast<std::int64_t>(columns_.count)};
-  if (shape.tiles.empty() || !is_in_place(state_)) return std::nullopt;
-  return shape;
-}
-
-void KeptGold::share(CommonMemory memory, bool leads) {
-  const std::optional<CommonGold::Shape> shape = common_shape();
-  if (!shape || memory.bytes.size() < CommonGold::bytes_of(*shape)) return;
-  std::vector<std::uint8_t> given;
-  if (leads)
-    for (const TileAt& tile : shape->tiles) given.push_back(tiles_.contains(tile) ? 1 : 0);
-  CommonGold common(std::move(memory), *shape, given);
-  if (!common.agrees()) return;
-  for (std::size_t i = 0; leads && i < common.given(); ++i) {
-    const Place& place = tiles_.at(shape->tiles[common.order()[i]]);
-    pages_[place.page].read(common.rows(i, 1), place.first);
-  }
-  tiles_.clear();
-  pages_.clear();
-  run_.reset();
-  heights_.reset();
-  common_bytes_.count(common.own_bytes(), "gold that is kept for all devices of this machine");
-  common_.emplace(std::move(common));
-}
-
-// By runs of rows: columns of the detector are upsampled once, too.
-void KeptGold::make_common(const Progress& progress) {
-  const CommonGold& common = *common_;
-  const std::vector<TileAt>& all = common.shape().tiles;
-  const ParallelGeometry& g = scan_.geometry;
-  const std::uint64_t tile = common.shape().tile;
-  const std::size_t each = std::max<std::size_t>(1, page_bytes / (4 * tile));
-  std::vector<std::pair<std::size_t, ColumnBlocks>> parts;  // page and what is made there
-  const auto add_pages = [&](std::size_t first, std::size_t last, bool made) {
-    for (std::size_t i = first; i < last; i += each) {
-      const std::size_t n = std::min(each, last - i);
-      std::vector<TileAt> tiles;
-      for (std::size_t j = 0; j < n; ++j) {
-        tiles.push_back(all[common.order()[i + j]]);
-        tiles_[tiles.back()] = {pages_.size(), j * tile};
-      }
-      pages_.emplace_back(state_, common.rows(i, n), common.owner(), "gold that is kept");
-      if (made) continue;
-      ColumnBlocks blocks = blocks_of(tiles);
-      blocks.wanted = wanted(blocks);
-      blocks.out_stride = stride_;
-      parts.emplace_back(pages_.size() - 1, std::move(blocks));
-    }
-  };
-  add_pages(0, common.given(), true);
-  add_pages(common.given(), all.size(), false);
-  common_->make_rows(
-      [&](std::size_t i) {
-        const std::int64_t first = static_cast<std::int64_t>(i) * CommonGold::chunk;
-        const UpsampledSlab slab = upsampled(first, std::min(g.rows, first + CommonGold::chunk));
-        const auto begun = std::chrono::steady_clock::now();
-        for (auto& [page, blocks] : parts) {
-          blocks.out_row = first;
-          back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
-        }
-        state_.queue.finish();
-        tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-      },
-      progress);
-  if (!few_rows()) make_common_heights(progress);
-  common_.reset();
-}
-
-void KeptGold::make_common_heights(const Progress& progress) {
-  const CommonGold& common = *common_;
-  const std::vector<TileAt>& all = common.shape().tiles;
-  const auto [low, heights] = all_heights();
-  begin_run(low, heights);
-  Run& run = *run_;
-  run.common = true;
-  for (std::size_t i = 0; i < all.size(); i += run.a_page) {
-    run.of_last = std::min(run.a_page, all.size() - i);
-    for (std::size_t j = 0; j < run.of_last; ++j)
-      run.tiles[all[common.order()[i + j]]] = {run.pages.size(), j * common.shape().heights};
-    run.pages.emplace_back(state_, common.heights(i, run.of_last), common.owner(), "heights of kept gold");
-  }
-  run.of_last = run.a_page;  // what others have not goes elsewhere
-  common_->make_heights(
-      [&](std::size_t i) {
-        const TileAt& tile = all[common.order()[i]];
-        make_heights(tiles_.at(tile), run.tiles.at(tile));
-        state_.queue.finish();
-      },
-      progress);
 }
 
 // By row of each tile the first and last node that is kept: the region is convex, so that all between them

@@ -117,6 +117,12 @@ class KeptGold {
   /// Rows of the detector up to which gold's heights are products with all of them: beyond, heights at half a
   /// pixel and filters between them are the cheaper.
   static constexpr std::int64_t most_few_rows = 32;
+  /// Kept nodes of a tile's side: positions in u are relative to its middle.
+  static constexpr std::int64_t side = 32;
+  /// Bytes of the tiles that are made together, which share one allocation.
+  static constexpr std::uint64_t page_bytes = std::uint64_t{128} << 20;
+  /// Kept heights around those asked for: boxes of other halos will read them.
+  static constexpr std::int64_t run_margin = 32;
 
   using TileAt = std::pair<std::int64_t, std::int64_t>;  // y, x
   struct Place {
