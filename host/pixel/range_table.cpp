@@ -74,11 +74,7 @@ Row row_between(const std::vector<TransferPoint>& points, double from, double to
   for (std::size_t i = first; i + 1 < points.size() && points[i].value <= to; ++i) {
     const TransferPoint &a = points[i], &b = points[i + 1];
     if (b.value < from) continue;
-    if (a.value == b.value) {  // a jump: its two sides, and nothing between
-      add_piece(row, a, a);
-      add_piece(row, b, b);
-      continue;
-    }
+    if (a.value == b.value) continue;  // of a jump the pieces beside it, or the ends, have either side
     add_piece(row, between(a, b, from), between(a, b, to));
   }
   return row;

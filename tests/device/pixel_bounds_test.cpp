@@ -120,6 +120,51 @@ BOOST_AUTO_TEST_CASE(termination_and_one_pass_give_no_narrower_intervals) {
   BOOST_TEST(outside(a, c) <= 14 * support::u * 500);
 }
 
+// A part's range holds those of the parts that it is cut into, and the box step is monotone in ranges.
+BOOST_AUTO_TEST_CASE(fewer_parts_give_no_narrower_intervals) {
+  // Noise from node to node: inside a cell V falls below, and rises above, what it is where rays pass its
+  // faces.
+  const Grid grid = fields::centred_grid({12, 12, 12});
+  std::mt19937 random(5);
+  const MixedVolume v = as_mixed(
+      fields::uniform(grid, [&](double, double, double) { return static_cast<double>(random() % 2); }));
+  const ResidentVolume resident(device(), v);
+  CertifyPictureOptions fine, coarse;
+  fine.kappa = 0.5;
+  coarse.kappa = 1024;
+  // More parts have a larger share of rounding in e: 64 times some u.
+  const auto bounds = all(v, 0x1p-6f), wider = all(v, 0x1p-6f + 0x1p-12f);
+  for (const bool low : {true, false}) {
+    const TransferFunction shown{"ends", {{0.3, {1, 1, 1}, low ? 0.5 : 0}, {0.7, {1, 1, 1}, low ? 0 : 0.5}}};
+    const RenderOptions o = unlit(grid, shown);
+    const PixelBounds a = certify_pixels(device(), resident, bounds, o, fine),
+                      b = certify_pixels(device(), resident, wider, o, coarse);
+    const std::uint32_t most = *std::max_element(a.parts.begin(), a.parts.end());
+    BOOST_TEST(most > 4 * *std::max_element(b.parts.begin(), b.parts.end()));
+    BOOST_TEST(outside(a, b) <= 14 * support::u * static_cast<double>(most), (low ? "low" : "high"));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_may_be_clear_ends_no_ray) {
+  // F is 0.49 to 0.57: clear below a half, white above, and nothing of it is black.
+  const Grid grid = fields::centred_grid({16, 16, 16});
+  const MixedVolume v = as_mixed(fields::uniform(grid, [](double, double, double) { return 0.53; }));
+  const ResidentVolume resident(device(), v);
+  RenderOptions o = unlit(grid, {"three",
+                                 {{0, {1, 1, 1}, 0},
+                                  {0.5, {1, 1, 1}, 0},
+                                  {0.5, {1, 1, 1}, 0.8},
+                                  {0.8, {1, 1, 1}, 0.8},
+                                  {0.8, {0, 0, 0}, 0.8},
+                                  {1, {0, 0, 0}, 0.8}}});
+  o.background_top = o.background_bottom = {0.5, 0.5, 0.5};
+  const PixelBounds b = certify_pixels(device(), resident, all(v, 0.04f), o);
+  const std::size_t centre = 12 * 24 + 12;
+  BOOST_TEST(static_cast<double>(b.lo.values[3 * centre]) >=
+             0.5 - 14 * support::u * (static_cast<double>(b.parts[centre]) + 2));
+  BOOST_TEST(b.hi.values[3 * centre] > 0.99f);
+}
+
 BOOST_AUTO_TEST_CASE(fog_of_f_where_v_is_clear_is_in_the_interval) {
   const Grid grid = fields::centred_grid({16, 16, 16});
   const MixedVolume v = as_mixed(fields::uniform(grid, [](double, double, double) { return 0.45; }));
