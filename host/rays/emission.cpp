@@ -5,7 +5,11 @@
 namespace vdvr {
 namespace {
 
+// Of an opacity between two points.
+constexpr double rounding = 0x1p-50;
+
 double extinction(double opacity) {
+  if (!(opacity > 0)) return 0;
   return opacity >= 1 ? std::numeric_limits<double>::infinity() : -std::log1p(-opacity);
 }
 
@@ -47,8 +51,9 @@ MediumRange MediumRanges::over(double low, double high) const {
     if (!(b.value > a.value)) take(a, b);
     else take(a.value < low ? cut(a, b, low) : a, b.value > high ? cut(a, b, high) : b);
   }
-  out.tau_low = extinction(least);
-  out.tau_high = extinction(most);
+  // Interpolation rounds: what is opaque must stay so.
+  out.tau_low = extinction(least - rounding);
+  out.tau_high = most > 0 ? extinction(most + rounding) : 0;
   return out;
 }
 
@@ -58,13 +63,17 @@ double stepped(double behind, double colour, double tau, double length) {
   return colour + (behind - colour) * std::exp(-tau * length);
 }
 
-void step(ColourInterval& w, const MediumRange& r, double length) {
+}  // namespace
+
+void box_step(ColourInterval& w, const MediumRange& r, double length) {
   if (!(r.tau_high > 0)) return;
   for (std::size_t c = 0; c < 3; ++c) {
     w.high[c] = stepped(w.high[c], r.high[c], r.high[c] > w.high[c] ? r.tau_high : r.tau_low, length);
     w.low[c] = stepped(w.low[c], r.low[c], r.low[c] < w.low[c] ? r.tau_high : r.tau_low, length);
   }
 }
+
+namespace {
 
 int parts_of(const RayPiece& piece, double kappa) {
   const Cubic& b = piece.value;
@@ -104,15 +113,15 @@ ColourInterval colour_interval(const RayField& field, const WorldRay& ray, const
       const Cubic b = parts == 1 ? piece->value
                                  : part_of(piece->value, static_cast<double>(i) / parts,
                                            static_cast<double>(i + 1) / parts);
-      step(w, ranges.over(least(b) - piece->bound, largest(b) + piece->bound), length);
+      box_step(w, ranges.over(least(b) - piece->bound, largest(b) + piece->bound), length);
       ++steps;
     }
   }
   // Ten roundings a step.
-  const double rounding = 0x1p-53 * 16 * static_cast<double>(steps + 1);
+  const double summed = 0x1p-53 * 16 * static_cast<double>(steps + 1);
   for (std::size_t c = 0; c < 3; ++c) {
-    w.low[c] -= rounding;
-    w.high[c] += rounding;
+    w.low[c] -= summed;
+    w.high[c] += summed;
   }
   return w;
 }
