@@ -264,12 +264,12 @@ const std::vector<std::string>& bound_outputs() { return kShown; }
 
 void add_certify(Arguments& args) {
   args.group("Certified pictures")
-      .value_or_flag(
-          "certify", "exact|fast", "exact",
-          "for every pixel an interval that holds the colour of the ideal picture: writes beside "
-          "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
-          "region alone. fast: in one pass, 1.4 to 3 times as wide. Of slices and mip alike; of iso: where "
-          "F has the surface for sure, may have it (striped), or not")
+      .value_or_flag("certify", "exact|fast", "exact",
+                     "for every pixel an interval that holds the colour of the ideal picture: writes beside "
+                     "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
+                     "region alone. fast: in one pass, 1.4 to 3 times as wide. Of slices, mip and integrals "
+                     "alike; of iso: where "
+                     "F has the surface for sure, may have it (striped), or not")
       .value("certify-parts", "K",
              "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
       .value("explain", "X,Y",
@@ -287,17 +287,18 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
     if (of_bounds) throw InputError(fmt::format("--show {} goes with --certify", show));
     return;
   }
-  if (o.mode == RenderMode::iso || o.mode == RenderMode::mip) {  // ray_certificate.hpp
+  if (is_certified_by_ray(o.mode)) {  // ray_certificate.hpp
     refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
     if (o.mode == RenderMode::iso)
       refuse(args, {"picture-tolerance"}, "is of colours, in levels of 255; a surface has a band of depth");
     check_tolerance(args);
     if (args.choice("certify", {"exact", "fast"}, "exact") == "fast")
-      throw InputError("--certify fast is of --mode dvr; iso and mip have the exact one alone");
+      throw InputError("--certify fast is of --mode dvr; iso, mip and integral have the exact one alone");
     return;
   }
   if (o.mode == RenderMode::error)
-    throw InputError("--certify: pictures of --mode dvr, iso, mip and slice are certified, not of error");
+    throw InputError(
+        "--certify: pictures of --mode dvr, iso, mip, integral and slice are certified, not of error");
   if (o.mode == RenderMode::slice) {
     refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
     refuse(args, {"colorbar", "caption"}, "is part of a certified slice, but for --plain");

@@ -61,6 +61,7 @@ std::vector<RenderOptions> pictures(bool image3d) {
     p.surfaces = {{0.3, 0.5}, {0.8}};
   });
   add([](RenderOptions& p) { p.mode = RenderMode::mip; });
+  add([](RenderOptions& p) { p.mode = RenderMode::integral; });
   add([](RenderOptions& p) { p.mode = RenderMode::slice; });
   add([](RenderOptions& p) { p.classification = Classification::preintegrated; });
   add([](RenderOptions& p) {

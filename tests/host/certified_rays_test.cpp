@@ -9,6 +9,7 @@
 
 #include "host/rays/crossings.hpp"
 #include "host/rays/emission.hpp"
+#include "host/rays/line_integral.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/certified_rays.hpp"
@@ -207,6 +208,78 @@ BOOST_AUTO_TEST_CASE(the_largest_f_lies_between_its_bounds) {
     }
     BOOST_TEST(m.low <= most + slope * step);
   });
+}
+
+BOOST_AUTO_TEST_CASE(the_integral_of_f_lies_between_its_bounds) {
+  const RayField field = scene().field();
+  double true_error = 0, reach = 0, whole = 0;
+  std::int64_t rays = 0;
+  for_each_ray([&](const WorldRay& ray) {
+    const auto [begin, end] = field.clipped(ray);
+    const LineIntegral line = integral_along(field, ray);
+    BOOST_TEST(line.any == (begin < end));
+    if (!line.any) return;
+    const int steps = 1 + static_cast<int>(64 * (end - begin));
+    double f = 0;
+    const double h = (end - begin) / steps;
+    for (int i = 0; i < steps; ++i) f += h * lobb(ray.at(begin + (i + 0.5) * h));
+    // Midpoints of a function of slope s err by s h / 4 a length at most.
+    BOOST_TEST(std::abs(f - line.value) <= line.reach + slope * h / 4 * (end - begin));
+    true_error += std::abs(f - line.value);
+    reach += line.reach;
+    whole += f;
+    ++rays;
+  });
+  BOOST_TEST_MESSAGE("mean bound of an integral " << reach / static_cast<double>(rays) << ", mean error "
+                                                  << true_error / static_cast<double>(rays)
+                                                  << ", mean integral " << whole / static_cast<double>(rays));
+  // Errors of either sign cancel along a ray, and bounds add up: a bound above is far off.
+  BOOST_TEST(reach > 3 * true_error);
+}
+
+BOOST_AUTO_TEST_CASE(the_integral_of_v_is_that_of_its_cubics) {
+  // Without a bound, what is left is V itself: held to midpoints of the pieces, of which every one is cut.
+  const std::vector<float> none(scene().bounds.size(), 0.0f);
+  const RayField field(scene().volume, none, scene().coverage);
+  for_each_ray([&](const WorldRay& ray) {
+    const LineIntegral line = integral_along(field, ray);
+    double sum = 0;
+    constexpr int parts = 64;
+    double error = 0;
+    field.walk(ray, [&](const RayPiece& piece) {
+      const double h = (piece.last - piece.first) / parts;
+      for (int i = 0; i < parts; ++i) {
+        const double at = (i + 0.5) / parts;
+        sum += h * part_of(piece.value, at, at)[0];
+      }
+      // A midpoint rule errs by h^2 / 24 of the second derivative, 6 of the largest second difference.
+      const auto& b = piece.value;
+      const double bent = 6 * std::max(std::abs(b[0] - 2 * b[1] + b[2]), std::abs(b[1] - 2 * b[2] + b[3]));
+      error += (piece.last - piece.first) * bent / (24.0 * parts * parts);
+      return true;
+    });
+    BOOST_TEST(std::abs(sum - line.value) <= error + tolerance::fp64_sum(64 * 256, 40));
+    BOOST_TEST(line.reach <= 0x1p-30 * 40);
+  });
+}
+
+BOOST_AUTO_TEST_CASE(greys_of_integrals_are_cut_at_the_window_and_unknown_where_nothing_was_tested) {
+  RenderOptions o;
+  o.mode = RenderMode::integral;
+  o.width = 4;
+  o.height = 1;
+  o.slice_range = std::pair{1.0, 3.0};
+  constexpr float endless = std::numeric_limits<float>::infinity();
+  const IntegralBounds bounds{
+      {4, 1, {1.5f, -2, -endless, 0}, 1}, {4, 1, {2, 0.5f, endless, 0}, 1}, {1, 1, 1, 0}};
+  const PixelBounds b = greys_of_integrals(bounds, o);
+  const std::vector<std::pair<double, double>> expected{{0.25, 0.5}, {0, 0}, {0, 1}, {0, 0}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    BOOST_TEST(std::abs(static_cast<double>(b.lo.values[3 * i]) - expected[i].first) <= 0x1p-22);
+    BOOST_TEST(std::abs(static_cast<double>(b.hi.values[3 * i + 2]) - expected[i].second) <= 0x1p-22);
+    BOOST_TEST(b.untested[i] == (i == 2 ? 1 : 0));
+    BOOST_TEST(b.parts[i] == (i == 3 ? 0u : 1u));
+  }
 }
 
 namespace {
