@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <exception>
 #include <optional>
@@ -119,6 +120,16 @@ int follow(MpiMessenger& messenger, const std::vector<std::string>& words) {
   }
 }
 
+// Rank 0, whose work is done, does not wait for ever; the others wait for it, which may still be writing.
+bool part_from_others(MpiMessenger& messenger) {
+  if (messenger.rank() != 0) return messenger.part(std::nullopt);
+  if (messenger.part(patience_with_others())) return true;
+  if (!messenger.lost_any())
+    say(fmt::format("vdvr-mpi: a rank gave no sign for {} s at the end; the job is ended without it\n",
+                    patience_with_others().count()));
+  return false;
+}
+
 int run(const std::vector<std::string>& words) {
   int code = 0;
   bool lost = false;
@@ -132,8 +143,7 @@ int run(const std::vector<std::string>& words) {
       dismiss(messenger);
     }
     messenger.flush();
-    messenger.part();
-    lost = messenger.lost_any();
+    lost = !part_from_others(messenger);
   }
   // Ranks that are gone, or hang, would be waited for.
   if (lost) MPI_Abort(MPI_COMM_WORLD, code);

@@ -374,20 +374,22 @@ CommonMemory MpiMessenger::common(std::uint64_t number, std::uint64_t bytes) {
           neighbours()};
 }
 
-void MpiMessenger::part() {
+bool MpiMessenger::part(std::optional<std::chrono::milliseconds> patience) {
   MPI_Request all = MPI_REQUEST_NULL;
-  if (lost_any() || MPI_Ibarrier(MPI_COMM_WORLD, &all) != MPI_SUCCESS) return;
+  if (lost_any() || MPI_Ibarrier(MPI_COMM_WORLD, &all) != MPI_SUCCESS) return false;
   const auto start = Clock::now();
-  for (int here = 0, more = 1; (here == 0 || more != 0) && Clock::now() - start < longest_flush;) {
+  for (int here = 0, more = 1; here == 0 || more != 0;) {
     more = 0;
     int from = 0;
     std::vector<std::byte> bytes;
     while (take(words, from, bytes)) more = 1;
     hear_of_files();
     progress();
-    if (here == 0 && MPI_Test(&all, &here, MPI_STATUS_IGNORE) != MPI_SUCCESS) return;
+    if (here == 0 && MPI_Test(&all, &here, MPI_STATUS_IGNORE) != MPI_SUCCESS) return false;
+    if (here == 0 && patience && Clock::now() - start > *patience) return false;
     std::this_thread::sleep_for(pause);
   }
+  return true;
 }
 
 void MpiMessenger::flush() {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <list>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,8 +43,9 @@ class MpiMessenger final : public Messenger {
   /// Waits for what is on its way, up to some seconds.
   void flush();
   /// Takes what others have sent, and nobody wants any more, until all ranks are here: MPI may complain of
-  /// messages that nobody took. Collective, but for ranks that are lost, for which it waits some seconds.
-  void part();
+  /// messages that nobody took. Collective, but for ranks that are lost. False where some are not here yet
+  /// after `patience`, if there is one.
+  [[nodiscard]] bool part(std::optional<std::chrono::milliseconds> patience);
 
  private:
   enum class State : std::uint8_t { here, gone, given_up };

@@ -369,11 +369,14 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
                            source.device().info().name,
                            source.device().info().driver,
                            show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
-  write_picture(out, show, made, bound, scene, o, overlay);
-  write_png(out.bound, picture_of_bound(bound, made.bounds));
-  picture.file_sha256 = sha256_of_file(out.picture);
+  io::AtomicFiles files;
+  const Outputs parts{files.add(out.picture), files.add(out.bound), files.add(out.certificate), out.values};
+  write_picture(parts, show, made, bound, scene, o, overlay);
+  write_png(parts.bound, picture_of_bound(bound, made.bounds));
+  picture.file_sha256 = sha256_of_file(parts.picture);
   const Json json = picture_certificate_json(picture, made.bounds, bound, certificate);
-  io::write_file(out.certificate, json.dump(2) + "\n");
+  io::write_file(parts.certificate, json.dump(2) + "\n");
+  files.commit();
   return say(args, common, source, o, out, made, bound, json);
 }
 

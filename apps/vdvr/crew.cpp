@@ -15,6 +15,8 @@ namespace {
 
 Messenger* the_messenger = nullptr;
 
+std::chrono::seconds the_patience = CrewOptions{}.give_up;
+
 constexpr std::int64_t longest_wait = 86400;
 
 }  // namespace
@@ -58,12 +60,15 @@ void set_messenger(Messenger* messenger) { the_messenger = messenger; }
 
 Messenger* frames_messenger() { return the_messenger; }
 int processes_here() { return the_messenger ? std::max(1, the_messenger->neighbours()) : 1; }
+std::chrono::seconds patience_with_others() { return the_patience; }
 int place_here() { return the_messenger ? the_messenger->place() : 0; }
 
 Devices::Devices(const Arguments& args, const CommonOptions& common) {
   options_.messenger = the_messenger;
   options_.mixed_devices = args.has("mixed-devices");
-  options_.give_up = std::chrono::seconds(args.integer_or("give-up", 300, 1, longest_wait));
+  options_.give_up =
+      std::chrono::seconds(args.integer_or("give-up", options_.give_up.count(), 1, longest_wait));
+  the_patience = options_.give_up;
   const std::string who = args.who();
   options_.say = [who](const std::string& text) { say(fmt::format("{}: {}\n", who, text)); };
   std::vector<std::string> all = device_selectors(common.device);

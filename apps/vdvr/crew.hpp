@@ -1,6 +1,7 @@
 // The devices and processes that a build is spread over, and its shares.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +24,8 @@ Messenger* frames_messenger();
 /// Processes of this program on this machine, which share --max-memory, and the place of this one.
 int processes_here();
 int place_here();
+/// After how long without a sign of life a process is given up: --give-up of the command that ran.
+std::chrono::seconds patience_with_others();
 
 /// What each of the devices that --device names is opened with: of "0,1" or "all" several. Throws InputError.
 std::vector<std::string> device_selectors(const std::string& text);

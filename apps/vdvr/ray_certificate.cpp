@@ -20,7 +20,17 @@ namespace fs = std::filesystem;
 namespace vdvr::cli {
 namespace {
 
-bool is_values(const fs::path& output) { return output.extension() == ".npy"; }
+/// Where the parts of a certified picture are written, until all are.
+struct Parts {
+  Parts(const fs::path& output, RenderMode mode) : values(output.extension() == ".npy") {
+    picture = files.add(output);
+    for (const auto& beside : ray_certificate_paths(output, mode))
+      (beside.extension() == ".png" ? bound : certificate) = files.add(beside);
+  }
+  io::AtomicFiles files;
+  fs::path picture, bound, certificate;
+  bool values;
+};
 
 /// All that the picture follows from; its file's hash comes when it is written.
 CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
@@ -41,31 +51,30 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   return picture;
 }
 
-void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image,
-                   const fs::path& output) {
-  if (is_values(output)) {
+void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image, const Parts& parts) {
+  if (parts.values) {
     const FloatImage classes{
         bounds.first.width, bounds.first.height, {bounds.hit.begin(), bounds.hit.end()}, 1};
-    write_npy(output, show == "class" ? classes
-                      : show == "lo"  ? bounds.first
-                      : show == "hi"  ? bounds.last
-                                      : band_of(bounds));
+    write_npy(parts.picture, show == "class" ? classes
+                             : show == "lo"  ? bounds.first
+                             : show == "hi"  ? bounds.last
+                                             : band_of(bounds));
     return;
   }
   const double p99 = band_quantile(bounds, 0.99);
   if (show == "class") image = class_picture(bounds);
   else if (show == "band") image = band_picture(bounds, p99 > 0 ? p99 : 1);
   else hatch_possible(image, bounds);
-  write_png(output, image);
+  write_png(parts.picture, image);
 }
 
 Json surface(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
-             const Scene& scene, const Image& image, const fs::path& output, const Progress& progress) {
+             const Scene& scene, const Image& image, const Parts& parts, const Progress& progress) {
   const RenderOptions& o = picture.options;
   const SurfaceBounds bounds = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
   throw_if_stopped();
-  write_surface(show, bounds, image, output);
-  picture.file_sha256 = sha256_of_file(output);
+  write_surface(show, bounds, image, parts);
+  picture.file_sha256 = sha256_of_file(parts.picture);
   picture.overlays = {"stripes over possible hits"};
   Json json = certificate_head(picture, *scene.certificate, statement_of(RenderMode::iso));
   json["iso"] = surface_json(bounds, scene.volume.grid.unit);
@@ -74,18 +83,18 @@ Json surface(const std::string& show, const CertifiedRays& rays, CertifiedPictur
 }
 
 Json maximum(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
-             const Scene& scene, const Image& image, const fs::path& output, const Progress& progress) {
+             const Scene& scene, const Image& image, const Parts& parts, const Progress& progress) {
   const RenderOptions& o = picture.options;
   const MaximumBounds maxima = rays.maximum(o.camera, o.width, o.height, progress);
   throw_if_stopped();
   const PixelBounds bounds = colours_of_maxima(maxima, o);
   const PictureBound bound = bound_of_picture(bounds, image);
   const Image bounds_image = picture_of_bound(bound, bounds);
-  if (is_values(output))
-    write_npy(output, show == "lo" ? maxima.low : show == "hi" ? maxima.high : bound.levels);
-  else write_png(output, show == "bound" ? bounds_image : image);
-  write_png(ray_certificate_paths(output, o.mode).back(), bounds_image);
-  picture.file_sha256 = sha256_of_file(output);
+  if (parts.values)
+    write_npy(parts.picture, show == "lo" ? maxima.low : show == "hi" ? maxima.high : bound.levels);
+  else write_png(parts.picture, show == "bound" ? bounds_image : image);
+  write_png(parts.bound, bounds_image);
+  picture.file_sha256 = sha256_of_file(parts.picture);
   Json json = picture_certificate_json(picture, bounds, bound, *scene.certificate);
   json["mip"] = maximum_json(maxima);
   return json;
@@ -135,10 +144,12 @@ Json write_ray_certificate(const Arguments& args, Source& source, const RenderOp
   CertifiedPicture picture = described(source, options, drawn, output);
   const CertifiedRays rays(scene.volume, *scene.certificate, false, box_of(options.clip));
   const std::string show = args.text_or("show", "colour");
+  Parts parts(output, options.mode);
   const Json json = options.mode == RenderMode::iso
-                        ? surface(show, rays, picture, scene, drawn.image, output, progress)
-                        : maximum(show, rays, picture, scene, drawn.image, output, progress);
-  io::write_file(ray_certificate_paths(output, options.mode).front(), json.dump(2) + "\n");
+                        ? surface(show, rays, picture, scene, drawn.image, parts, progress)
+                        : maximum(show, rays, picture, scene, drawn.image, parts, progress);
+  io::write_file(parts.certificate, json.dump(2) + "\n");
+  parts.files.commit();
   return json;
 }
 

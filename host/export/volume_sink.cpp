@@ -58,9 +58,10 @@ class FlatSink : public VolumeSink {
       : path_(path),
         text_(note_json(note, path.filename().string()).dump(2) + "\n"),
         expected_(io::checked_bytes(note.grid.samples(), bytes_of(note.samples), path.string())),
-        file_(path),
-        stream_(file_.temporary(), std::ios::binary | std::ios::trunc) {
-    require_disk(path, file_.temporary(), expected_);
+        file_(files_.add(path)),
+        note_(files_.add(note_path(path))),
+        stream_(file_, std::ios::binary | std::ios::trunc) {
+    require_disk(path, file_, expected_);
     const std::string header = npy ? npy_header(note) : "";
     expected_ += header.size();
     stream_ << header;
@@ -73,12 +74,10 @@ class FlatSink : public VolumeSink {
   std::uint64_t commit() override {
     stream_.close();
     std::error_code unknown;
-    if (!stream_ || fs::file_size(file_.temporary(), unknown) != expected_)
+    if (!stream_ || fs::file_size(file_, unknown) != expected_)
       throw ResourceError(fmt::format("{}: cannot be written; is the disk full?", path_.string()));
-    io::AtomicFile note(note_path(path_));
-    std::ofstream(note.temporary(), std::ios::binary) << text_;
-    file_.commit();
-    note.commit();
+    std::ofstream(note_, std::ios::binary) << text_;
+    files_.commit();
     return expected_ + text_.size();
   }
 
@@ -86,7 +85,8 @@ class FlatSink : public VolumeSink {
   fs::path path_;
   std::string text_;
   std::uint64_t expected_;
-  io::AtomicFile file_;
+  io::AtomicFiles files_;
+  fs::path file_, note_;
   std::ofstream stream_;
 };
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr::io {
 namespace {
@@ -39,6 +40,16 @@ Temporaries& temporaries() {
   static Temporaries all;
   return all;
 }
+
+// What a program that ends without unwinding waits for in remove_temporaries: it finds either nothing in
+// place, or all of it. The wish to stop is looked for here once more: what comes after it is work done.
+class Placing {
+ public:
+  Placing() : guard_(temporaries().lock) { throw_if_stopped(); }
+
+ private:
+  std::lock_guard<std::mutex> guard_;
+};
 
 }  // namespace
 
@@ -69,13 +80,34 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::commit() {
   sync_path(temporary_, O_RDONLY);
+  {
+    const Placing placing;
+    put_in_place();
+  }
+  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+// While Placing.
+void AtomicFile::put_in_place() {
   std::error_code error;
   std::filesystem::rename(temporary_, target_, error);
   if (error)
     throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
   committed_ = true;
-  forget_temporary(temporary_);
-  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+  temporaries().paths.erase(temporary_);
+}
+
+const std::filesystem::path& AtomicFiles::add(const std::filesystem::path& target) {
+  return files_.emplace_back(target).temporary();
+}
+
+void AtomicFiles::commit() {
+  for (const AtomicFile& file : files_) sync_path(file.temporary_, O_RDONLY);
+  {
+    const Placing placing;
+    for (AtomicFile& file : files_) file.put_in_place();
+  }
+  for (const AtomicFile& file : files_) sync_path(folder_of(file.target_), O_RDONLY | O_DIRECTORY);
 }
 
 namespace {
@@ -112,6 +144,19 @@ void remove_tree(const std::filesystem::path& path) {
   forget_tree(path);
 }
 
+// Goes where it ends if nothing lies in it.
+struct EmptyFolder {
+  explicit EmptyFolder(std::filesystem::path made) : path(std::move(made)) {}
+  ~EmptyFolder() {
+    std::error_code ignored;
+    if (!path.empty()) std::filesystem::remove(path, ignored);
+    forget_tree(path);
+  }
+  EmptyFolder(const EmptyFolder&) = delete;
+  EmptyFolder& operator=(const EmptyFolder&) = delete;
+  std::filesystem::path path;
+};
+
 /// All that was written to the disk of `path`: one call for thousands of small files.
 void sync_disk_of(const std::filesystem::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY);
@@ -136,26 +181,31 @@ AtomicFolder::~AtomicFolder() {
 
 void AtomicFolder::commit() {
   sync_disk_of(temporary_);
-  // A folder is renamed over an empty one only: what was there steps aside first, and goes last.
-  std::error_code error;
-  std::filesystem::path old;
-  if (std::filesystem::exists(target_, error)) {
-    old = folder_beside(target_);
-    forget_tree(old);  // what will lie there is the user's until the new one is in place
-    std::filesystem::rename(target_, old, error);
+  std::error_code ignored;
+  const bool replaces = std::filesystem::exists(target_, ignored);
+  const EmptyFolder aside(replaces ? folder_beside(target_) : std::filesystem::path());
+  {
+    const Placing placing;
+    put_in_place(aside.path);
   }
+  if (replaces) remove_tree(aside.path);
+  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+// While Placing. A folder is renamed over an empty one only: what was there steps aside first, and goes last.
+void AtomicFolder::put_in_place(const std::filesystem::path& aside) {
+  temporaries().trees.erase(aside);  // what will lie there is the user's until the new one is in place
+  std::error_code error;
+  if (!aside.empty()) std::filesystem::rename(target_, aside, error);
   if (!error) std::filesystem::rename(temporary_, target_, error);
   if (error) {
     std::error_code ignored;
-    if (!old.empty() && !std::filesystem::exists(target_, ignored))
-      std::filesystem::rename(old, target_, ignored);
-    else if (!old.empty()) std::filesystem::remove(old, ignored);  // still empty
+    if (!aside.empty() && !std::filesystem::exists(target_, ignored))
+      std::filesystem::rename(aside, target_, ignored);
     throw ResourceError(fmt::format("{}: cannot be put in place: {}", target_.string(), error.message()));
   }
   committed_ = true;
-  forget_tree(temporary_);
-  if (!old.empty()) remove_tree(old);
-  sync_path(folder_of(target_), O_RDONLY | O_DIRECTORY);
+  temporaries().trees.erase(temporary_);
 }
 
 void note_temporary(const std::filesystem::path& path) {

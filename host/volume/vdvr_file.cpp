@@ -1,6 +1,5 @@
-// The .vdvr file (docs/file-format.md): written whole or not at all, read only after everything in it has
-// been checked. Datasets are [z][y][x] and triples "ZYX", as MixedVolume holds them; grid attributes are
-// turned from x,y,z to z,y,x. Called by build, verify, render, probe, export, info.
+// Reads the .vdvr file (docs/file-format.md), only after everything in it has been checked. Called by verify,
+// render, probe, export, info.
 #include "host/volume/vdvr_file.hpp"
 
 #include <fmt/format.h>
@@ -16,15 +15,13 @@
 #include <span>
 
 #include "host/hdf5/hdf5_reader.hpp"
-#include "host/hdf5/hdf5_writer.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
-#include "host/system/scratch_pass.hpp"
 #include "host/volume/seal.hpp"
+#include "host/volume/vdvr_layout.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
-#include "vdvr/output_file.hpp"
 #include "vdvr/read_large.hpp"
 
 namespace vdvr {
@@ -32,76 +29,9 @@ namespace {
 
 namespace h5 = io::hdf5;
 
-static_assert(std::endian::native == std::endian::little,
-              "content_sha256 hashes memory, which must be little-endian");
-
-// Version 2 is version 1 with integer samples, version 3 with triples whose tiles have several types, version
-// 4 with a base coarser than the grid; a file has the lowest that says what it holds.
-constexpr int newest_version = 4;
 constexpr std::uint64_t longest_certificate = 64u << 20;
-// Of zlib's nine: within 1.5 % of the smallest on real volumes, at half the time of 6 (docs/file-format.md).
-constexpr unsigned deflate_level = 4;
-
-template <class T>
-std::array<T, 3> zyx(const std::array<T, 3>& xyz) {
-  return {xyz[2], xyz[1], xyz[0]};
-}
-
-h5::Shape shape_of(std::initializer_list<std::int64_t> extents) {
-  h5::Shape shape;
-  for (const std::int64_t n : extents) shape.push_back(static_cast<std::uint64_t>(n));
-  return shape;
-}
-
-h5::Shape base_shape(const MixedVolume& v) {
-  const Index3 s = v.base_samples();
-  return shape_of({s[2], s[1], s[0]});
-}
 
 std::string text_of(const h5::Shape& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
-
-bool is_coarse(const MixedVolume& v) { return v.coarsening != LevelTriple{0, 0, 0}; }
-
-/// As the file and its hash have it, z, y, x.
-std::array<std::int64_t, 3> wide(const LevelTriple& zyx) { return {zyx[0], zyx[1], zyx[2]}; }
-
-// --- writing ---
-
-void write_grid(h5::Writer& file, const MixedVolume& v) {
-  file.group("/grid");
-  file.attribute("/grid", "cells", zyx(v.grid.cells));
-  file.attribute("/grid", "origin", zyx(v.grid.origin));
-  file.attribute("/grid", "spacing", zyx(v.grid.spacing));
-  file.attribute("/grid", "unit", v.grid.unit);
-  file.attribute("/grid", "granularity", std::int64_t{v.granularity});
-  file.attribute("/grid", "rate", std::int64_t{v.rate});
-  if (is_coarse(v)) file.attribute("/grid", "coarsening", wide(v.coarsening));
-}
-
-void write_index(h5::Writer& file, const MixedVolume& v) {
-  const Index3 b = v.bricks();
-  static_assert(sizeof(LevelTriple) == 3);
-  file.dataset("/level", shape_of({b[2], b[1], b[0], 3}),
-               std::span<const std::uint8_t>(v.level.data()->data(), 3 * v.level.size()));
-  file.dataset("/tile", shape_of({b[2], b[1], b[0]}), std::span<const std::uint32_t>(v.tile));
-}
-
-/// Samples, and offset and shift of each tile where they are integers.
-void write_block(h5::Writer& file, const std::string& path, const h5::Shape& shape, const SampleBlock& b) {
-  if (b.type == SampleType::f32) file.dataset(path, shape, std::span<const float>(b.f32));
-  else if (b.type == SampleType::u16) file.dataset(path, shape, std::span<const std::uint16_t>(b.u16));
-  else file.dataset(path, shape, std::span<const std::uint8_t>(b.u8));
-  if (b.type == SampleType::f32) return;
-  if (path == "/base") {
-    file.attribute(path, "offset", std::int64_t{b.offset.front()});
-    file.attribute(path, "shift", std::int64_t{b.shift.front()});
-    return;
-  }
-  file.dataset(path + "_offset", {b.offset.size()}, std::span<const std::int32_t>(b.offset));
-  file.dataset(path + "_shift", {b.shift.size()}, std::span<const std::uint8_t>(b.shift));
-}
-
-// --- reading ---
 
 int read_version(const h5::Reader& file) {
   if (!file.has_attribute("/", "format") || file.text_attribute("/", "format") != "vdvr")
@@ -300,19 +230,6 @@ void read_samples(const h5::Reader& file, const h5::Dataset& d, const Reading& r
   else into(b.u8);
 }
 
-constexpr const char* kTotals = "/brick_total";
-constexpr const char* kCertificate = "/certificate";
-/// In its place where nothing is certified, so that nobody takes the one for the other.
-constexpr const char* kComparison = "/comparison";
-
-void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
-  const Index3 b = v.bricks();
-  if (totals.size() != v.level.size())
-    throw InputError(
-        fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(), v.level.size()));
-  file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
-}
-
 /// Bounds by brick, where the file has them; none is above what the certificate promises of all.
 void read_totals(const h5::Reader& file, const MixedVolume& v, Certificate& c) {
   if (!file.has(kTotals)) return;
@@ -447,29 +364,6 @@ std::string read_altered(const h5::Reader& file, VdvrFile& result) {
       altered, altered.empty() ? "" : "; ", found, result.certificate.content_sha256);
 }
 
-// --- content hash ---
-
-template <class T>
-void add(Sha256& hash, std::span<const T> values) {
-  hash.update(values.data(), values.size_bytes());
-}
-
-void add_grid(Sha256& hash, const MixedVolume& v) {
-  const auto cells = zyx(v.grid.cells);
-  const auto origin = zyx(v.grid.origin), spacing = zyx(v.grid.spacing);
-  add(hash, std::span<const std::int64_t>(cells));
-  add(hash, std::span<const double>(origin));
-  add(hash, std::span<const double>(spacing));
-  // Unit texts hold no zero byte and the granularity ends in seven, so two different grids never give the
-  // same bytes.
-  hash.update(v.grid.unit.data(), v.grid.unit.size());
-  const std::array<std::int64_t, 2> counts{v.granularity, v.rate};
-  add(hash, std::span<const std::int64_t>(counts));
-  if (!is_coarse(v)) return;
-  const auto coarsening = wide(v.coarsening);
-  add(hash, std::span<const std::int64_t>(coarsening));
-}
-
 VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
   const h5::Reader file(path, h5::Links::hard);
   VdvrFile result;
@@ -494,79 +388,6 @@ VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
 }
 
 }  // namespace
-
-std::string content_sha256(const MixedVolume& v) {
-  Sha256 hash;
-  ScratchPass pass;
-  pass.add(v);
-  const auto add_samples = [&](const SampleBlock& block) {
-    const auto* from = static_cast<const std::byte*>(block.data());
-    for (std::uint64_t at = 0; at < block.bytes(); at += ScratchPass::at_once) {
-      const std::uint64_t n = std::min(ScratchPass::at_once, block.bytes() - at);
-      hash.update(from + at, n);
-      pass.touched(n);
-    }
-  };
-  add_grid(hash, v);
-  const bool integers = has_integers(v);
-  if (integers) hash.update(&v.step, sizeof v.step);
-  add_samples(v.base);
-  add(hash, std::span<const LevelTriple>(v.level));
-  add(hash, std::span<const std::uint32_t>(v.tile));
-  for (const auto& [triple, block] : v.tiles) add_samples(block);
-  // The base's offset and shift are attributes: 64 bits.
-  if (v.base.type != SampleType::f32) {
-    const std::array<std::int64_t, 1> offset{v.base.offset.front()};
-    add(hash, std::span<const std::int64_t>(offset));
-  }
-  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::int32_t>(block.offset));
-  if (v.base.type != SampleType::f32) {
-    const std::array<std::int64_t, 1> shift{v.base.shift.front()};
-    add(hash, std::span<const std::int64_t>(shift));
-  }
-  for (const auto& [triple, block] : v.tiles) add(hash, std::span<const std::uint8_t>(block.shift));
-  return hash.hex();
-}
-
-void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const Certificate& certificate,
-                Compression compression) {
-  if (const auto p = volume_problem(v))
-    throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
-  Certificate stored = certificate;
-  if (stored.content_sha256.empty()) stored.content_sha256 = content_sha256(v);
-  stored.sealed = true;
-  const std::string json = to_json(stored);
-
-  io::AtomicFile target(path);
-  {
-    h5::Writer file(target.temporary(), path,
-                    {.deflate_level = compression == Compression::deflate ? deflate_level : 0});
-    file.attribute("/", "format", std::string("vdvr"));
-    file.attribute("/", "format_version",
-                   std::int64_t{is_coarse(v)      ? 4
-                                : has_parts(v)    ? 3
-                                : has_integers(v) ? 2
-                                                  : 1});
-    file.attribute("/", "generator", std::string("vdvr " VDVR_VERSION));
-    if (has_integers(v)) file.attribute("/", "step", v.step);
-    write_grid(file, v);
-    write_block(file, "/base", base_shape(v), v.base);
-    write_index(file, v);
-    file.group("/tiles");
-    for (const auto& [triple, samples] : v.tiles) {
-      if (samples.size() == 0) continue;
-      const auto side = v.tile_shape(triple);
-      const auto count = static_cast<std::int64_t>(samples.size()) / v.tile_size(triple);
-      write_block(file, path_of(triple), shape_of({count, side[0], side[1], side[2]}), samples);
-    }
-    if (stored.comparison) stored.brick_totals.clear();
-    file.text(stored.comparison ? kComparison : kCertificate, json);
-    if (!stored.brick_totals.empty()) write_totals(file, v, stored.brick_totals);
-    file.attribute("/", kSeal, seal_of(json, stored.brick_totals, file.attributes()));
-    file.close();
-  }
-  target.commit();
-}
 
 const char* text_of(Seal seal) {
   switch (seal) {

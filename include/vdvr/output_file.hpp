@@ -1,8 +1,9 @@
 // An output file or folder that appears only whole: written under a temporary name in the same folder,
-// flushed, renamed.
+// flushed, renamed. Nothing appears once a stop was requested (stop.hpp).
 #pragma once
 
 #include <filesystem>
+#include <list>
 #include <string>
 
 #include "vdvr/export.hpp"
@@ -20,12 +21,26 @@ class VDVR_API AtomicFile {
 
   /// Where to write; close it before commit().
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
-  /// fsync, rename over the target, fsync the folder. Throws ResourceError (disk).
+  /// fsync, rename over the target, fsync the folder. Throws ResourceError (disk), Interrupted.
   void commit();
 
  private:
+  friend class AtomicFiles;
+  void put_in_place();
   std::filesystem::path target_, temporary_;
   bool committed_ = false;
+};
+
+/// Files that belong together: all of them appear, or none.
+class VDVR_API AtomicFiles {
+ public:
+  /// Where to write what will be `target`, with any writer that takes a path. Throws as AtomicFile.
+  [[nodiscard]] const std::filesystem::path& add(const std::filesystem::path& target);
+  /// Puts all in place, in the order of add(). Throws as AtomicFile::commit.
+  void commit();
+
+ private:
+  std::list<AtomicFile> files_;
 };
 
 /// The same for a folder, with all that is put into it.
@@ -41,10 +56,11 @@ class VDVR_API AtomicFolder {
   /// Where to put files; close them before commit().
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
   /// Flushes, and puts it in the place of the target, which is removed with all that is in it: whoever calls
-  /// this has looked whether it may be. Throws ResourceError (disk).
+  /// this has looked whether it may be. Throws ResourceError (disk), Interrupted.
   void commit();
 
  private:
+  void put_in_place(const std::filesystem::path& aside);
   std::filesystem::path target_, temporary_;
   bool committed_ = false;
 };

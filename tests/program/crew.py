@@ -285,9 +285,30 @@ def kills(work, launchers, workers, leaders):
     left = {p.name for p in work.folder.iterdir()} - {"scan.h5", "messages", "o.vdvr.journal"}
     check(is_done(work) or not left, f"an interrupted job left {left}")
     finish(work, expected, launcher, 2)
-    # A rank that hangs is given up, and its blocks are computed elsewhere.
+    # A rank that hangs is given up, and its blocks are computed elsewhere; at the end it is not waited for.
+    hang(work, launcher, lambda _: time.sleep(0.7 * whole))
+    finish(work, expected, launcher, 2)
+    hang(work, launcher, lambda job: wait_until(job, lambda: "verify" in messages_of(work)))
+    finish(work, expected, launcher, 2)
+    hang(work, launcher, lambda job: wait_until(job, lambda: work.out.exists()))
+    finish(work, expected, launcher, 2)
+    print(f"{workers} ranks that work and {leaders} that lead were killed: {resumed} jobs were resumed, "
+          f"{went_on} went on by themselves; a whole one takes {whole:.1f} s")
+
+
+def messages_of(work):
+    return (work.folder / "messages").read_text(encoding="utf-8", errors="replace")
+
+
+def wait_until(job, holds):
+    while job.poll() is None and not holds():
+        time.sleep(0.002)
+
+
+def hang(work, launcher, wait):
+    """Stops a rank of a job once `wait` returns; the job ends all the same."""
     job = start(work, launcher, 3, "--give-up", "2")
-    time.sleep(0.7 * whole)
+    wait(job)
     ranks = ranks_of(job.pid, launcher[1])
     if len(ranks) == 3:
         os.kill(ranks[2], signal.SIGSTOP)
@@ -299,9 +320,6 @@ def kills(work, launchers, workers, leaders):
                 os.kill(rank, signal.SIGKILL)
             except ProcessLookupError:
                 pass
-    finish(work, expected, launcher, 2)
-    print(f"{workers} ranks that work and {leaders} that lead were killed: {resumed} jobs were resumed, "
-          f"{went_on} went on by themselves; a whole one takes {whole:.1f} s")
 
 
 def main():

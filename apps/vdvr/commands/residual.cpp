@@ -161,12 +161,12 @@ int residual_command(Arguments& args) {
   const std::int64_t last = result.first_row + result.rows - 1,
                      row = args.integer_or("picture-row", result.first_row + result.rows / 2,
                                            result.first_row, last);
+  const std::string caption = fmt::format("{}, row {}: measured less integral of F", scan.report.name, row);
+  Image picture;
+  if (!outputs.picture.empty()) picture = residual_picture(result, summary, row, caption);
   throw_if_stopped();
   if (!outputs.values.empty()) write_residual(outputs.values, result);
-  if (!outputs.picture.empty())
-    write_png(outputs.picture, residual_picture(result, summary, row,
-                                                fmt::format("{}, row {}: measured less integral of F",
-                                                            scan.report.name, row)));
+  if (!outputs.picture.empty()) write_png(outputs.picture, picture);
   progress.clear();
 
   Json json = {{"scan", projections.string()},
