@@ -7,6 +7,7 @@
 
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
+#include "apps/vdvr/picture_tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/explain_pixel.hpp"
 #include "vdvr/hash.hpp"
@@ -138,20 +139,6 @@ void write_shown(const Outputs& out, const std::string& show, const PixelBounds&
   else write_png(out.picture, as_image(values));
 }
 
-/// Says which pixels lie beyond; how many.
-std::int64_t beyond(const PictureBound& bound, double tolerance, std::string& text) {
-  std::int64_t count = 0;
-  for (std::size_t i = 0; i < bound.levels.values.size(); ++i) {
-    if (static_cast<double>(bound.levels.values[i]) <= tolerance) continue;
-    const auto at = static_cast<std::int64_t>(i);
-    if (++count <= 8)
-      text += fmt::format("{}({}, {}) {:.1f}", count == 1 ? "" : ", ", at % bound.levels.width,
-                          at / bound.levels.width, bound.levels.values[i]);
-  }
-  if (count > 8) text += fmt::format(" and {} more", count - 8);
-  return count;
-}
-
 struct Explained {
   std::int64_t x = 0, y = 0;
   PixelExplanation why;
@@ -234,13 +221,11 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
         const Outputs& out, const Made& made, const PictureBound& bound, const Json& json) {
   const Scene& scene = source.scene();
   const auto why = explained(args, scene, o, made.bounds.sampler);
-  std::string pixels;
-  const std::optional<double> tolerance = args.number("picture-tolerance");
-  const std::int64_t over = tolerance ? beyond(bound, *tolerance, pixels) : 0;
+  const std::optional<PixelsBeyond> beyond = pixels_beyond(args, bound);
   Json printed = json;
   printed["output"] = out.picture.string();
   printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
-  if (tolerance) printed["picture_tolerance"] = {{"levels", *tolerance}, {"pixels_beyond", over}};
+  if (beyond) printed["picture_tolerance"] = tolerance_json(*beyond);
   if (why) printed["explain"] = explained_json(*why);
   print_result(common, printed, [&] {
     const bool slice = o.mode == RenderMode::slice;
@@ -255,11 +240,10 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
       print_explained(
           *why, scene, o,
           static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
-    if (tolerance && over == 0) fmt::print("  every pixel is certain to {:g} levels\n", *tolerance);
+    print_tolerance(beyond);
   });
-  if (over == 0) return 0;
-  throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", out.picture.string(),
-                                  over, *tolerance, pixels));
+  require_within(out.picture, beyond);
+  return 0;
 }
 
 void check_file(const Arguments& args, const Scene& scene, const RenderOptions& o) {
@@ -315,7 +299,9 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
   }
   if (o.mode == RenderMode::iso || o.mode == RenderMode::mip) {  // ray_certificate.hpp
     refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
-    refuse(args, {"picture-tolerance"}, "is of --mode dvr and slice");
+    if (o.mode == RenderMode::iso)
+      refuse(args, {"picture-tolerance"}, "is of colours, in levels of 255; a surface has a band of depth");
+    check_tolerance(args);
     if (const std::string form = form_of(args); form != "exact")
       throw InputError(
           fmt::format("--certify {} is of --mode dvr; iso and mip have the exact one alone", form));
@@ -339,8 +325,7 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
   if (o.gradient == GradientKind::stored)
     throw InputError("--gradient stored: a certified picture takes central or analytic");
   refuse(args, {"unverified"}, "excludes --certify");
-  if (const auto levels = args.number("picture-tolerance"); levels && !(*levels >= 0 && *levels <= 255))
-    throw InputError(fmt::format("--picture-tolerance: {:g} is not within 0 and 255 levels", *levels));
+  check_tolerance(args);
   if (args.path("output").extension() == ".npy" && !of_bounds)
     throw InputError("--certify: as .npy there are --show bound, lo, hi and middle");
 }

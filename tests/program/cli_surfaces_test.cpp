@@ -122,6 +122,33 @@ BOOST_AUTO_TEST_CASE(a_slice_has_its_bound_and_its_tolerance) {
   BOOST_TEST(run(beyond).code == 1);
 }
 
+BOOST_AUTO_TEST_CASE(a_maximum_has_its_tolerance_and_a_surface_has_none) {
+  const auto draw = [](const std::string& name, const std::string& levels) {
+    return run({"render", small_volume(), "--mode", "mip", "--size", "48x48", "--picture-tolerance", levels,
+                "-o", at(name), "--json"});
+  };
+  const Ended within = draw("mip-in.png", "255");
+  BOOST_REQUIRE_MESSAGE(within.code == 0, within.err);
+  const auto json = nlohmann::json::parse(within.out);
+  BOOST_TEST(json.at("picture_tolerance").at("pixels_beyond") == 0);
+  const double worst = json.at("certificate").at("levels").at("max").get<double>();
+  BOOST_REQUIRE(worst > 1);
+  const Ended beyond = draw("mip-out.png", std::to_string(worst - 0.5));
+  BOOST_TEST(beyond.code == 1);
+  const auto pixel = json.at("certificate").at("worst_pixel");
+  const std::string named =
+      "(" + std::to_string(pixel.at(0).get<int>()) + ", " + std::to_string(pixel.at(1).get<int>()) + ")";
+  BOOST_TEST(beyond.err.find("not certain") != std::string::npos);
+  // What is not met is written all the same, and the worst pixel is named where few are.
+  BOOST_TEST(json_of(at("mip-out.certificate.json")).at("levels").at("max").get<double>() == worst);
+  BOOST_TEST((beyond.err.find("more") != std::string::npos || beyond.err.find(named) != std::string::npos));
+  check_refused({"render", small_volume(), "--mode", "iso", "--iso", "0.5", "--picture-tolerance", "4", "-o",
+                 at("no.png")},
+                "--picture-tolerance");
+  check_refused({"render", small_volume(), "--mode", "mip", "--picture-tolerance", "300", "-o", at("no.png")},
+                "300");
+}
+
 BOOST_AUTO_TEST_CASE(what_has_no_certificate_by_ray_is_refused) {
   const std::string out = at("refused.png");
   check_refused({"render", small_volume(), "--mode", "error", "--certify", "-o", out}, "--certify");

@@ -490,7 +490,7 @@ int render_command(Arguments& args) {
                                   ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
                               : certifies ? source.draw(o)
                                           : draw_one(stage, o, output, kind);
-  Json ray_certificate;
+  RayCertificate ray_certificate;
   if (certifies)
     ray_certificate = write_ray_certificate(args, source, o, result, output, progress.callback());
   progress.clear();
@@ -504,23 +504,25 @@ int render_command(Arguments& args) {
   const bool has_transfer = o.mode == RenderMode::dvr || o.mode == RenderMode::mip;
   const bool lit = (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) &&
                    (o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour));
-  const Json json = {{"output", output.string()},
-                     {"frames", frames},
-                     {"frames_kept", turned.kept},
-                     {"verified", certified},
-                     {"sampler", sampler_name(result.sampler)},
-                     {"sampler_reason", result.sampler_reason},
-                     {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
-                     {"samples", result.samples},
-                     {"seconds", result.seconds},
-                     {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
-                     {"outside_certificate", outside_certificate(o)},
-                     {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
-                     {"method", method},
-                     {"certificate", ray_certificate},
-                     {"resident_bytes", source.bytes()},
-                     {"paging", paging_json(source.paging())},
-                     {"device", source.device().info().name}};
+  const Json json = {
+      {"output", output.string()},
+      {"frames", frames},
+      {"frames_kept", turned.kept},
+      {"verified", certified},
+      {"sampler", sampler_name(result.sampler)},
+      {"sampler_reason", result.sampler_reason},
+      {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
+      {"samples", result.samples},
+      {"seconds", result.seconds},
+      {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
+      {"outside_certificate", outside_certificate(o)},
+      {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
+      {"method", method},
+      {"certificate", ray_certificate.json},
+      {"picture_tolerance", ray_certificate.beyond ? tolerance_json(*ray_certificate.beyond) : Json()},
+      {"resident_bytes", source.bytes()},
+      {"paging", paging_json(source.paging())},
+      {"device", source.device().info().name}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
@@ -550,6 +552,7 @@ int render_command(Arguments& args) {
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,
                source.device().info().name);
   });
+  require_within(output, ray_certificate.beyond);
   return 0;
 }
 
