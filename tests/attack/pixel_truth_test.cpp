@@ -163,7 +163,11 @@ BOOST_AUTO_TEST_CASE(every_crossing_of_the_surface_is_in_its_band) {
           };
           const Crossing c = first_crossing(field, ray, value);
           ++hits[static_cast<std::size_t>(c.hit)];
-          if (c.from_start) continue;
+          if (c.from_start) {
+            if (c.hit == Hit::sure && !support::passes(f, begin, c.last, value, step, s.field.slope))
+              ++outside;
+            continue;
+          }
           const double sign = f(begin) < value ? 1 : -1, before = c.hit == Hit::none ? end : c.first;
           for (double t = begin; t < before; t += step)
             if (!(sign * (f(t) - value) < 0)) ++outside;
