@@ -155,6 +155,18 @@ void check_integral(const Field& field, const CertifiedPicture& picture, const G
        static_cast<double>(again.integrals.high.values[i]) + std::abs(fine - coarse));
 }
 
+/// Whether F comes to the value before `last`, where it is surely on one side, or as near to it from there as
+/// it moves between two places.
+bool meets(const Field& field, const RaySteps& steps, const std::vector<double>& values, double last,
+           double value, double moves) {
+  const double end = field({steps.at(last)}).front(), side = end < value ? 1 : -1;
+  double other = side * (end - value);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (steps.first + (static_cast<double>(k) + 0.5) * steps.length < last)
+      other = std::max(other, side * (values[k] - value));
+  return other >= -moves;
+}
+
 void check_crossing(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
                     std::size_t i, RayCheck& check) {
   const auto at = static_cast<std::int64_t>(i);
@@ -164,8 +176,17 @@ void check_crossing(const Field& field, const CertifiedPicture& picture, const G
   const int hit = again.surface.hit[i];
   const double value = o.surfaces.front().value,
                first = hit == 0 ? steps.last : static_cast<double>(again.surface.first.values[i]);
-  if (!(first > steps.first)) return;  // possible from the start: nothing is said
   const std::vector<double> values = field(steps.points);
+  // The most that F moves from one place to the next, as neighbours show.
+  double moves = 0;
+  for (std::size_t k = 1; k < values.size(); ++k)
+    moves = std::max(moves, std::abs(values[k] - values[k - 1]));
+  if (!(first > steps.first)) {  // the side is unknown on which F begins
+    if (hit == 2 &&
+        !meets(field, steps, values, static_cast<double>(again.surface.last.values[i]), value, moves))
+      ++check.outside;
+    return;
+  }
   const double side = values.front() < value ? 1 : -1;
   bool early = false;
   for (std::size_t k = 0; k < values.size(); ++k)
@@ -174,11 +195,8 @@ void check_crossing(const Field& field, const CertifiedPicture& picture, const G
   bool reached = hit != 2;
   if (hit == 2) {
     const double last = static_cast<double>(again.surface.last.values[i]);
-    // The end of the band is rounded to float32: four units of it, by the slope that neighbours show.
-    double slope = 0;
-    for (std::size_t k = 1; k < values.size(); ++k)
-      slope = std::max(slope, std::abs(values[k] - values[k - 1]) / steps.length);
-    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * slope;
+    // The end of the band is rounded to float32: four units of it.
+    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * moves / steps.length;
   }
   if (early || !reached) ++check.outside;
 }

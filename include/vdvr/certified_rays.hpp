@@ -29,7 +29,8 @@ struct SurfaceBounds {
   /// 0: F does not pass the value on that ray. 1: it may. 2: it does.
   std::vector<std::uint8_t> hit;
   /// Distances from the eye, world units: where F passes first lies between; `last` only where it is sure;
-  /// NaN where there is none. Where a ray begins within the bound of the value, `first` is where it begins.
+  /// NaN where there is none. Where a ray begins within the bound of the value, `first` is where it begins,
+  /// and it is sure where F is surely on both sides of the value further on.
   FloatImage first, last;
 
   [[nodiscard]] double share(std::uint8_t kind) const;
