@@ -187,7 +187,7 @@ BOOST_AUTO_TEST_CASE(an_integral_has_its_values_its_bound_and_its_tolerance) {
     const double half = 0.5 * (static_cast<double>(hi[i]) - static_cast<double>(lo[i]));
     BOOST_TEST(std::abs(static_cast<double>(v[i]) - (static_cast<double>(lo[i]) + half)) <= half);
   }
-  BOOST_TEST(met > 400u);
+  BOOST_TEST(met > 200u);
   const Ended within = draw("integral-in.png", {"--picture-tolerance", "255"});
   BOOST_TEST(within.code == 0, within.err);
   BOOST_TEST(draw("integral-out.png", {"--picture-tolerance", "0.1"}).code == 1);
