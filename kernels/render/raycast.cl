@@ -36,6 +36,10 @@
 #include "device/packet_sampler.h"
 
 #include "device/raycast_dvr.h"
+// Here for both: a text is put where it is first named, and nowhere else.
+#if VDVR_KERNEL == VDVR_KERNEL_ISO || VDVR_KERNEL == VDVR_KERNEL_INTEGRAL
+#include "device/ray_cells.h"
+#endif
 #if VDVR_KERNEL == VDVR_KERNEL_PREINTEGRATED
 #include "device/raycast_preintegrated.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_LEVEL
