@@ -32,7 +32,8 @@ struct Parts {
   bool values;
 };
 
-/// All that the picture follows from; its file's hash comes when it is written.
+}  // namespace
+
 CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
                            const fs::path& output) {
   const Scene& scene = source.scene();
@@ -51,6 +52,8 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   return picture;
 }
 
+namespace {
+
 void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image, const Parts& parts) {
   if (parts.values) {
     const FloatImage classes{
@@ -68,8 +71,8 @@ void write_surface(const std::string& show, const SurfaceBounds& bounds, Image i
   write_png(parts.picture, image);
 }
 
-Json surface(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
-             const Scene& scene, const Image& image, const Parts& parts, const Progress& progress) {
+RayCertificate surface(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
+                       const Scene& scene, const Image& image, const Parts& parts, const Progress& progress) {
   const RenderOptions& o = picture.options;
   const SurfaceBounds bounds = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
   throw_if_stopped();
@@ -79,11 +82,12 @@ Json surface(const std::string& show, const CertifiedRays& rays, CertifiedPictur
   Json json = certificate_head(picture, *scene.certificate, statement_of(RenderMode::iso));
   json["iso"] = surface_json(bounds, scene.volume.grid.unit);
   if (show == "band") json["picture"]["band_at_white"] = json["iso"]["band_p99"];
-  return json;
+  return {std::move(json), std::nullopt};
 }
 
-Json maximum(const std::string& show, const CertifiedRays& rays, CertifiedPicture& picture,
-             const Scene& scene, const Image& image, const Parts& parts, const Progress& progress) {
+RayCertificate maximum(const Arguments& args, const std::string& show, const CertifiedRays& rays,
+                       CertifiedPicture& picture, const Scene& scene, const Image& image, const Parts& parts,
+                       const Progress& progress) {
   const RenderOptions& o = picture.options;
   const MaximumBounds maxima = rays.maximum(o.camera, o.width, o.height, progress);
   throw_if_stopped();
@@ -97,7 +101,7 @@ Json maximum(const std::string& show, const CertifiedRays& rays, CertifiedPictur
   picture.file_sha256 = sha256_of_file(parts.picture);
   Json json = picture_certificate_json(picture, bounds, bound, *scene.certificate);
   json["mip"] = maximum_json(maxima);
-  return json;
+  return {std::move(json), pixels_beyond(args, bound)};
 }
 
 }  // namespace
@@ -134,26 +138,27 @@ std::vector<fs::path> ray_certificate_paths(const fs::path& output, RenderMode m
   std::vector<fs::path> paths{output, output};
   paths[0].replace_extension(".certificate.json");
   paths[1].replace_extension(".bound.png");
-  if (mode != RenderMode::mip) paths.pop_back();
+  if (mode == RenderMode::iso) paths.pop_back();
   return paths;
 }
 
-Json write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
-                           RenderResult drawn, const fs::path& output, const Progress& progress) {
+RayCertificate write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
+                                     RenderResult drawn, const fs::path& output, const Progress& progress) {
   const Scene& scene = source.scene();
   CertifiedPicture picture = described(source, options, drawn, output);
   const CertifiedRays rays(scene.volume, *scene.certificate, false, box_of(options.clip));
   const std::string show = args.text_or("show", "colour");
   Parts parts(output, options.mode);
-  const Json json = options.mode == RenderMode::iso
-                        ? surface(show, rays, picture, scene, drawn.image, parts, progress)
-                        : maximum(show, rays, picture, scene, drawn.image, parts, progress);
-  io::write_file(parts.certificate, json.dump(2) + "\n");
+  RayCertificate made = options.mode == RenderMode::iso
+                            ? surface(show, rays, picture, scene, drawn.image, parts, progress)
+                            : maximum(args, show, rays, picture, scene, drawn.image, parts, progress);
+  io::write_file(parts.certificate, made.json.dump(2) + "\n");
   parts.files.commit();
-  return json;
+  return made;
 }
 
-void print_ray_certificate(const Json& json) {
+void print_ray_certificate(const RayCertificate& certificate) {
+  const Json& json = certificate.json;
   if (json.contains("iso")) {
     const Json& iso = json.at("iso");
     fmt::print(
@@ -172,6 +177,7 @@ void print_ray_certificate(const Json& json) {
       levels.at("mean").get<double>(), levels.at("max").get<double>());
   fmt::print("  certain      the maximum of F to +- {:.4g} in the mean, {:.4g} at most\n",
              mip.at("half_width_mean").get<double>(), mip.at("half_width_max").get<double>());
+  print_tolerance(certificate.beyond);
 }
 
 }  // namespace vdvr::cli

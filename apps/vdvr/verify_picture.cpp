@@ -32,9 +32,10 @@ using Field = std::function<std::vector<double>(const std::vector<Vec3>&)>;
 /// The intervals again, of what this device draws.
 struct Again {
   RenderResult drawn;
-  PixelBounds bounds;     ///< of all but iso
-  MaximumBounds maxima;   ///< of mip
-  SurfaceBounds surface;  ///< of iso
+  PixelBounds bounds;        ///< of all but iso
+  MaximumBounds maxima;      ///< of mip
+  IntegralBounds integrals;  ///< of integral
+  SurfaceBounds surface;     ///< of iso
   bool same_device = false;
 };
 void certify_again(Device& device, const ResidentVolume& resident, const CertifiedPicture& picture,
@@ -54,6 +55,11 @@ void certify_again(Device& device, const ResidentVolume& resident, const Certifi
   const CertifiedRays rays(file.volume, file.certificate, false, box_of(o.clip));
   if (o.mode == RenderMode::iso) {
     again.surface = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
+    return;
+  }
+  if (o.mode == RenderMode::integral) {
+    again.integrals = rays.integral(o.camera, o.width, o.height, progress);
+    again.bounds = greys_of_integrals(again.integrals, o);
     return;
   }
   again.maxima = rays.maximum(o.camera, o.width, o.height, progress);
@@ -132,6 +138,35 @@ void check_maximum(const Field& field, const CertifiedPicture& picture, const Gr
        static_cast<double>(again.maxima.high.values[i]));
 }
 
+/// By midpoints; what steps three times as long are off is an estimate of what these are.
+void check_integral(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                    std::size_t i, RayCheck& check) {
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+  if (steps.points.empty()) return;
+  const std::vector<double> values = field(steps.points);
+  double fine = 0, coarse = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    fine += values[k] * steps.length;
+    if (k % 3 == 1) coarse += values[k] * 3 * steps.length;
+  }
+  take(check, fine, static_cast<double>(again.integrals.low.values[i]) - std::abs(fine - coarse),
+       static_cast<double>(again.integrals.high.values[i]) + std::abs(fine - coarse));
+}
+
+/// Whether F comes to the value before `last`, where it is surely on one side, or as near to it from there as
+/// it moves between two places.
+bool meets(const Field& field, const RaySteps& steps, const std::vector<double>& values, double last,
+           double value, double moves) {
+  const double end = field({steps.at(last)}).front(), side = end < value ? 1 : -1;
+  double other = side * (end - value);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (steps.first + (static_cast<double>(k) + 0.5) * steps.length < last)
+      other = std::max(other, side * (values[k] - value));
+  return other >= -moves;
+}
+
 void check_crossing(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
                     std::size_t i, RayCheck& check) {
   const auto at = static_cast<std::int64_t>(i);
@@ -141,8 +176,17 @@ void check_crossing(const Field& field, const CertifiedPicture& picture, const G
   const int hit = again.surface.hit[i];
   const double value = o.surfaces.front().value,
                first = hit == 0 ? steps.last : static_cast<double>(again.surface.first.values[i]);
-  if (!(first > steps.first)) return;  // possible from the start: nothing is said
   const std::vector<double> values = field(steps.points);
+  // The most that F moves from one place to the next, as neighbours show.
+  double moves = 0;
+  for (std::size_t k = 1; k < values.size(); ++k)
+    moves = std::max(moves, std::abs(values[k] - values[k - 1]));
+  if (!(first > steps.first)) {  // the side is unknown on which F begins
+    if (hit == 2 &&
+        !meets(field, steps, values, static_cast<double>(again.surface.last.values[i]), value, moves))
+      ++check.outside;
+    return;
+  }
   const double side = values.front() < value ? 1 : -1;
   bool early = false;
   for (std::size_t k = 0; k < values.size(); ++k)
@@ -151,11 +195,8 @@ void check_crossing(const Field& field, const CertifiedPicture& picture, const G
   bool reached = hit != 2;
   if (hit == 2) {
     const double last = static_cast<double>(again.surface.last.values[i]);
-    // The end of the band is rounded to float32: four units of it, by the slope that neighbours show.
-    double slope = 0;
-    for (std::size_t k = 1; k < values.size(); ++k)
-      slope = std::max(slope, std::abs(values[k] - values[k - 1]) / steps.length);
-    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * slope;
+    // The end of the band is rounded to float32: four units of it.
+    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * moves / steps.length;
   }
   if (early || !reached) ++check.outside;
 }
@@ -181,10 +222,11 @@ RayCheck check_rays(const Arguments& args, const CertifiedPicture& picture, cons
     report(progress, "rays", static_cast<double>(check.rays) / static_cast<double>(wanted));
     const bool any = crossing.empty() || check.rays % 2 == 1;
     const std::size_t i = any ? random() % pixels : crossing[random() % crossing.size()];
-    const auto one = mode == RenderMode::iso     ? check_crossing
-                     : mode == RenderMode::mip   ? check_maximum
-                     : mode == RenderMode::slice ? check_grey
-                                                 : check_colours;
+    const auto one = mode == RenderMode::iso        ? check_crossing
+                     : mode == RenderMode::mip      ? check_maximum
+                     : mode == RenderMode::integral ? check_integral
+                     : mode == RenderMode::slice    ? check_grey
+                                                    : check_colours;
     one(field, picture, file.volume.grid, again, i, check);
   }
   return check;

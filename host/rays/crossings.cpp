@@ -36,19 +36,39 @@ Cubic beyond(const Cubic& b, double value, double sign, double added) {
   return out;
 }
 
+// Where F is surely above the value, or at it, and surely below or at it: the first place of each. Whatever
+// the side on which it begins, it has passed the value at the later of the two.
+struct BothSides {
+  std::optional<double> above, below;
+
+  [[nodiscard]] bool look(const RayPiece& piece, double value) {
+    const auto find = [&](std::optional<double>& found, double sign) {
+      if (!found)
+        found = does_reach(beyond(piece.value, value, sign, -piece.bound), piece.first, piece.last, depth);
+    };
+    find(above, 1);
+    find(below, -1);
+    return above && below;
+  }
+};
+
 }  // namespace
 
 Crossing first_crossing(const RayField& field, const WorldRay& ray, double value) {
   Crossing out;
   double sign = 0;
+  BothSides sides;
   field.walk(ray, [&](const RayPiece& piece) {
-    if (sign == 0) {
+    if (sign == 0 && !out.from_start) {
       const double start = piece.value[0];
-      if (!(std::abs(start - value) > piece.bound)) {
-        out = {Hit::possible, piece.first, 0, true};
-        return false;
-      }
-      sign = start < value ? 1 : -1;
+      if (!(std::abs(start - value) > piece.bound)) out = {Hit::possible, piece.first, 0, true};
+      else sign = start < value ? 1 : -1;
+    }
+    if (out.from_start) {
+      if (!sides.look(piece, value)) return true;
+      out.hit = Hit::sure;
+      out.last = std::max(*sides.above, *sides.below);
+      return false;
     }
     // The entry of a piece is one of its places: V and the bound may have jumped there without a root.
     if (out.hit == Hit::none)

@@ -13,7 +13,9 @@ enum class Hit : std::uint8_t { none = 0, possible = 1, sure = 2 };
 struct Crossing {
   Hit hit = Hit::none;
   double first = 0, last = 0;  ///< along the ray, world units; last only where it is sure
-  bool from_start = false;     ///< F may be on either side of the value where the ray begins
+  /// F may be on either side of the value where the ray begins, which `first` is. Sure where it is surely on
+  /// both sides further on, or at the value.
+  bool from_start = false;
 };
 Crossing first_crossing(const RayField& field, const WorldRay& ray, double value);
 

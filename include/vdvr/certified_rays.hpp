@@ -1,5 +1,5 @@
 // Pictures of the ideal field F, as far as a certificate tells them: intervals of colours, of the depth of a
-// surface, of a maximum (docs/pixel-bounds.md). Double precision on the host, ray by ray.
+// surface, of a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the host, ray by ray.
 #pragma once
 
 #include <array>
@@ -29,7 +29,8 @@ struct SurfaceBounds {
   /// 0: F does not pass the value on that ray. 1: it may. 2: it does.
   std::vector<std::uint8_t> hit;
   /// Distances from the eye, world units: where F passes first lies between; `last` only where it is sure;
-  /// NaN where there is none. Where a ray begins within the bound of the value, `first` is where it begins.
+  /// NaN where there is none. Where a ray begins within the bound of the value, `first` is where it begins,
+  /// and it is sure where F is surely on both sides of the value further on.
   FloatImage first, last;
 
   [[nodiscard]] double share(std::uint8_t kind) const;
@@ -39,6 +40,13 @@ struct SurfaceBounds {
 /// infinite where a ray passes a brick that was not tested.
 struct MaximumBounds {
   FloatImage low, high, first, last;
+};
+
+/// The integral of F along rays inside the covered region, density times world unit: [y][x], 0 and 0 where a
+/// ray misses it. Infinite ends where a ray passes a brick that was not tested.
+struct IntegralBounds {
+  FloatImage low, high;
+  std::vector<std::uint8_t> met;  ///< 1 where a ray meets the region
 };
 
 class VDVR_API CertifiedRays {
@@ -63,6 +71,8 @@ class VDVR_API CertifiedRays {
                                       double value, const Progress& progress = {}) const;
   [[nodiscard]] MaximumBounds maximum(const Camera& camera, std::int64_t width, std::int64_t height,
                                       const Progress& progress = {}) const;
+  [[nodiscard]] IntegralBounds integral(const Camera& camera, std::int64_t width, std::int64_t height,
+                                        const Progress& progress = {}) const;
 
  private:
   struct Impl;

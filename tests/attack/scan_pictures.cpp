@@ -133,6 +133,22 @@ double interpolation_error(const ExactField& exact, const std::vector<Line>& lin
   return most;
 }
 
+// Whether F meets the value before `last`, where it is surely on one side: it comes as near to the other as
+// it moves from one place of the line to the next.
+bool meets(const Line& line, const ExactField& exact, const WorldRay& ray, double last, double value,
+           double doubt) {
+  const double end = exact.at(std::vector<Vec3>{ray.at(last)})[0], sign = end < value ? 1 : -1,
+               step = line.h / (between / an_eighth);
+  double other = sign * (end - value), moves = 0, before = end;
+  for (double t = last - step; t > line.first; t -= step) {
+    const double f = line.at(t);
+    moves = std::max(moves, std::abs(f - before));
+    other = std::max(other, sign * (f - value));
+    before = f;
+  }
+  return other >= -moves - doubt;
+}
+
 void surfaces(const VdvrFile& file, const RayField& field, const ExactField& exact, const RenderOptions& o,
               const std::vector<std::size_t>& pixels, const std::vector<Line>& lines, double doubt,
               Tally& tally) {
@@ -146,7 +162,10 @@ void surfaces(const VdvrFile& file, const RayField& field, const ExactField& exa
       if (!(begin < end)) continue;
       const Crossing c = first_crossing(field, ray, value);
       ++tally.crossings;
-      if (c.from_start) continue;
+      if (c.from_start) {
+        if (c.hit == Hit::sure && !meets(lines[k], exact, ray, c.last, value, doubt)) ++tally.beside;
+        continue;
+      }
       const double at_begin = exact.at(std::vector<Vec3>{ray.at(begin)})[0];
       const double sign = at_begin < value ? 1 : -1, before = c.hit == Hit::none ? end : c.first;
       bool wrong = false;

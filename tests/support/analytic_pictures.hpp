@@ -82,6 +82,16 @@ inline AnalyticField blobs(std::int64_t cells) {
   return f;
 }
 
+/// Whether `f` can have met the value in [first, last], at whose end it is surely on one side: it comes as
+/// near to the other as it moves between two places of so many, `slope` being its largest.
+template <class Field>
+bool passes(const Field& f, double first, double last, double value, double step, double slope) {
+  const double sign = f(last) < value ? 1 : -1;
+  double other = sign * (f(last) - value);
+  for (double t = first; t < last; t += step) other = std::max(other, sign * (f(t) - value));
+  return other >= -slope * step / 2 * (1 + 0x1p-20);
+}
+
 /// On the centred grid of spacing 1.
 inline MixedVolume volume_of(const AnalyticField& f, const std::vector<LevelTriple>& levels, unsigned seed,
                              const LevelTriple& coarsening = {}) {
