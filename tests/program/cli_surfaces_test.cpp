@@ -235,6 +235,36 @@ BOOST_AUTO_TEST_CASE(a_build_is_refined_until_its_pictures_are_certain) {
   BOOST_TEST(std::abs(json.at("certificate").at("epsilon").get<double>() - 0.25) < 1e-12);
   const Ended verified = run({"verify", out, "--projections", small_scan()});
   BOOST_TEST(verified.code == 0, verified.err);
+
+  // What plan says of the same build. docs/surfaces.md states the factor.
+  constexpr double stated = 2;
+  const Ended p = run({"plan", small_scan(), "--picture-tolerance", "40", "--views", views,
+                       "--picture-finest", "2%", "--json"});
+  BOOST_REQUIRE_MESSAGE(p.code == 0, p.err);
+  const auto plan = nlohmann::json::parse(p.out);
+  const auto& foreseen = plan.at("foreseen").at("pictures");
+  const double ratio = foreseen.at("samples_ratio").get<double>(),
+               built = json.at("storage").at("samples_ratio").get<double>();
+  BOOST_TEST(ratio <= stated * built);
+  BOOST_TEST(built <= stated * ratio);
+  BOOST_TEST(plan.at("foreseen").at("samples_ratio") == foreseen.at("samples_ratio"));
+  const auto& rounds = foreseen.at("rounds");
+  BOOST_TEST(rounds.size() > 1u);
+  BOOST_TEST(rounds.back().at("worst").get<double>() <= 40);
+  // Without refinement neither is within the tolerance.
+  BOOST_TEST(rounds.front().at("worst").get<double>() > 40);
+  BOOST_TEST(pictures.at("rounds").front().at("worst").get<double>() > 40);
+  const auto& bounds = foreseen.at("bounds");
+  BOOST_TEST(bounds.at("least").get<double>() > 0);
+  BOOST_TEST(bounds.at("least").get<double>() < bounds.at("largest").get<double>());
+  BOOST_TEST(bounds.at("largest").get<double>() <= json.at("certificate").at("epsilon_abs").get<double>());
+  BOOST_TEST(foreseen.at("bytes").get<double>() > 0);
+  BOOST_TEST(foreseen.at("seconds").get<double>() > 0);
+  check_refused({"plan", small_scan(), "--picture-tolerance", "40", "--views", views, "--ranks", "2"},
+                "--picture-tolerance");
+  check_refused(
+      {"plan", small_scan(), "--picture-tolerance", "40", "--views", views, "--picture-finest", "30%"},
+      "--picture-finest");
 }
 
 BOOST_AUTO_TEST_CASE(views_that_make_no_sense_are_refused_by_name) {
@@ -249,8 +279,10 @@ BOOST_AUTO_TEST_CASE(views_that_make_no_sense_are_refused_by_name) {
   for (const auto& [text, named] : bad) {
     write(views, text);
     check_refused({"build", small_scan(), "--picture-tolerance", "8", "--views", views, "-o", out}, named);
+    check_refused({"plan", small_scan(), "--picture-tolerance", "8", "--views", views}, named);
   }
   check_refused({"build", small_scan(), "--picture-tolerance", "8", "-o", out}, "--views");
+  check_refused({"plan", small_scan(), "--picture-tolerance", "8"}, "--views");
   check_refused({"build", small_scan(), "--epsilon", "3%", "--views", views, "-o", out},
                 "--picture-tolerance");
 }
