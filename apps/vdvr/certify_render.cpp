@@ -278,7 +278,7 @@ void add_certify(Arguments& args) {
                      "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
                      "region alone. chord: some per cent narrower, in twice the time; fast: in one pass, 1.4 "
                      "to 3 times as "
-                     "wide. Of slices and mip alike; of iso: where "
+                     "wide. Of slices, mip and integrals alike; of iso: where "
                      "F has the surface for sure, may have it (striped), or not")
       .value("certify-parts", "K",
              "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
@@ -297,18 +297,19 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
     if (of_bounds) throw InputError(fmt::format("--show {} goes with --certify", show));
     return;
   }
-  if (o.mode == RenderMode::iso || o.mode == RenderMode::mip) {  // ray_certificate.hpp
+  if (is_certified_by_ray(o.mode)) {  // ray_certificate.hpp
     refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
     if (o.mode == RenderMode::iso)
       refuse(args, {"picture-tolerance"}, "is of colours, in levels of 255; a surface has a band of depth");
     check_tolerance(args);
     if (const std::string form = form_of(args); form != "exact")
       throw InputError(
-          fmt::format("--certify {} is of --mode dvr; iso and mip have the exact one alone", form));
+          fmt::format("--certify {} is of --mode dvr; iso, mip and integral have the exact one alone", form));
     return;
   }
   if (o.mode == RenderMode::error)
-    throw InputError("--certify: pictures of --mode dvr, iso, mip and slice are certified, not of error");
+    throw InputError(
+        "--certify: pictures of --mode dvr, iso, mip, integral and slice are certified, not of error");
   if (o.mode == RenderMode::slice) {
     refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
     refuse(args, {"colorbar", "caption"}, "is part of a certified slice, but for --plain");

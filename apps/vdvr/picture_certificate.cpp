@@ -64,10 +64,11 @@ Json light_list(const std::vector<Vec3>& lights) {
   return list;
 }
 
-constexpr std::array<std::pair<const char*, RenderMode>, 4> kModes{{{"dvr", RenderMode::dvr},
+constexpr std::array<std::pair<const char*, RenderMode>, 5> kModes{{{"dvr", RenderMode::dvr},
                                                                     {"iso", RenderMode::iso},
                                                                     {"mip", RenderMode::mip},
-                                                                    {"slice", RenderMode::slice}}};
+                                                                    {"slice", RenderMode::slice},
+                                                                    {"integral", RenderMode::integral}}};
 
 /// A real number of any size is no count: to convert it is undefined.
 std::int64_t count_of(const Json& j, const char* name, const std::filesystem::path& path) {
@@ -75,6 +76,15 @@ std::int64_t count_of(const Json& j, const char* name, const std::filesystem::pa
   if (!member.is_number_integer())
     throw FileError(fmt::format("{}: `{}`: {} is no whole number", path.string(), name, member.dump()));
   return member.get<std::int64_t>();
+}
+
+/// From black to white.
+Json window_json(const RenderOptions& o) {
+  return Json::array({o.slice_range.value().first, o.slice_range.value().second});
+}
+void read_window(const Json& j, RenderOptions& o) {
+  const auto range = j.at("range").get<std::array<double, 2>>();
+  o.slice_range = std::pair{range[0], range[1]};
 }
 
 /// What a mode has of its own.
@@ -86,9 +96,9 @@ Json mode_json(const RenderOptions& o) {
     json["iso_opacity"] = o.surfaces.front().opacity;
   }
   if (o.mode == RenderMode::slice)
-    json["slice"] = {{"axis", o.slice_axis},
-                     {"position", o.slice_position.value()},
-                     {"range", Json::array({o.slice_range.value().first, o.slice_range.value().second})}};
+    json["slice"] = {
+        {"axis", o.slice_axis}, {"position", o.slice_position.value()}, {"range", window_json(o)}};
+  if (o.mode == RenderMode::integral) json["integral"] = {{"range", window_json(o)}};
   return json;
 }
 
@@ -102,6 +112,7 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
   if (o.mode == RenderMode::iso)
     o.surfaces = {{j.at("iso").get<double>(), j.at("iso_opacity").get<double>(),
                    j.at("iso_rgb").get<std::array<double, 3>>()}};
+  if (o.mode == RenderMode::integral) read_window(j.at("integral"), o);
   if (o.mode != RenderMode::slice) return;
   const Json& slice = j.at("slice");
   const std::int64_t axis = count_of(slice, "axis", path);
@@ -109,8 +120,7 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
     throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), axis));
   o.slice_axis = static_cast<int>(axis);
   o.slice_position = slice.at("position").get<double>();
-  const auto range = slice.at("range").get<std::array<double, 2>>();
-  o.slice_range = std::pair{range[0], range[1]};
+  read_window(slice, o);
 }
 
 Json picture_json(const CertifiedPicture& picture) {
@@ -214,6 +224,10 @@ std::string statement_of(RenderMode mode, CertifiedLight light) {
     return "In every pixel and channel the colour of the largest F on the ray through the pixel's middle, "
            "inside "
            "the covered region, differs from the drawn one by at most the bound of that pixel.";
+  if (mode == RenderMode::integral)
+    return "In every pixel the grey of the integral of F along the ray through the pixel's middle, inside "
+           "the "
+           "covered region, differs from the drawn one by at most the bound of that pixel.";
   if (mode == RenderMode::iso)
     return "F passes the value first, on the ray through a pixel's middle inside the covered region, in the "
            "pixel's band where the pixel is sure; nowhere where it is none; and not before the band's "

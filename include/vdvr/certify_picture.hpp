@@ -80,8 +80,12 @@ VDVR_API void clear_absent(Image& drawn, const PixelBounds& bounds);
 /// The middle of a slice's pixel, world units.
 VDVR_API Vec3 slice_point(const RenderOptions& options, const Grid& grid, std::int64_t x, std::int64_t y);
 struct MaximumBounds;
+struct IntegralBounds;
 /// The colours that mode mip has for what certain maxima can be; behind rays without one the background.
 VDVR_API PixelBounds colours_of_maxima(const MaximumBounds& maxima, const RenderOptions& options);
+/// The greys that mode integral has for what certain integrals can be, through `slice_range`. Throws
+/// InputError for another mode and no `slice_range`.
+VDVR_API PixelBounds greys_of_integrals(const IntegralBounds& integrals, const RenderOptions& options);
 
 /// How far what was drawn can lie from the ideal picture, in levels of 255.
 struct PictureBound {
