@@ -32,7 +32,8 @@ struct Parts {
   bool values;
 };
 
-/// All that the picture follows from; its file's hash comes when it is written.
+}  // namespace
+
 CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
                            const fs::path& output) {
   const Scene& scene = source.scene();
@@ -50,6 +51,8 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   picture.driver = source.device().info().driver;
   return picture;
 }
+
+namespace {
 
 void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image, const Parts& parts) {
   if (parts.values) {
@@ -135,7 +138,7 @@ std::vector<fs::path> ray_certificate_paths(const fs::path& output, RenderMode m
   std::vector<fs::path> paths{output, output};
   paths[0].replace_extension(".certificate.json");
   paths[1].replace_extension(".bound.png");
-  if (mode != RenderMode::mip) paths.pop_back();
+  if (mode == RenderMode::iso) paths.pop_back();
   return paths;
 }
 

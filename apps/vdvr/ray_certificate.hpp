@@ -13,6 +13,10 @@
 
 namespace vdvr::cli {
 
+struct CertifiedPicture;
+/// All that the picture follows from; its file's hash comes when it is written.
+CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
+                           const std::filesystem::path& output);
 /// What --show has beside its usual values; the option is declared by add_certify (certify_render.hpp).
 inline const std::vector<std::string>& certified_outputs() {
   static const std::vector<std::string> names{"class", "band", "lo", "hi", "bound"};
