@@ -30,7 +30,7 @@ struct FramesDrawn {
 };
 
 /// Calls draw(number, path) for each frame that is this process's to draw and is not there yet; of the leader
-/// also for those that others were to draw and have not, because they are gone. Then, of the leader, `finish`
+/// also for those that others were to draw and have not, because they are gone or gave no sign for long. Then, of the leader, `finish`
 /// writes the certificate, where there is one. Until then `turntable.json` in the folder says what is being
 /// drawn. Throws InputError for a folder that is in the way.
 FramesDrawn draw_frames(const FramesOptions& options,

@@ -4,6 +4,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/integral_certificate.hpp"
@@ -75,6 +76,7 @@ void add_options(Arguments& args) {
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("resume", "keep the frames that an interrupted turntable of the same command left in the folder")
       .flag("unverified", "render although content and certificate do not match");
+  add_give_up(args, "rank 0 draws its frames; of vdvr-mpi");
   add_certify(args);
   add_clip(args);
   add_scan(args);
@@ -345,7 +347,8 @@ RenderResult draw_frame(const Arguments& args, const Stage& stage, RenderOptions
 /// The words of a command but for those that do not change its pictures, and what they are pictures of.
 std::string key_of(const Arguments& args, const Scene& scene) {
   static const std::vector<std::string> flags{"--force", "--resume", "--quiet", "--json"};
-  static const std::vector<std::string> values{"--device", "--max-memory", "--scratch", "--output", "-o"};
+  static const std::vector<std::string> values{"--device",  "--max-memory", "--scratch",
+                                               "--give-up", "--output",     "-o"};
   const auto is_in = [](const std::vector<std::string>& list, const std::string& word) {
     return std::find(list.begin(), list.end(), word.substr(0, word.find('='))) != list.end();
   };
@@ -456,7 +459,8 @@ int render_command(Arguments& args) {
   if (kind == OutputKind::values)
     refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
   if (kind != OutputKind::folder)
-    refuse(args, {"resume"}, "is of a turntable in a folder, whose frames are kept");
+    refuse(args, {"resume", "give-up"}, "is of a turntable in a folder, whose frames are kept");
+  give_up_option(args);
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   const bool of_integrals = o.mode == RenderMode::integral;
   if (of_integrals) check_integral_certificate(args, kind == OutputKind::values);
