@@ -3,8 +3,8 @@
 namespace vdvr {
 
 // A cubic's mean is that of its Bernstein coefficients. The bound of a piece has 2^-36 of its values for
-// rounding, which is above what sums of a ray's pieces lose in double precision as long as there are fewer
-// than 2^16.
+// rounding, which is above what the sum of V over a ray's pieces loses in double precision as long as there
+// are fewer than 2^16; the sum of bounds takes as much of itself.
 LineIntegral integral_along(const RayField& field, const WorldRay& ray) {
   LineIntegral out;
   field.walk(ray, [&](const RayPiece& piece) {
@@ -14,6 +14,7 @@ LineIntegral integral_along(const RayField& field, const WorldRay& ray) {
     out.reach += length * piece.bound;
     return true;
   });
+  out.reach *= 1 + 0x1p-36;
   return out;
 }
 
