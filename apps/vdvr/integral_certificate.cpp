@@ -28,27 +28,6 @@ void check_integral_certificate(const Arguments& args, bool values) {
     throw InputError(fmt::format("--show {}: is written as .npy", show));
 }
 
-Json integral_json(const IntegralBounds& bounds) {
-  double sum = 0, most = 0;
-  std::int64_t count = 0, untested = 0;
-  for (std::size_t i = 0; i < bounds.met.size(); ++i) {
-    if (bounds.met[i] == 0) continue;
-    const double half =
-        0.5 * (static_cast<double>(bounds.high.values[i]) - static_cast<double>(bounds.low.values[i]));
-    if (!std::isfinite(half)) {
-      ++untested;
-      continue;
-    }
-    sum += half;
-    most = std::max(most, half);
-    ++count;
-  }
-  return {{"half_width_mean", count > 0 ? sum / static_cast<double>(count) : 0},
-          {"half_width_max", most},
-          {"pixels", count},
-          {"untested", untested}};
-}
-
 RayCertificate write_integral_certificate(const Arguments& args, Source& source, const RenderOptions& options,
                                           const RenderResult& drawn, const std::filesystem::path& output,
                                           const Progress& progress) {
@@ -71,21 +50,14 @@ RayCertificate write_integral_certificate(const Arguments& args, Source& source,
   write_png(bound_part, bounds_image);
   picture.file_sha256 = sha256_of_file(picture_part);
   Json json = picture_certificate_json(picture, bounds, bound, *scene.certificate);
-  json["integral"] = integral_json(integrals);
+  json["integral"] = half_widths_json(integrals.low, integrals.high, integrals.met);
   io::write_file(certificate_part, json.dump(2) + "\n");
   files.commit();
   return {std::move(json), pixels_beyond(args, bound)};
 }
 
 void print_integral_certificate(const RayCertificate& certificate) {
-  const Json &json = certificate.json, &integral = json.at("integral"), &levels = json.at("levels");
-  fmt::print(
-      "  greys        {:.0f} % of the pixels certain to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst "
-      "{:.1f}\n",
-      100 * json.at("within").at("4").get<double>(), 100 * json.at("within").at("8").get<double>(),
-      levels.at("mean").get<double>(), levels.at("max").get<double>());
-  fmt::print("  certain      the integral of F to +- {:.4g} in the mean, {:.4g} at most\n",
-             integral.at("half_width_mean").get<double>(), integral.at("half_width_max").get<double>());
+  print_known(certificate.json, "greys", "integral", "integral");
   print_tolerance(certificate.beyond);
 }
 

@@ -16,7 +16,5 @@ RayCertificate write_integral_certificate(const Arguments& args, Source& source,
                                           const RenderResult& drawn, const std::filesystem::path& output,
                                           const Progress& progress);
 void print_integral_certificate(const RayCertificate& certificate);
-/// How well the integrals are known, density times world unit.
-Json integral_json(const IntegralBounds& bounds);
 
 }  // namespace vdvr::cli

@@ -270,23 +270,22 @@ Json surface_json(const SurfaceBounds& bounds, const std::string& unit) {
           {"unit", unit}};
 }
 
-Json maximum_json(const MaximumBounds& bounds) {
+Json half_widths_json(const FloatImage& low, const FloatImage& high, const std::vector<std::uint8_t>& met) {
   double sum = 0, most = 0;
   std::int64_t count = 0, untested = 0;
-  for (std::size_t i = 0; i < bounds.low.values.size(); ++i) {
-    const double width =
-        static_cast<double>(bounds.high.values[i]) - static_cast<double>(bounds.low.values[i]);
-    if (std::isnan(width)) continue;
-    if (!std::isfinite(width)) {
+  for (std::size_t i = 0; i < low.values.size(); ++i) {
+    const double half = 0.5 * (static_cast<double>(high.values[i]) - static_cast<double>(low.values[i]));
+    if (std::isnan(half) || (!met.empty() && met[i] == 0)) continue;
+    if (!std::isfinite(half)) {
       ++untested;
       continue;
     }
-    sum += width;
-    most = std::max(most, width);
+    sum += half;
+    most = std::max(most, half);
     ++count;
   }
-  return {{"half_width_mean", count > 0 ? 0.5 * sum / static_cast<double>(count) : 0},
-          {"half_width_max", 0.5 * most},
+  return {{"half_width_mean", count > 0 ? sum / static_cast<double>(count) : 0},
+          {"half_width_max", most},
           {"pixels", count},
           {"untested", untested}};
 }

@@ -37,6 +37,8 @@ struct RayCertificate {
 RayCertificate write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
                                      RenderResult drawn, const std::filesystem::path& output,
                                      const Progress& progress);
+/// Levels of what is shown, and how well the value of F behind it is known: `member` of the JSON.
+void print_known(const Json& json, const std::string& shown, const char* member, const char* what);
 void print_ray_certificate(const RayCertificate& certificate);
 
 }  // namespace vdvr::cli

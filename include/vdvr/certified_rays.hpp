@@ -1,5 +1,6 @@
 // Pictures of the ideal field F, as far as a certificate tells them: intervals of colours, of the depth of a
-// surface, of a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the host, ray by ray.
+// surface, of a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the
+// host, ray by ray.
 #pragma once
 
 #include <array>

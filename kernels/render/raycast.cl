@@ -1,5 +1,6 @@
 // Ray-casting of the mixed-resolution field: emission-absorption (dvr), iso-surfaces (iso), maximum (mip),
-// line integral (integral), slice. One source for both samplers and for packets of 1 to 16 rays per work-item (device/packet.h).
+// line integral (integral), slice. One source for both samplers and for packets of 1 to 16 rays per work-item
+// (device/packet.h).
 //
 // Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, the last in the middle of the path
 // that is left. Each belongs to the brick that vdvr_brick_of names; bricks decide what is skipped and which

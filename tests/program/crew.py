@@ -186,21 +186,22 @@ def hang_while_drawing(work, launcher, turn):
         job = subprocess.Popen([str(w) for w in [*launch(launcher, 3), *words]], env=ENVIRONMENT, stdout=messages,
                                stderr=messages)
     wait_until(job, lambda: "vdvr-mpi render:" in messages_of(work))
+    stop_a_rank(job, launcher)
+
+
+def stop_a_rank(job, launcher):
+    """The last of three; the job ends without it."""
     ranks = ranks_of(job.pid, launcher[1])
     if len(ranks) == 3:
         os.kill(ranks[2], signal.SIGSTOP)
     try:
         end(job)
     finally:
-        kill_all(ranks)
-
-
-def kill_all(processes):
-    for process in processes:
-        try:
-            os.kill(process, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
+        for rank in ranks:
+            try:
+                os.kill(rank, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
 
 
 def launch(mpi, ranks):
@@ -338,13 +339,7 @@ def hang(work, launcher, wait):
     """Stops a rank of a job once `wait` returns; the job ends all the same."""
     job = start(work, launcher, 3, "--give-up", "2")
     wait(job)
-    ranks = ranks_of(job.pid, launcher[1])
-    if len(ranks) == 3:
-        os.kill(ranks[2], signal.SIGSTOP)
-    try:
-        end(job)
-    finally:
-        kill_all(ranks)
+    stop_a_rank(job, launcher)
 
 
 def main():
