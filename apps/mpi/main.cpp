@@ -2,6 +2,7 @@
 // program `vdvr` with the other ranks at hand; these compute blocks until it is done.
 #include <fmt/format.h>
 #include <mpi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "apps/common/completion.hpp"
@@ -130,12 +132,21 @@ bool part_from_others(MpiMessenger& messenger) {
   return false;
 }
 
+// A rank that hangs while MPI ends is waited for by MPI, but not by this process, whose output is in place.
+void end_after(std::chrono::seconds patience, int code) {
+  std::thread([patience, code] {
+    std::this_thread::sleep_for(patience);
+    ::_exit(code);
+  }).detach();
+}
+
 int run(const std::vector<std::string>& words) {
   int code = 0;
-  bool lost = false;
+  bool lost = false, leads = false;
   {
     MpiMessenger messenger;
-    if (messenger.rank() != 0) {
+    leads = messenger.rank() == 0;
+    if (!leads) {
       code = follow(messenger, words);
     } else {
       if (messenger.others() > 0) set_messenger(&messenger);
@@ -147,6 +158,7 @@ int run(const std::vector<std::string>& words) {
   }
   // Ranks that are gone, or hang, would be waited for.
   if (lost) MPI_Abort(MPI_COMM_WORLD, code);
+  if (leads) end_after(patience_with_others(), code);
   MPI_Finalize();
   return code;
 }

@@ -87,20 +87,30 @@ Wanted wanted_to_certify(const Arguments& args) {
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress) {
   Planned planned;
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress);
-  const Tolerance finest = wanted.pictures ? Tolerance{wanted.pictures->finest, {}} : wanted.tolerance;
-  planned.plan = make_plan(device, planned.scan, finest, wanted.options, progress);
-  if (!wanted.pictures) return planned;
-  PictureRefinementOptions options;
-  options.levels = wanted.pictures->levels;
-  options.finest_abs = planned.plan.epsilon_abs;
-  planned.pictures = std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan,
-                                                         planned.plan.field, std::move(options), progress);
+  if (!wanted.pictures) {
+    planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
+    return planned;
+  }
+  CertifyOptions options = wanted.options;
+  options.plan.everywhere = wanted.tolerance;
+  // Pictures are of the whole grid, so a part of the scan does not do.
+  options.plan.estimate = false;
+  planned.plan = make_plan(device, planned.scan, Tolerance{wanted.pictures->finest, {}}, options, progress);
+  everywhere_of(planned, wanted);
+  planned.pictures =
+      std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan, planned.plan.field,
+                                          refinement_options(planned, wanted), progress);
   return planned;
 }
 
-BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
-  if (!planned.pictures)
-    return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
+PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted) {
+  PictureRefinementOptions options;
+  options.levels = wanted.pictures->levels;
+  options.finest_abs = planned.plan.epsilon_abs;
+  return options;
+}
+
+double everywhere_of(const Planned& planned, const Wanted& wanted) {
   const Plan& plan = planned.plan;
   const double everywhere = wanted.tolerance.absolute.value_or(wanted.tolerance.relative.value_or(1) *
                                                                (plan.epsilon_abs / plan.epsilon));
@@ -108,8 +118,14 @@ BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted
     throw InputError(
         fmt::format("--epsilon {:.4g} lies below {:.4g}, the least that --picture-finest asks of a brick",
                     everywhere, plan.epsilon_abs));
+  return everywhere;
+}
+
+BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
+  if (!planned.pictures)
+    return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
   CertifyOptions options = wanted.options;
-  options.build.refinement = planned.pictures->refinement(everywhere);
+  options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
   BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
   planned.pictures->note(result.certificate);
   return result;

@@ -50,6 +50,10 @@ Json pictures_json(const Planned& planned);
 void print_pictures(const Planned& planned);
 /// Reads IN and plans.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
+/// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.
+/// Throws InputError where that is less than what a brick may be asked for.
+PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted);
+double everywhere_of(const Planned& planned, const Wanted& wanted);
 /// The second half of vdvr::certify. Takes the plan.
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress);
 

@@ -11,6 +11,10 @@ namespace vdvr::cli {
 
 void add_certify(Arguments& args);
 /// Whether the options ask for it.
+/// Modes of which each ray is certified on the host.
+inline bool is_certified_by_ray(RenderMode mode) {
+  return mode == RenderMode::iso || mode == RenderMode::mip || mode == RenderMode::integral;
+}
 bool asks_certify(const Arguments& args);
 /// Throws InputError for options that it does not take.
 void check_certify(const Arguments& args, const RenderOptions& options);

@@ -46,10 +46,20 @@ void add_crew(Arguments& args) {
   args.group("Several devices (--device 0,1 or all)")
       .flag("mixed-devices",
             "devices may differ: the certificate names all and charges the worst, and the same bytes are not "
-            "promised")
-      .value("give-up", "SECONDS",
-             "after so long without a sign of life a process is given up, and its blocks are computed "
-             "elsewhere (default 300)");
+            "promised");
+  add_give_up(args, "its blocks are computed elsewhere");
+}
+
+void add_give_up(Arguments& args, const std::string& what) {
+  args.value("give-up", "SECONDS",
+             fmt::format("after so long without a sign of life a process is given up, and {} (default {})",
+                         what, CrewOptions{}.give_up.count()));
+}
+
+std::chrono::seconds give_up_option(const Arguments& args) {
+  the_patience =
+      std::chrono::seconds(args.integer_or("give-up", CrewOptions{}.give_up.count(), 1, longest_wait));
+  return the_patience;
 }
 
 std::string first_device(const Arguments& args) {
@@ -66,9 +76,7 @@ int place_here() { return the_messenger ? the_messenger->place() : 0; }
 Devices::Devices(const Arguments& args, const CommonOptions& common) {
   options_.messenger = the_messenger;
   options_.mixed_devices = args.has("mixed-devices");
-  options_.give_up =
-      std::chrono::seconds(args.integer_or("give-up", options_.give_up.count(), 1, longest_wait));
-  the_patience = options_.give_up;
+  options_.give_up = give_up_option(args);
   const std::string who = args.who();
   options_.say = [who](const std::string& text) { say(fmt::format("{}: {}\n", who, text)); };
   std::vector<std::string> all = device_selectors(common.device);

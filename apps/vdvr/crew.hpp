@@ -15,6 +15,9 @@ namespace vdvr::cli {
 
 /// --mixed-devices and --give-up.
 void add_crew(Arguments& args);
+/// --give-up alone, of what other processes do `what`, and its value.
+void add_give_up(Arguments& args, const std::string& what);
+std::chrono::seconds give_up_option(const Arguments& args);
 
 /// To the other processes of this program; none: it is alone. Set before a command runs.
 void set_messenger(Messenger* messenger);

@@ -1,6 +1,6 @@
 // Frame f is drawn by process f mod N. The leader makes the folder, tells the others, draws its own, waits
-// until the others say that they are done or are gone, and draws what is missing: a frame is a file that is
-// whole or not there, so that the folder alone says what is done. All processes see one folder.
+// until the others say that they are done, or are gone or given up, and draws what is missing: a frame is a
+// file that is whole or not there, so that the folder alone says what is done. All processes see one folder.
 #include "apps/vdvr/frames.hpp"
 
 #include <fmt/format.h>
@@ -68,16 +68,36 @@ std::int64_t draw_missing(const FramesOptions& o, std::int64_t first, std::int64
   return drawn;
 }
 
-void wait_for_others(Messenger& messenger) {
+std::int64_t frames_there(const FramesOptions& o) {
+  std::int64_t count = 0;
+  for (std::int64_t f = 0; f < o.frames; ++f) count += is_there(o.folder / frame_name(f)) ? 1 : 0;
+  return count;
+}
+
+// A frame that comes to lie in the folder is a sign of life. Without one for long, those that have not said
+// that they are done are given up: what they were to draw is drawn here.
+void wait_for_others(Messenger& messenger, const FramesOptions& o) {
+  using Clock = std::chrono::steady_clock;
   std::set<int> busy;
   for (int process = 1; process <= messenger.others(); ++process) busy.insert(process);
   const std::vector<std::byte> done = message_of(kDone);
+  auto heard = Clock::now();
+  std::int64_t there = frames_there(o);
   while (!busy.empty()) {
     throw_if_stopped();
     if (const auto message = messenger.receive(std::chrono::milliseconds(200));
-        message && message->second == done)
+        message && message->second == done) {
       busy.erase(message->first);
+      heard = Clock::now();
+    }
     std::erase_if(busy, [&](int process) { return messenger.is_gone(process); });
+    if (const std::int64_t now = frames_there(o); now != there) {
+      there = now;
+      heard = Clock::now();
+    }
+    if (Clock::now() - heard <= patience_with_others()) continue;
+    for (const int process : busy) messenger.give_up(process);
+    return;
   }
 }
 
@@ -104,7 +124,7 @@ FramesDrawn draw_frames(const FramesOptions& o,
   const std::int64_t processes = others ? others->others() + 1 : 1;
   for (int process = 1; process < processes; ++process) others->send(process, message_of(kGo));
   result.drawn = draw_missing(o, 0, processes, draw);
-  if (others) wait_for_others(*others);
+  if (others) wait_for_others(*others, o);
   result.drawn += draw_missing(o, 0, 1, draw);
   finish(folder);
   std::error_code ignored;

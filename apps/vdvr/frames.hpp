@@ -30,9 +30,9 @@ struct FramesDrawn {
 };
 
 /// Calls draw(number, path) for each frame that is this process's to draw and is not there yet; of the leader
-/// also for those that others were to draw and have not, because they are gone. Then, of the leader, `finish`
-/// writes the certificate, where there is one. Until then `turntable.json` in the folder says what is being
-/// drawn. Throws InputError for a folder that is in the way.
+/// also for those that others were to draw and have not, because they are gone or gave no sign for long.
+/// Then, of the leader, `finish` writes the certificate, where there is one. Until then `turntable.json` in
+/// the folder says what is being drawn. Throws InputError for a folder that is in the way.
 FramesDrawn draw_frames(const FramesOptions& options,
                         const std::function<void(std::int64_t, const std::filesystem::path&)>& draw,
                         const std::function<void(OutputFolder&)>& finish);

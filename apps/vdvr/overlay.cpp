@@ -16,15 +16,22 @@ std::vector<float> hidden_part(RenderMode mode, const FloatImage& values) {
   std::vector<float> hidden;
   hidden.reserve(values.values.size());
   for (const float v : values.values) {
-    // A maximum hides nothing; where an iso-surface was hit its depth is a number.
+    // A maximum hides nothing, nor does an integral; where an iso-surface was hit its depth is a number.
     if (mode == RenderMode::dvr) hidden.push_back(v);
     else hidden.push_back(mode == RenderMode::iso && v == v ? 1.0f : 0.0f);
   }
   return hidden;
 }
 
-ColourBar colour_bar(const RenderOptions& o, const Scene& scene, bool certified) {
+ColourBar colour_bar(const RenderOptions& o, const Scene& scene, bool certified, const FloatImage& values) {
   ColourBar bar;
+  if (o.mode == RenderMode::integral) {
+    // A line integral has no unit.
+    const auto [lo, hi] = o.slice_range.value_or(range_of_values(values));
+    bar.points = {{lo, {0, 0, 0}, 1}, {hi, {1, 1, 1}, 1}};
+    bar.opacity = false;
+    return bar;
+  }
   if (o.mode == RenderMode::slice) {
     const auto [lo, hi] = o.slice_range.value_or(std::pair{0.0, 1.0});
     bar.points = {{lo, {0, 0, 0}, 1}, {hi, {1, 1, 1}, 1}};
@@ -108,7 +115,7 @@ void draw_overlay(RenderResult& r, const Scene& scene, const RenderOptions& o, c
   if (overlay.box) draw_box(r.image, o.camera, scene.volume.grid, hidden_part(o.mode, r.values));
   std::int64_t above = 0;
   if (overlay.caption) above = draw_caption(r.image, caption);
-  if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified), above);
+  if (overlay.colour_bar) draw_colour_bar(r.image, colour_bar(o, scene, certified, r.values), above);
   if (overlay.axes) draw_axes(r.image, o.camera, above);
 }
 

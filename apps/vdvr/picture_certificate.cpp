@@ -64,10 +64,11 @@ Json light_list(const std::vector<Vec3>& lights) {
   return list;
 }
 
-constexpr std::array<std::pair<const char*, RenderMode>, 4> kModes{{{"dvr", RenderMode::dvr},
+constexpr std::array<std::pair<const char*, RenderMode>, 5> kModes{{{"dvr", RenderMode::dvr},
                                                                     {"iso", RenderMode::iso},
                                                                     {"mip", RenderMode::mip},
-                                                                    {"slice", RenderMode::slice}}};
+                                                                    {"slice", RenderMode::slice},
+                                                                    {"integral", RenderMode::integral}}};
 
 /// A real number of any size is no count: to convert it is undefined.
 std::int64_t count_of(const Json& j, const char* name, const std::filesystem::path& path) {
@@ -75,6 +76,15 @@ std::int64_t count_of(const Json& j, const char* name, const std::filesystem::pa
   if (!member.is_number_integer())
     throw FileError(fmt::format("{}: `{}`: {} is no whole number", path.string(), name, member.dump()));
   return member.get<std::int64_t>();
+}
+
+/// From black to white.
+Json window_json(const RenderOptions& o) {
+  return Json::array({o.slice_range.value().first, o.slice_range.value().second});
+}
+void read_window(const Json& j, RenderOptions& o) {
+  const auto range = j.at("range").get<std::array<double, 2>>();
+  o.slice_range = std::pair{range[0], range[1]};
 }
 
 /// What a mode has of its own.
@@ -86,9 +96,9 @@ Json mode_json(const RenderOptions& o) {
     json["iso_opacity"] = o.surfaces.front().opacity;
   }
   if (o.mode == RenderMode::slice)
-    json["slice"] = {{"axis", o.slice_axis},
-                     {"position", o.slice_position.value()},
-                     {"range", Json::array({o.slice_range.value().first, o.slice_range.value().second})}};
+    json["slice"] = {
+        {"axis", o.slice_axis}, {"position", o.slice_position.value()}, {"range", window_json(o)}};
+  if (o.mode == RenderMode::integral) json["integral"] = {{"range", window_json(o)}};
   return json;
 }
 
@@ -102,6 +112,7 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
   if (o.mode == RenderMode::iso)
     o.surfaces = {{j.at("iso").get<double>(), j.at("iso_opacity").get<double>(),
                    j.at("iso_rgb").get<std::array<double, 3>>()}};
+  if (o.mode == RenderMode::integral) read_window(j.at("integral"), o);
   if (o.mode != RenderMode::slice) return;
   const Json& slice = j.at("slice");
   const std::int64_t axis = count_of(slice, "axis", path);
@@ -109,8 +120,7 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
     throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), axis));
   o.slice_axis = static_cast<int>(axis);
   o.slice_position = slice.at("position").get<double>();
-  const auto range = slice.at("range").get<std::array<double, 2>>();
-  o.slice_range = std::pair{range[0], range[1]};
+  read_window(slice, o);
 }
 
 Json picture_json(const CertifiedPicture& picture) {
@@ -180,6 +190,14 @@ void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPic
   o.clip = clip_of(j.at("clip"));
 }
 
+/// Files without the member are older than chord steps.
+bool is_chord(const std::string& step, const std::filesystem::path& path) {
+  if (step != "box" && step != "chord")
+    throw FileError(fmt::format("{}: is no certificate of a picture: its step is '{}', neither box nor chord",
+                                path.string(), step));
+  return step == "chord";
+}
+
 }  // namespace
 
 std::string sha256_of_pixels(const Image& image) {
@@ -206,6 +224,10 @@ std::string statement_of(RenderMode mode, CertifiedLight light) {
     return "In every pixel and channel the colour of the largest F on the ray through the pixel's middle, "
            "inside "
            "the covered region, differs from the drawn one by at most the bound of that pixel.";
+  if (mode == RenderMode::integral)
+    return "In every pixel the grey of the integral of F along the ray through the pixel's middle, inside "
+           "the "
+           "covered region, differs from the drawn one by at most the bound of that pixel.";
   if (mode == RenderMode::iso)
     return "F passes the value first, on the ray through a pixel's middle inside the covered region, in the "
            "pixel's band where the pixel is sure; nowhere where it is none; and not before the band's "
@@ -248,23 +270,22 @@ Json surface_json(const SurfaceBounds& bounds, const std::string& unit) {
           {"unit", unit}};
 }
 
-Json maximum_json(const MaximumBounds& bounds) {
+Json half_widths_json(const FloatImage& low, const FloatImage& high, const std::vector<std::uint8_t>& met) {
   double sum = 0, most = 0;
   std::int64_t count = 0, untested = 0;
-  for (std::size_t i = 0; i < bounds.low.values.size(); ++i) {
-    const double width =
-        static_cast<double>(bounds.high.values[i]) - static_cast<double>(bounds.low.values[i]);
-    if (std::isnan(width)) continue;
-    if (!std::isfinite(width)) {
+  for (std::size_t i = 0; i < low.values.size(); ++i) {
+    const double half = 0.5 * (static_cast<double>(high.values[i]) - static_cast<double>(low.values[i]));
+    if (std::isnan(half) || (!met.empty() && met[i] == 0)) continue;
+    if (!std::isfinite(half)) {
       ++untested;
       continue;
     }
-    sum += width;
-    most = std::max(most, width);
+    sum += half;
+    most = std::max(most, half);
     ++count;
   }
-  return {{"half_width_mean", count > 0 ? 0.5 * sum / static_cast<double>(count) : 0},
-          {"half_width_max", 0.5 * most},
+  return {{"half_width_mean", count > 0 ? sum / static_cast<double>(count) : 0},
+          {"half_width_max", most},
           {"pixels", count},
           {"untested", untested}};
 }
@@ -285,6 +306,7 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
           {"kappa", picture.certify.kappa},
           {"theta", picture.certify.theta},
           {"fast", picture.certify.fast},
+          {"step", picture.certify.chord ? "chord" : "box"},
           {"device", picture.device},
           {"driver", picture.driver},
           {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
@@ -320,6 +342,7 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.certify.kappa = j.at("kappa").get<double>();
     picture.certify.theta = j.at("theta").get<double>();
     picture.certify.fast = j.at("fast").get<bool>();
+    picture.certify.chord = is_chord(j.value("step", "box"), path);
     picture.covered.radius = j.at("covered").at("radius").get<double>();
     const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
     picture.covered.z = {z[0], z[1]};

@@ -44,8 +44,10 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
                       const std::string& statement);
 /// Shares of the pixels by class, and the band's depth in world units.
 Json surface_json(const SurfaceBounds& bounds, const std::string& unit);
-/// How well the maxima are known, in units of F.
-Json maximum_json(const MaximumBounds& bounds);
+/// How well values are known, in their own units, over the rays that have one: not those of NaN, nor those of
+/// 0 in `met`, where it is not empty.
+Json half_widths_json(const FloatImage& low, const FloatImage& high,
+                      const std::vector<std::uint8_t>& met = {});
 /// The box that a clip has beside its cylinder.
 std::array<double, 6> box_of(const std::optional<Clip>& clip);
 Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,

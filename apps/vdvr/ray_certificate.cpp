@@ -32,7 +32,8 @@ struct Parts {
   bool values;
 };
 
-/// All that the picture follows from; its file's hash comes when it is written.
+}  // namespace
+
 CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
                            const fs::path& output) {
   const Scene& scene = source.scene();
@@ -50,6 +51,8 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   picture.driver = source.device().info().driver;
   return picture;
 }
+
+namespace {
 
 void write_surface(const std::string& show, const SurfaceBounds& bounds, Image image, const Parts& parts) {
   if (parts.values) {
@@ -97,7 +100,7 @@ RayCertificate maximum(const Arguments& args, const std::string& show, const Cer
   write_png(parts.bound, bounds_image);
   picture.file_sha256 = sha256_of_file(parts.picture);
   Json json = picture_certificate_json(picture, bounds, bound, *scene.certificate);
-  json["mip"] = maximum_json(maxima);
+  json["mip"] = half_widths_json(maxima.low, maxima.high);
   return {std::move(json), pixels_beyond(args, bound)};
 }
 
@@ -135,7 +138,7 @@ std::vector<fs::path> ray_certificate_paths(const fs::path& output, RenderMode m
   std::vector<fs::path> paths{output, output};
   paths[0].replace_extension(".certificate.json");
   paths[1].replace_extension(".bound.png");
-  if (mode != RenderMode::mip) paths.pop_back();
+  if (mode == RenderMode::iso) paths.pop_back();
   return paths;
 }
 
@@ -154,6 +157,17 @@ RayCertificate write_ray_certificate(const Arguments& args, Source& source, cons
   return made;
 }
 
+void print_known(const Json& json, const std::string& shown, const char* member, const char* what) {
+  const Json &known = json.at(member), &levels = json.at("levels");
+  fmt::print(
+      "  {:<12} {:.0f} % of the pixels certain to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst "
+      "{:.1f}\n",
+      shown, 100 * json.at("within").at("4").get<double>(), 100 * json.at("within").at("8").get<double>(),
+      levels.at("mean").get<double>(), levels.at("max").get<double>());
+  fmt::print("  certain      the {} of F to +- {:.4g} in the mean, {:.4g} at most\n", what,
+             known.at("half_width_mean").get<double>(), known.at("half_width_max").get<double>());
+}
+
 void print_ray_certificate(const RayCertificate& certificate) {
   const Json& json = certificate.json;
   if (json.contains("iso")) {
@@ -166,14 +180,7 @@ void print_ray_certificate(const RayCertificate& certificate) {
         iso.at("band_p99").get<double>(), iso.at("unit").get<std::string>());
     return;
   }
-  const Json &mip = json.at("mip"), &levels = json.at("levels");
-  fmt::print(
-      "  colours      {:.0f} % of the pixels certain to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst "
-      "{:.1f}\n",
-      100 * json.at("within").at("4").get<double>(), 100 * json.at("within").at("8").get<double>(),
-      levels.at("mean").get<double>(), levels.at("max").get<double>());
-  fmt::print("  certain      the maximum of F to +- {:.4g} in the mean, {:.4g} at most\n",
-             mip.at("half_width_mean").get<double>(), mip.at("half_width_max").get<double>());
+  print_known(json, "colours", "mip", "maximum");
   print_tolerance(certificate.beyond);
 }
 

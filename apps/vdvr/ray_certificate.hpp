@@ -13,6 +13,10 @@
 
 namespace vdvr::cli {
 
+struct CertifiedPicture;
+/// All that the picture follows from; its file's hash comes when it is written.
+CertifiedPicture described(Source& source, const RenderOptions& options, const RenderResult& drawn,
+                           const std::filesystem::path& output);
 /// What --show has beside its usual values; the option is declared by add_certify (certify_render.hpp).
 inline const std::vector<std::string>& certified_outputs() {
   static const std::vector<std::string> names{"class", "band", "lo", "hi", "bound"};
@@ -33,6 +37,8 @@ struct RayCertificate {
 RayCertificate write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
                                      RenderResult drawn, const std::filesystem::path& output,
                                      const Progress& progress);
+/// Levels of what is shown, and how well the value of F behind it is known: `member` of the JSON.
+void print_known(const Json& json, const std::string& shown, const char* member, const char* what);
 void print_ray_certificate(const RayCertificate& certificate);
 
 }  // namespace vdvr::cli

@@ -32,9 +32,10 @@ using Field = std::function<std::vector<double>(const std::vector<Vec3>&)>;
 /// The intervals again, of what this device draws.
 struct Again {
   RenderResult drawn;
-  PixelBounds bounds;     ///< of all but iso
-  MaximumBounds maxima;   ///< of mip
-  SurfaceBounds surface;  ///< of iso
+  PixelBounds bounds;        ///< of all but iso
+  MaximumBounds maxima;      ///< of mip
+  IntegralBounds integrals;  ///< of integral
+  SurfaceBounds surface;     ///< of iso
   bool same_device = false;
 };
 void certify_again(Device& device, const ResidentVolume& resident, const CertifiedPicture& picture,
@@ -54,6 +55,11 @@ void certify_again(Device& device, const ResidentVolume& resident, const Certifi
   const CertifiedRays rays(file.volume, file.certificate, false, box_of(o.clip));
   if (o.mode == RenderMode::iso) {
     again.surface = rays.surface(o.camera, o.width, o.height, o.surfaces.front().value, progress);
+    return;
+  }
+  if (o.mode == RenderMode::integral) {
+    again.integrals = rays.integral(o.camera, o.width, o.height, progress);
+    again.bounds = greys_of_integrals(again.integrals, o);
     return;
   }
   again.maxima = rays.maximum(o.camera, o.width, o.height, progress);
@@ -132,6 +138,23 @@ void check_maximum(const Field& field, const CertifiedPicture& picture, const Gr
        static_cast<double>(again.maxima.high.values[i]));
 }
 
+/// By midpoints; what steps three times as long are off is an estimate of what these are.
+void check_integral(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
+                    std::size_t i, RayCheck& check) {
+  const auto at = static_cast<std::int64_t>(i);
+  const RenderOptions& o = picture.options;
+  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+  if (steps.points.empty()) return;
+  const std::vector<double> values = field(steps.points);
+  double fine = 0, coarse = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    fine += values[k] * steps.length;
+    if (k % 3 == 1) coarse += values[k] * 3 * steps.length;
+  }
+  take(check, fine, static_cast<double>(again.integrals.low.values[i]) - std::abs(fine - coarse),
+       static_cast<double>(again.integrals.high.values[i]) + std::abs(fine - coarse));
+}
+
 /// Whether F comes to the value before `last`, where it is surely on one side, or as near to it from there as
 /// it moves between two places.
 bool meets(const Field& field, const RaySteps& steps, const std::vector<double>& values, double last,
@@ -199,10 +222,11 @@ RayCheck check_rays(const Arguments& args, const CertifiedPicture& picture, cons
     report(progress, "rays", static_cast<double>(check.rays) / static_cast<double>(wanted));
     const bool any = crossing.empty() || check.rays % 2 == 1;
     const std::size_t i = any ? random() % pixels : crossing[random() % crossing.size()];
-    const auto one = mode == RenderMode::iso     ? check_crossing
-                     : mode == RenderMode::mip   ? check_maximum
-                     : mode == RenderMode::slice ? check_grey
-                                                 : check_colours;
+    const auto one = mode == RenderMode::iso        ? check_crossing
+                     : mode == RenderMode::mip      ? check_maximum
+                     : mode == RenderMode::integral ? check_integral
+                     : mode == RenderMode::slice    ? check_grey
+                                                    : check_colours;
     one(field, picture, file.volume.grid, again, i, check);
   }
   return check;

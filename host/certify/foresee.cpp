@@ -63,19 +63,6 @@ int stratum_of(double error, double tolerance) {
 // fine gold) or from fine.
 enum Fate { coarse_stays, fine_stays, coarse_refined, proposed, fine_refined, fates };
 
-// A brick that was classified to see what becomes of it.
-struct Classified {
-  double samples = 0;  // of its tile
-  BrickMeasure measure;
-  bool easy = false;  // measured on coarse gold first
-
-  [[nodiscard]] Fate fate(int fine_rate) const {
-    const bool fine = measure.rate == fine_rate;
-    if (samples > 0) return fine ? fine_refined : easy ? coarse_refined : proposed;
-    return fine ? fine_stays : coarse_stays;
-  }
-};
-
 struct Stratum {
   std::vector<std::int64_t> bricks, candidates;  // all, and those in the layers looked at
   double seen = 0, tile_samples = 0;
@@ -124,10 +111,15 @@ class Paces {
   }
   double seconds(bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
     GoldStream* s = stream(fine);
+    return s ? pace(fine, purpose) * s->samples(bricks, purpose) : 0;
+  }
+  /// Seconds a sample.
+  double pace(bool fine, GoldStream::For purpose) {
+    GoldStream* s = stream(fine);
     if (!s) return 0;
     GoldSpent spent = s->spent(purpose);
     spent -= before_[{fine, purpose}];
-    return spent.seconds / std::max(1.0, spent.samples) * s->samples(bricks, purpose);
+    return spent.seconds / std::max(1.0, spent.samples);
   }
 
  private:
@@ -139,18 +131,19 @@ class Paces {
 // The strata of the bricks, and which of them to look at.
 std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
                                  const std::vector<std::uint8_t>& looked_at, const std::vector<double>& error,
-                                 double tolerance, const Index3& n) {
+                                 const NodeTolerance& tolerance, const Index3& n) {
   const std::int64_t some = std::min(layers, n[2]);
   std::vector<std::uint8_t> in_layer(at(n[2]), 0);
   for (std::int64_t i = 0; i < some; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * some))] = 1;
   std::map<int, Stratum> strata;
   for (std::size_t i = 0; i < near.size(); ++i) {
     if (!near[i]) continue;
-    Stratum& s = strata[stratum_of(error[i], tolerance)];
+    Stratum& s = strata[stratum_of(error[i], tolerance.of(i))];
     s.bricks.push_back(static_cast<std::int64_t>(i));
     if (looked_at[i] && in_layer[at(static_cast<std::int64_t>(i) / (n[0] * n[1]))])
       s.candidates.push_back(static_cast<std::int64_t>(i));
   }
+  const auto excess = [&](std::int64_t i) { return error[at(i)] / tolerance.of(at(i)); };
   // Tiles grow with the error to the power 3/2, and so does their spread: sample in that proportion (Neyman).
   const auto weight = [](int key, const Stratum& s) {
     return static_cast<double>(s.bricks.size()) * std::pow(2.0, 0.75 * key);
@@ -162,9 +155,9 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
     std::shuffle(s.candidates.begin(), s.candidates.end(), random);
     const double wanted = std::max(fewest_of_stratum, sampled_bricks * weight(key, s) / all_weights);
     s.candidates.resize(std::min(s.candidates.size(), static_cast<std::size_t>(wanted)));
-    // Bricks that err more lie together, as those that are refined do.
+    // Bricks that err more, for what they may, lie together, as those that are refined do.
     std::stable_sort(s.bricks.begin(), s.bricks.end(),
-                     [&](std::int64_t a, std::int64_t b) { return error[at(a)] > error[at(b)]; });
+                     [&](std::int64_t a, std::int64_t b) { return excess(a) > excess(b); });
   }
   return strata;
 }
@@ -202,72 +195,105 @@ std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGe
   return near;
 }
 
-Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
-                       const std::vector<float>& stored, const std::vector<std::uint8_t>& looked_at,
-                       double tolerance) {
-  const GoldSettings& settings = gold.fine().settings();
-  const Index3 n = Bricks(settings.grid, settings.granularity).along();
-  const std::vector<std::uint8_t> near = gold.fine().bricks_near_coverage();
-  const DeviceField field(state, as_mixed(stored, settings));
-  HostMemory host(state);
-  const auto classify = [&](const std::vector<std::uint8_t>& selected) {
-    OpenBricks bricks;
-    bricks.grid = settings.grid;
-    bricks.granularity = settings.granularity;
-    bricks.rate = settings.rate;
-    bricks.coarsening = settings.coarsening;
-    bricks.sampled = false;
-    bricks.level.assign(near.size(), LevelTriple{0, 0, 0});
-    bricks.involved.assign(near.size(), 0);
-    bricks.samples.resize(near.size());
-    JournalledRates unrecorded(gold);
-    ClassifyBricks test(unrecorded, bricks, host, {}, [](float, double) {});
-    test.classify(field, tolerance, selected);
-    std::vector<Classified> out;
-    const MixedVolume shape = bricks.shape();
-    for (std::size_t i = 0; i < near.size(); ++i)
-      out.push_back({bricks.level[i] == LevelTriple{0, 0, 0}
-                         ? 0.0
-                         : static_cast<double>(shape.tile_size(bricks.level[i])),
-                     test.measures()[i], test.is_easy(i, tolerance)});
-    return out;
-  };
+// A brick that was classified to see what becomes of it.
+struct Foresight::Classified {
+  double samples = 0;  // of its tile
+  BrickMeasure measure;
+  bool easy = false;  // measured on coarse gold first
 
-  // One brick builds the kernels; then whole blocks tell the pace of the first pass, and bricks of every
-  // stratum what follows it.
-  std::vector<std::uint8_t> one(near.size(), 0);
+  [[nodiscard]] Fate fate(int fine_rate) const {
+    const bool fine = measure.rate == fine_rate;
+    if (samples > 0) return fine ? fine_refined : easy ? coarse_refined : proposed;
+    return fine ? fine_stays : coarse_stays;
+  }
+};
+
+Foresight::Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
+                     const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at)
+    : prepared_(std::move(prepared)),
+      units_(units),
+      gold_(prepared_->state, prepared_->filtered, prepared_->sups, settings, prepared_->source(settings)),
+      stored_(std::move(stored)),
+      looked_at_(std::move(looked_at)),
+      near_(gold_.fine().bricks_near_coverage()),
+      error_(expected_error(base, settings.granularity, Bricks(settings.grid, settings.granularity).along())),
+      base_samples_(std::ssize(base.samples)),
+      field_(prepared_->state, as_mixed(stored_, gold_.fine().settings())) {}
+
+std::vector<Foresight::Classified> Foresight::classify(const NodeTolerance& tolerance,
+                                                       const std::vector<std::uint8_t>& selected) {
+  const GoldSettings& settings = gold_.fine().settings();
+  OpenBricks bricks;
+  bricks.grid = settings.grid;
+  bricks.granularity = settings.granularity;
+  bricks.rate = settings.rate;
+  bricks.coarsening = settings.coarsening;
+  bricks.sampled = false;
+  bricks.level.assign(near_.size(), LevelTriple{0, 0, 0});
+  bricks.involved.assign(near_.size(), 0);
+  bricks.samples.resize(near_.size());
+  JournalledRates unrecorded(gold_);
+  HostMemory host(prepared_->state);
+  ClassifyBricks test(unrecorded, bricks, host, {}, [](float, double) {});
+  test.classify(field_, tolerance, selected);
+  std::vector<Classified> out;
+  const MixedVolume shape = bricks.shape();
+  for (std::size_t i = 0; i < near_.size(); ++i)
+    out.push_back({bricks.level[i] == LevelTriple{0, 0, 0}
+                       ? 0.0
+                       : static_cast<double>(shape.tile_size(bricks.level[i])),
+                   test.measures()[i], test.is_easy(i, tolerance.of(i))});
+  return out;
+}
+
+// One brick builds the kernels; then whole blocks tell the pace of the first pass.
+double Foresight::first_pass_seconds(const NodeTolerance& tolerance) {
+  std::vector<std::uint8_t> one(near_.size(), 0);
   // The middle one of those that are looked at.
-  std::int64_t before = std::count(looked_at.begin(), looked_at.end(), 1) / 2;
+  std::int64_t before = std::count(looked_at_.begin(), looked_at_.end(), 1) / 2;
   for (std::size_t i = 0; i < one.size() && before >= 0; ++i)
-    if (looked_at[i] && before-- == 0) one[i] = 1;
-  classify(one);
-  const bool screens = gold.coarse() != nullptr;
-  GoldStream& first = screens ? *gold.coarse() : gold.fine();
-  const auto first_purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
-  Paces large(gold);
-  classify(some_blocks(first, n, looked_at));
-  const double first_pass = large.seconds(!screens, first_purpose, near);
+    if (looked_at_[i] && before-- == 0) one[i] = 1;
+  classify(tolerance, one);
+  const GoldSettings& settings = gold_.fine().settings();
+  const bool screens = gold_.coarse() != nullptr;
+  GoldStream& first = screens ? *gold_.coarse() : gold_.fine();
+  const auto purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
+  Paces large(gold_);
+  classify(tolerance, some_blocks(first, Bricks(settings.grid, settings.granularity).along(), looked_at_));
+  return large.seconds(!screens, purpose, near_);
+}
 
-  const auto error = expected_error(base, settings.granularity, n);
-  std::map<int, Stratum> strata = strata_of(near, looked_at, error, tolerance, n);
-  std::vector<std::uint8_t> sampled(near.size(), 0);
+Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
+  const GoldSettings& settings = gold_.fine().settings();
+  const Index3 n = Bricks(settings.grid, settings.granularity).along();
+  const bool screens = gold_.coarse() != nullptr;
+  const double first_pass = first_pass_seconds(tolerance);
+  // Bricks of every stratum tell what follows it.
+  std::map<int, Stratum> strata = strata_of(near_, looked_at_, error_, tolerance, n);
+  std::vector<std::uint8_t> sampled(near_.size(), 0);
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
-  Paces small(gold);
-  const auto classes = classify(sampled);
+  Paces small(gold_);
+  const auto classes = classify(tolerance, sampled);
+  Foreseen out;
+  measured_.clear();
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
       const Classified& c = classes[at(i)];
+      if (c.measure.total >= 0) measured_.push_back(c.measure);
       s.seen += 1;
       s.tile_samples += c.samples;
       if (c.measure.total >= 0) s.share[c.fate(settings.rate)] += 1;
     }
 
+  tile_pace_ = small.pace(true, GoldStream::For::samples);
+  measure_pace_ = small.pace(true, GoldStream::For::measuring);
+
   // A stratum without a brick in the layers takes after the one below it.
   double tile_samples = 0, mean = 0;
   std::array<double, fates> share{};
   std::array<std::vector<std::uint8_t>, fates> bricks;
-  for (auto& b : bricks) b.assign(near.size(), 0);
+  for (auto& b : bricks) b.assign(near_.size(), 0);
   for (const auto& [key, s] : strata) {
     if (s.seen > 0) {
       mean = s.tile_samples / s.seen;
@@ -280,14 +306,13 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
            ++i)
         bricks[fate][at(s.bricks[next++])] = 1;
   }
-  Foreseen out;
-  const auto samples = static_cast<double>(base.samples.size());
+  const auto samples = static_cast<double>(base_samples_);
   out.samples_ratio =
-      (static_cast<double>(stored.size()) + static_cast<double>(near.size()) + tile_samples) / samples;
+      (static_cast<double>(stored_.size()) + static_cast<double>(near_.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
   // What will be kept and was not needed so far.
-  const KeptGold& kept = gold.fine().source()->kept;
-  const std::int64_t missing = gold.fine().missing_tiles(near, GoldStream::For::samples);
+  const KeptGold& kept = gold_.fine().source()->kept;
+  const std::int64_t missing = gold_.fine().missing_tiles(near_, GoldStream::For::samples);
   out.kept_bytes =
       kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
   out.kept_seconds = kept.column_seconds() +
@@ -310,6 +335,27 @@ Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base
   add(false, For::measuring, bricks[coarse_refined]);
   add(true, For::measuring, hard);
   return out;
+}
+
+double Foresight::repair_seconds(const std::vector<std::uint8_t>& raises) {
+  double seconds = 0;
+  const std::uint8_t most =
+      raises.empty() ? std::uint8_t{0} : *std::max_element(raises.begin(), raises.end());
+  // Where the sample measured nothing on fine gold: what extraction takes bounds it.
+  const double measuring = measure_pace_ > 0 ? measure_pace_ : tile_pace_;
+  for (std::uint8_t round = 1; round <= most; ++round) {
+    std::vector<std::uint8_t> raised(raises.size(), 0);
+    for (std::size_t i = 0; i < raised.size(); ++i) raised[i] = raises[i] >= round ? 1 : 0;
+    seconds += tile_pace_ * gold_.fine().samples(raised, GoldStream::For::samples) +
+               measuring * gold_.fine().samples(raised, GoldStream::For::measuring);
+  }
+  return seconds;
+}
+
+std::uint64_t memory_of_tiles(std::uint64_t tiles, std::uint64_t limit, bool on_gpu) {
+  const std::uint64_t eighth = limit / 8;
+  if (limit == 0 || tiles <= eighth) return 3 * tiles;
+  return 2 * eighth + (on_gpu ? tiles : 0);
 }
 
 }  // namespace vdvr

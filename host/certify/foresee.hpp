@@ -1,9 +1,13 @@
-// What a build will store and how long it will take, from a sample of its bricks. Called by plan.cpp.
+// What a build will store and how long it will take, from a sample of its bricks. Called by plan.cpp and
+// foresee_pictures.cpp.
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "host/certify/classify_bricks.hpp"
+#include "host/gold/prepared_scan.hpp"
 
 namespace vdvr {
 
@@ -19,12 +23,50 @@ struct Foreseen {
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
 
-/// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
-/// which tells the storage, among those to look at. `base` holds F on the grid, `stored` the base samples to
-/// store, `tolerance` is what the node test may take. Raising bricks after closing is not foreseen: it
-/// concerns few. Cost: about 1 % of the build.
-Foreseen foresee_build(opencl::State& state, GoldRates& gold, const Volume& base,
-                       const std::vector<float>& stored, const std::vector<std::uint8_t>& looked_at,
-                       double tolerance);
+/// Of what plans look at, foresees builds of different tolerances. Keeps the prepared scan; all but what
+/// `units` says is in those.
+class Foresight {
+ public:
+  /// `base` holds F on the grid, `stored` the base samples to store.
+  Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
+            const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at);
+
+  /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
+  /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
+  /// bricks after closing is not foreseen. Cost: about 1 % of the build.
+  Foreseen foresee(const NodeTolerance& tolerance);
+
+  /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and
+  /// their measure, at the pace of what was foreseen last.
+  double repair_seconds(const std::vector<std::uint8_t>& raises);
+
+  [[nodiscard]] const Units& units() const { return units_; }
+  [[nodiscard]] GoldRates& gold() { return gold_; }
+  /// Of the base samples, on the bricks that were looked at last.
+  [[nodiscard]] const std::vector<BrickMeasure>& measured() const { return measured_; }
+  [[nodiscard]] const std::vector<float>& stored() const { return stored_; }
+  /// Bricks that may hold a tested node.
+  [[nodiscard]] const std::vector<std::uint8_t>& near() const { return near_; }
+
+ private:
+  struct Classified;
+  std::vector<Classified> classify(const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected);
+  double first_pass_seconds(const NodeTolerance& tolerance);
+
+  std::shared_ptr<PreparedScan> prepared_;
+  Units units_;
+  GoldRates gold_;
+  std::vector<float> stored_;
+  std::vector<std::uint8_t> looked_at_, near_;
+  std::vector<double> error_;  // expected, by brick
+  std::int64_t base_samples_;  // of the grid
+  std::vector<BrickMeasure> measured_;
+  double tile_pace_ = 0, measure_pace_ = 0;  // seconds a gold sample
+  DeviceField field_;
+};
+
+/// What tiles take: as classified, closed and on the device, but no more than an eighth of the limit of each
+/// of the first two, since the rest lies in scratch.
+std::uint64_t memory_of_tiles(std::uint64_t tiles, std::uint64_t limit, bool on_gpu);
 
 }  // namespace vdvr

@@ -292,14 +292,6 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Before closing, closed, and on the device: build puts what takes more than an eighth of the limit into
-// scratch.
-std::uint64_t memory_of_tiles(std::uint64_t tiles, std::uint64_t limit, bool on_gpu) {
-  const std::uint64_t eighth = limit / 8;
-  if (limit == 0 || tiles <= eighth) return 3 * tiles;
-  return 2 * eighth + (on_gpu ? tiles : 0);
-}
-
 // One plan, step by step. All but the scan, and what is thrown, in `units`.
 class Planner {
  public:
@@ -481,6 +473,14 @@ class Planner {
     plan_.layout.coarsening = coarsening_of(plan_, *coverage_, settings_at(plan_.rates), t);
   }
 
+  // What every brick is brought within at first.
+  [[nodiscard]] double everywhere() const {
+    const auto& wanted = plan_.settings.everywhere;
+    if (!wanted) return plan_.epsilon_abs;
+    return wanted->relative ? *wanted->relative * (plan_.epsilon_abs / plan_.epsilon)
+                            : from_world(*wanted->absolute, units_);
+  }
+
   // Storage, memory and time.
   void foresee(const Trial& t) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates),
@@ -496,11 +496,13 @@ class Planner {
                          stored, {}, source_at(plan_.rates));
     });
     const double all = size(gold.fine().bricks_near_coverage());
-    const Foreseen foreseen =
-        foresee_build(state_, gold, plan_.base, stored, looked_at, plan_.epsilon_abs - t.arithmetic);
+    plan_.foresight = std::make_shared<Foresight>(prepared_, units_, settings_at(plan_.rates), plan_.base,
+                                                  std::move(stored), looked_at);
+    const Foreseen foreseen = plan_.foresight->foresee(everywhere() - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
+    plan_.seconds_of_levels = foreseen.seconds - foreseen.kept_seconds;
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
     foresee_memory(foreseen, gold.fine().source()->kept);
@@ -548,6 +550,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   const ParallelGeometry& g = scan.geometry;
   plan.estimated = true;
   plan.prepared = nullptr;
+  plan.foresight = nullptr;
   plan.notes.push_back(
       fmt::format("estimated from the rows {} to {} of {}: the range, the bounds and what is foreseen may "
                   "differ in other rows",

@@ -106,6 +106,7 @@ void check_view(const LiveView& v, const LiveScene& scene) {
           std::isfinite((*v.clip)[i]) && std::isfinite((*v.clip)[i + 3]) && (*v.clip)[i] < (*v.clip)[i + 3],
           fmt::format("`clip` {} to {} along {} must be finite and in order", (*v.clip)[i], (*v.clip)[i + 3],
                       "xyz"[i]));
+  require(v.mode != RenderMode::integral, "`mode` integral is of `render`; a live view has none");
   require(scene.has_bounds || (!v.bound && v.mode != RenderMode::error),
           "the volume has no certificate to take a bound from");
 }

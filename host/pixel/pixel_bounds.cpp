@@ -26,7 +26,7 @@ namespace {
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
 
-static_assert(sizeof(VdvrCertify) == 84);
+static_assert(sizeof(VdvrCertify) == 88);
 
 constexpr double kUnit = 0x1p-24;
 // Of the list of pieces; what a picture needs beyond is made by bands of fewer rows.
@@ -46,6 +46,8 @@ void check(const Impl& v, const std::vector<float>& bounds, const RenderOptions&
     throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), v.host_ranges.size()));
   if (!(c.kappa >= 0x1p-10 && c.kappa <= 1024))
     throw InputError(fmt::format("`certify_parts` kappa {} must lie between 1/1024 and 1024", c.kappa));
+  if (c.chord && c.fast)
+    throw InputError("chord steps need what lies behind a part, which the one pass of `fast` does not know");
   if (!(c.theta > 0 && c.theta < 1))
     throw InputError(fmt::format("termination {} of a certified picture must lie in (0, 1)", c.theta));
   if (c.window && !is_clear_outside(o.transfer, *c.window))
@@ -66,23 +68,23 @@ double typical_bound(std::vector<float> bounds) {
 }
 
 VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPictureOptions& c,
-                         const RangeTable& table) {
+                         const RangeTable& table, double theta) {
   VdvrCertify q{};
   q.range_lo = table.lo;
   q.range_scale = table.scale;
   q.bins = table.bins;
   q.parts_per_spread = static_cast<float>(3 / (2 * c.kappa));
-  q.deep = static_cast<float>(std::log2(1 / c.theta));
-  q.theta = static_cast<float>(c.theta);
-  // docs/pixel-bounds.md, theorem 6: corners 7.5 u M, averages 3 u M, each cut of three lerps 8 u M.
-  const double largest = static_cast<double>(v.facts->largest);
-  q.slack = static_cast<float>(16 * kUnit * largest);
-  q.part_slack = static_cast<float>(8 * kUnit * largest);
+  q.deep = static_cast<float>(std::log2(1 / theta));
+  q.theta = static_cast<float>(theta);
+  // docs/pixel-bounds.md, theorem 6: corners 7.5 u M, averages 3 u M, coefficients of a part 2 u M, and what
+  // they are widened by is a sum.
+  q.slack = static_cast<float>(18 * kUnit * static_cast<double>(v.facts->largest));
   // Entry and product: 4 u of the cells of an axis.
   q.reach[0] = static_cast<float>(4 * kUnit * v.field.grid.cells_x);
   q.reach[1] = static_cast<float>(4 * kUnit * v.field.grid.cells_y);
   q.reach[2] = static_cast<float>(4 * kUnit * v.field.grid.cells_z);
   double most = 1;
+  for (std::size_t k = 0; k < 3; ++k) most = std::max({most, o.background_top[k], o.background_bottom[k]});
   const double lights = std::max<double>(1, static_cast<double>(o.lights.size()) + (o.head_light ? 1 : 0));
   for (std::size_t k = 0; k < 3; ++k) {
     const bool any = table.colour_lo[k] <= table.colour_hi[k];
@@ -97,8 +99,11 @@ VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPic
     q.colour_hi[k] = static_cast<float>(hi);
     if (any) most = std::max({most, std::abs(lo), std::abs(hi)});
   }
-  // A box step 10 u, the length of a part and the colours with light 4 more, of colours up to `most`.
-  q.part_error = static_cast<float>(14 * kUnit * most);
+  // Of theorem 6 too. The background is interpolated: 5 u of a quotient, and four roundings.
+  q.first_error = static_cast<float>(10 * kUnit * most);
+  q.sum_error = static_cast<float>(kUnit / 2 * std::exp2(std::ceil(std::log2(most))));
+  const int of_share = c.fast ? VDVR_FAST_ROUNDING : c.chord ? VDVR_CHORD_ROUNDING : VDVR_BOX_ROUNDING;
+  q.share_error = static_cast<float>(of_share * kUnit * most);
   return q;
 }
 
@@ -121,6 +126,7 @@ opencl::Defines with_kernel(opencl::Defines defines, const CertifyPictureOptions
   for (auto& [name, value] : defines)
     if (name == "VDVR_KERNEL") value = c.fast ? "VDVR_KERNEL_CERTIFY_FAST" : "VDVR_KERNEL_CERTIFY";
   defines.push_back({"VDVR_LIGHT", light ? "1" : "0"});
+  defines.push_back({"VDVR_CHORD", c.chord ? "1" : "0"});
   return defines;
 }
 
@@ -142,7 +148,7 @@ class Launch {
         o_(o),
         certify_(c),
         table_(make_range_table(o.transfer, typical_bound(bounds), c.window.has_value())) {
-    q_ = make_certify(v, o, c, table_);
+    q_ = make_certify(v, o, c, table_, ending_share(c.theta, bounds, o.transfer));
     const VdvrGrid& grid = v.field.grid;
     const auto clear = clear_bricks(v, q_, table_, bounds, c.window.has_value());
     const auto distance = distance_to_other(clear, {grid.bricks_x, grid.bricks_y, grid.bricks_z});
@@ -255,6 +261,13 @@ class Launch {
 };
 
 }  // namespace
+
+double ending_share(double theta, const std::vector<float>& bounds, const TransferFunction& transfer) {
+  const auto& points = transfer.points;
+  const double range = points.empty() ? 0 : points.back().value - points.front().value,
+               share = range > 0 ? typical_bound(bounds) / range / 16 : 1;
+  return share > 0 ? std::min(theta, share) : theta;
+}
 
 bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, double>& window) {
   const auto& points = transfer.points;

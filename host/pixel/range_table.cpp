@@ -15,10 +15,11 @@ constexpr float kNone = -std::numeric_limits<float>::infinity();
 // 0.
 constexpr float kOpaque = 1e30f;
 
-float up(double x) { return std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity()); }
-float down(double x) {
-  return std::nextafter(static_cast<float>(x), -std::numeric_limits<float>::infinity());
+float up(double x) {
+  const auto f = static_cast<float>(x);
+  return static_cast<double>(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
 }
+float down(double x) { return -up(-x); }
 
 double halvings(double opacity) { return -std::log1p(-opacity) / std::log(2.0); }
 
@@ -86,7 +87,7 @@ RangeTable make_range_table(const TransferFunction& transfer, double bound, bool
   const auto& points = transfer.points;
   RangeTable t;
   const double first = points.front().value, width = std::max(points.back().value - first, 1e-30);
-  const double wanted = bound > 0 ? 8 * width / bound : 16384.0;
+  const double wanted = bound > 0 ? 32 * width / bound : 16384.0;
   t.bins = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::clamp(wanted, 2048.0, 16384.0))));
   t.lo = down(first);
   t.scale = down(t.bins / width);

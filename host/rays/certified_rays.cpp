@@ -7,6 +7,7 @@
 #include "host/fdk/filter_cone.hpp"
 #include "host/rays/crossings.hpp"
 #include "host/rays/emission.hpp"
+#include "host/rays/line_integral.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
@@ -136,6 +137,22 @@ MaximumBounds CertifiedRays::maximum(const Camera& camera, std::int64_t width, s
       out.high.values[i] = up(m.high);
       out.first.values[i] = down(m.first);
       out.last.values[i] = up(m.last);
+    }
+  });
+  return out;
+}
+
+IntegralBounds CertifiedRays::integral(const Camera& camera, std::int64_t width, std::int64_t height,
+                                       const Progress& progress) const {
+  IntegralBounds out{empty(width, height, 1, 0), empty(width, height, 1, 0),
+                     std::vector<std::uint8_t>(static_cast<std::size_t>(width * height))};
+  parallel_for(height, progress, "certify", [&](std::int64_t y) {
+    for (std::int64_t x = 0; x < width; ++x) {
+      const LineIntegral line = integral_along(impl_->field, pixel_ray(camera, width, height, x, y));
+      const auto i = static_cast<std::size_t>(y * width + x);
+      out.met[i] = line.any ? 1 : 0;
+      out.low.values[i] = down(line.value - line.reach);
+      out.high.values[i] = up(line.value + line.reach);
     }
   });
   return out;

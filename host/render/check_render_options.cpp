@@ -49,6 +49,13 @@ void check_lights(const std::vector<Vec3>& lights) {
       throw InputError(fmt::format("`light` {},{},{} has no direction", l[0], l[1], l[2]));
 }
 
+void check_window(const RenderOptions& o) {
+  if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
+                         o.slice_range->first <= o.slice_range->second))
+    throw InputError(fmt::format("the grey window {},{} must be finite and in order", o.slice_range->first,
+                                 o.slice_range->second));
+}
+
 void check_clip(const Clip& c) {
   for (std::size_t a = 0; a < 3; ++a)
     if (!(c.low[a] < c.high[a]))
@@ -71,10 +78,7 @@ void check_options(const RenderOptions& o) {
       throw InputError("`show` depth, normal and error do not apply to a slice, which has no camera");
     if (o.slice_axis < 0 || o.slice_axis > 2)
       throw InputError(fmt::format("slice axis {} is not 0 (x), 1 (y) or 2 (z)", o.slice_axis));
-    if (o.slice_range && !(std::isfinite(o.slice_range->first) && std::isfinite(o.slice_range->second) &&
-                           o.slice_range->first <= o.slice_range->second))
-      throw InputError(fmt::format("the grey window {},{} must be finite and in order", o.slice_range->first,
-                                   o.slice_range->second));
+    check_window(o);
     return;
   }
   check_camera(o.camera);
@@ -95,7 +99,13 @@ void check_options(const RenderOptions& o) {
         "one step");
   if (o.mode == RenderMode::mip && o.output == RenderOutput::normal)
     throw InputError("`show` normal does not apply to `mode` mip: a maximum has no surface");
-  if (o.mode != RenderMode::iso || !o.transfer.points.empty()) check_transfer(o.transfer);
+  if (o.mode == RenderMode::integral) {
+    if (o.output != RenderOutput::colour)
+      throw InputError("`show` depth, normal and error do not apply to `mode` integral: it is of whole rays");
+    check_window(o);
+  }
+  const bool needs_transfer = o.mode == RenderMode::dvr || o.mode == RenderMode::mip;
+  if (needs_transfer || !o.transfer.points.empty()) check_transfer(o.transfer);
 }
 
 }  // namespace vdvr

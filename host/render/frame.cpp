@@ -60,7 +60,7 @@ const BakedTransfer& Frame::prepare(const RenderOptions& o, float slack, bool ba
   static const BakedTransfer none;
   if (o.mode == RenderMode::slice) return none;
   bake_table(o);
-  if (o.mode != RenderMode::mip) update_distance(o, slack, base_first);
+  if (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) update_distance(o, slack, base_first);
   return baked_;
 }
 

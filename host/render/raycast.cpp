@@ -1,6 +1,6 @@
 // Launches the ray-caster over resident volumes: chooses sampler, gradients and packets. Called by
 // renderer.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive,
-// raycast_iso, raycast_mip, slice of kernels/render/raycast.cl.
+// raycast_iso, raycast_mip, raycast_integral, slice of kernels/render/raycast.cl.
 #include "host/render/raycast.hpp"
 
 #include <fmt/format.h>
@@ -91,6 +91,8 @@ KernelName kernel_of(const RenderOptions& o) {
       return {"raycast_mip", "VDVR_KERNEL_MIP"};
     case RenderMode::slice:
       return {"slice", "VDVR_KERNEL_SLICE"};
+    case RenderMode::integral:
+      return {"raycast_integral", "VDVR_KERNEL_INTEGRAL"};
     default:
       break;
   }
@@ -165,11 +167,12 @@ void launch(const Frame& f, const Impl& v, const RenderOptions& o, const opencl:
     kernel(range, field..., bricks, grid, slice, picture, f.row_samples());
     return;
   }
-  // dvr and iso leap by distances, mip by the bricks' maxima.
+  // dvr and iso leap by distances, mip by the bricks' maxima; an integral passes every cell.
   VdvrRaycast params = make_params(f.field(), o, table, slack);
   params.pixel_x = static_cast<int>(pixels.x0);
   params.pixel_y = static_cast<int>(pixels.y0);
-  const cl::Buffer& guide = o.mode == RenderMode::mip ? v.ranges() : f.distance();
+  const bool by_distance = o.mode == RenderMode::dvr || o.mode == RenderMode::iso;
+  const cl::Buffer& guide = by_distance ? f.distance() : v.ranges();
   const auto draw = [&](const auto&... bounds) {
     opencl::Kernel<Field..., cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrRaycast, cl::Buffer,
                    cl::Buffer, std::remove_cvref_t<decltype(bounds)>...>

@@ -64,6 +64,8 @@ void set_clip(VdvrRaycast& p, const Grid& g, const std::optional<Clip>& clip) {
                  high = (clip->high[a] - g.origin[a]) / g.spacing[a];
     if (low > 0) p.clip_low[a] = static_cast<float>(std::min(low + inward, cells + 1));
     if (high < cells) p.clip_high[a] = static_cast<float>(std::max(high - inward, -1.0));
+    // Faces in the wrong order would be a box again: beside the grid there is none.
+    p.clip_low[a] = std::min(p.clip_low[a], p.clip_high[a]);
   }
   if (!clip || !std::isfinite(clip->radius)) return;
   p.cylinder_x = static_cast<float>((clip->axis[0] - g.origin[0]) / g.spacing[0]);

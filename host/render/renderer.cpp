@@ -47,16 +47,24 @@ Image coloured(Pixels pixels, const RenderOptions& o) {
   return image;
 }
 
+// Of line integrals: black to white over the window.
+Image grey(const FloatImage& values, const std::pair<double, double>& window) {
+  Image image{values.width, values.height, {}};
+  image.rgb.reserve(3 * values.values.size());
+  const auto [lo, hi] = window;
+  for (const float x : values.values) {
+    const double part = hi > lo ? (static_cast<double>(x) - lo) / (hi - lo) : 0;
+    image.rgb.insert(image.rgb.end(), 3, to_byte(static_cast<float>(part)));
+  }
+  return image;
+}
+
 // Depths from white, nearest, to dark grey; normals with 0 as middle grey; nothing black.
 Image shown(const FloatImage& values) {
   Image image{values.width, values.height,
               std::vector<std::uint8_t>(static_cast<std::size_t>(3 * values.width * values.height))};
-  float lo = std::numeric_limits<float>::infinity(), hi = -lo;
-  for (const float x : values.values) {
-    if (!std::isfinite(x)) continue;
-    lo = std::min(lo, x);
-    hi = std::max(hi, x);
-  }
+  const auto range = range_of_values(values);
+  const auto lo = static_cast<float>(range.first), hi = static_cast<float>(range.second);
   const float scale = hi > lo ? 0.85f / (hi - lo) : 0.0f;
   for (std::size_t i = 0; i < image.rgb.size(); ++i)
     image.rgb[i] = to_byte(values.channels == 3 ? 0.5f + 0.5f * values.values[i]
@@ -68,7 +76,20 @@ Image shown(const FloatImage& values) {
 
 void convert(Pixels pixels, const RenderOptions& o, RenderResult& r) {
   r.values = values_of(pixels, o);
-  r.image = o.output == RenderOutput::colour ? coloured(pixels, o) : shown(r.values);
+  if (o.mode == RenderMode::integral)
+    r.image = grey(r.values, o.slice_range.value_or(range_of_values(r.values)));
+  else r.image = o.output == RenderOutput::colour ? coloured(pixels, o) : shown(r.values);
+}
+
+std::pair<double, double> range_of_values(const FloatImage& values) {
+  std::pair<double, double> range{std::numeric_limits<double>::infinity(),
+                                  -std::numeric_limits<double>::infinity()};
+  for (const float x : values.values) {
+    if (!std::isfinite(x)) continue;
+    range.first = std::min(range.first, static_cast<double>(x));
+    range.second = std::max(range.second, static_cast<double>(x));
+  }
+  return range.first <= range.second ? range : std::pair{0.0, 0.0};
 }
 
 struct Renderer::Impl {

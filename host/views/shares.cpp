@@ -64,12 +64,11 @@ struct Sample {
   std::uint32_t brick;
 };
 
-std::vector<Sample> samples_along(const RayField& field, const WorldRay& ray, const Media& media) {
+std::vector<Sample> samples_along(const RayField& field, const WorldRay& ray, const Media& media, int parts) {
   std::vector<Sample> out;
   double depth = 0;
   // What lies behind this is seen by less than a tenth of a level.
   constexpr double dark = 8;
-  constexpr int parts = 2;
   field.walk(ray, [&](const RayPiece& piece) {
     const double cells = (piece.last - piece.first) / field.cell() / parts;
     for (int i = 0; i < parts; ++i) {
@@ -114,7 +113,7 @@ PixelShares added(const std::vector<Sample>& samples, const Media& media, Colour
 }  // namespace
 
 std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews& views, std::size_t view,
-                                      const Progress& progress) {
+                                      int parts, const Progress& progress) {
   const Media media(views.transfer);
   std::vector<PixelShares> out(static_cast<std::size_t>(views.width * views.height));
   parallel_for(views.height, progress, "shares", [&](std::int64_t y) {
@@ -122,7 +121,7 @@ std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews&
     for (std::int64_t x = 0; x < views.width; ++x) {
       const WorldRay ray = pixel_ray(views.cameras[view], views.width, views.height, x, y);
       out[static_cast<std::size_t>(y * views.width + x)] =
-          added(samples_along(field, ray, media), media, background);
+          added(samples_along(field, ray, media, parts), media, background);
     }
   });
   return out;

@@ -19,8 +19,8 @@ struct PixelShares {
   std::vector<std::pair<std::uint32_t, float>> bricks;
 };
 
-/// [y][x]. Cost: two values of V a cell of each ray, and some 20 of the transfer function each.
+/// [y][x]. Cost: `parts` values of V a cell of each ray, and some 20 of the transfer function each.
 std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews& views, std::size_t view,
-                                      const Progress& progress = {});
+                                      int parts, const Progress& progress = {});
 
 }  // namespace vdvr

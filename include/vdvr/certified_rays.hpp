@@ -1,5 +1,6 @@
 // Pictures of the ideal field F, as far as a certificate tells them: intervals of colours, of the depth of a
-// surface, of a maximum (docs/pixel-bounds.md). Double precision on the host, ray by ray.
+// surface, of a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the
+// host, ray by ray.
 #pragma once
 
 #include <array>
@@ -42,6 +43,13 @@ struct MaximumBounds {
   FloatImage low, high, first, last;
 };
 
+/// The integral of F along rays inside the covered region, density times world unit: [y][x], 0 and 0 where a
+/// ray misses it. Infinite ends where a ray passes a brick that was not tested.
+struct IntegralBounds {
+  FloatImage low, high;
+  std::vector<std::uint8_t> met;  ///< 1 where a ray meets the region
+};
+
 class VDVR_API CertifiedRays {
  public:
   /// Rays are those within the covered cylinder, the grid and the region of interest. Refers to the volume.
@@ -64,6 +72,8 @@ class VDVR_API CertifiedRays {
                                       double value, const Progress& progress = {}) const;
   [[nodiscard]] MaximumBounds maximum(const Camera& camera, std::int64_t width, std::int64_t height,
                                       const Progress& progress = {}) const;
+  [[nodiscard]] IntegralBounds integral(const Camera& camera, std::int64_t width, std::int64_t height,
+                                        const Progress& progress = {}) const;
 
  private:
   struct Impl;

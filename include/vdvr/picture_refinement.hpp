@@ -92,4 +92,25 @@ class VDVR_API PictureRefinement {
   std::unique_ptr<Impl> impl_;
 };
 
+/// What a build that is refined for pictures is foreseen to take.
+struct PictureForecast {
+  /// As pictures of F show them, at no more than a quarter of the pixels where there are many.
+  std::vector<PictureRound> rounds;
+  double samples_ratio = 0;  ///< stored per base sample, as Plan::samples_ratio
+  std::uint64_t bytes = 0;   ///< of samples, before compression
+  std::uint64_t memory_bytes = 0;
+  double seconds = 0;
+  double least = 0, median = 0, largest = 0;  ///< bounds of bricks that may be asked, world units
+};
+
+/// Goes through the rounds of the build with what second differences of F say of each level, compared with
+/// what some bricks were measured to err, and no gold besides. `plan`: made to foresee
+/// (PlanSettings::foresee) and not from a part of the scan, with `everywhere` as the tolerance that holds
+/// everywhere; its epsilon is the least that is asked of a brick. Cost: a plan's look at some bricks, and
+/// some rounds' pictures.
+VDVR_API PictureForecast foresee_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
+                                          const WantedViews& wanted, const PictureRefinementOptions& options,
+                                          double everywhere_abs, StorageChoice storage,
+                                          const Progress& progress = {});
+
 }  // namespace vdvr

@@ -40,9 +40,13 @@ struct PlanSettings {
   /// Of a large scan judge by a part: some views for bounds, a window of rows for everything. What is
   /// foreseen then are estimates, as the plan's notes say, and it cannot be built.
   bool estimate = false;
+  /// What is foreseen is for this tolerance, no smaller than the plan's: where bricks begin that pictures
+  /// then refine. None: the plan's.
+  std::optional<Tolerance> everywhere{};
 };
 
 struct PreparedScan;
+class Foresight;
 
 struct Plan {
   Grid grid;
@@ -59,8 +63,9 @@ struct Plan {
                 memory_of_cells = 0;  ///< of those, what grows with the rows, with the grid
   std::uint64_t tile_bytes = 0;       ///< of tiles before closing, wherever they lie
   double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
-  double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
-  double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks
+  double seconds_of_rows = 0;    ///< of those, what grows with the detector's rows and not with the grid's
+  double seconds_of_levels = 0;  ///< and what classifying and measuring once takes
+  double samples_ratio = 0;      ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows
@@ -69,6 +74,8 @@ struct Plan {
   /// The filtered scan and the gold that was kept, on the device: a build of the same scan on it goes on from
   /// there. Reset it to free their memory.
   std::shared_ptr<PreparedScan> prepared{};
+  /// Where something was foreseen: foresees builds of other tolerances.
+  std::shared_ptr<Foresight> foresight{};
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.

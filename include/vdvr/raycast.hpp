@@ -1,4 +1,5 @@
-// Headless ray-casting of certified and uniform volumes: DVR, iso-surface, MIP, slice, error.
+// Headless ray-casting of certified and uniform volumes: DVR, iso-surface, MIP, line integral, slice,
+// error.
 #pragma once
 
 #include <array>
@@ -18,7 +19,8 @@
 
 namespace vdvr {
 
-enum class RenderMode { dvr, iso, mip, slice, error };
+/// integral: an X-ray picture, the field summed up along each ray.
+enum class RenderMode { dvr, iso, mip, slice, error, integral };
 /// What a picture shows of modes dvr and iso (depth and error also of mip): colours, where and how what is
 /// seen stands, or the largest bound of the samples that it was made of (Renderer::set_bounds).
 enum class RenderOutput { colour, depth, normal, error };
@@ -65,11 +67,13 @@ struct RenderOptions {
   TransferFunction transfer;
   double step = 1;  ///< base cells (of the smallest spacing); opacities are corrected for it; iso needs none
   Classification classification = Classification::post;
-  StepMode step_mode = StepMode::fixed;                  ///< the others not with preintegrated
-  std::vector<IsoSurface> surfaces;                      ///< of mode iso, in any order
-  int slice_axis = 2;                                    ///< 0 x, 1 y, 2 z
-  std::optional<double> slice_position;                  ///< world; default the middle
-  std::optional<std::pair<double, double>> slice_range;  ///< grey window; default the volume's range
+  StepMode step_mode = StepMode::fixed;  ///< the others not with preintegrated
+  std::vector<IsoSurface> surfaces;      ///< of mode iso, in any order
+  int slice_axis = 2;                    ///< 0 x, 1 y, 2 z
+  std::optional<double> slice_position;  ///< world; default the middle
+  /// Grey window of modes slice and integral; default the volume's range, of integral that of the picture's
+  /// values.
+  std::optional<std::pair<double, double>> slice_range;
   bool shading = true;
   GradientKind gradient = GradientKind::central;
   bool head_light = true;      ///< at the eye
@@ -85,11 +89,12 @@ struct RenderOptions {
 struct RenderResult {
   Image image;
   /// What lies behind the pixels, NaN where nothing does. Colour: of dvr the opacity; of iso the distance
-  /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field.
-  /// Depth: that distance of iso, of dvr to the sample that brings the opacity to a half, of mip to the
-  /// maximum. Normal: three channels, x, y, z of the unit vector towards lower density there. Error: the
-  /// largest bound of the samples that add at least 1/512 per base cell to the pixel (of iso and mip: of the
-  /// points that it shows), infinite where one lies in a brick without.
+  /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field; of
+  /// integral the line integral, density times world unit, 0 where a ray meets nothing. Depth: that distance
+  /// of iso, of dvr to the sample that brings the opacity to a half, of mip to the maximum. Normal: three
+  /// channels, x, y, z of the unit vector towards lower density there. Error: the largest bound of the
+  /// samples that add at least 1/512 per base cell to the pixel (of iso and mip: of the points that it
+  /// shows), infinite where one lies in a brick without.
   FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
@@ -136,6 +141,9 @@ class VDVR_API Renderer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// The least and the largest finite value: what mode integral takes for its window. 0, 0 where there is none.
+VDVR_API std::pair<double, double> range_of_values(const FloatImage& values);
 
 /// One picture by a renderer of its own; a Renderer is faster for several.
 VDVR_API RenderResult raycast(Device& device, const ResidentVolume& volume, const RenderOptions& options);

@@ -10,6 +10,11 @@
 #define VDVR_LIGHT 0
 #endif
 
+RAY_INLINE V3 least3(V3 a, V3 b) { return v3(LEAST(a.x, b.x), LEAST(a.y, b.y), LEAST(a.z, b.z)); }
+RAY_INLINE V3 most3(V3 a, V3 b) { return v3(MOST(a.x, b.x), MOST(a.y, b.y), MOST(a.z, b.z)); }
+
+#include "device/certify_step.h"
+
 // The field on a piece is the cubic of Bernstein coefficients b0 to b3, and F lies within e of it.
 typedef struct {
   V b0, b1, b2, b3;
@@ -61,12 +66,7 @@ RAY_INLINE V least_extinction(RANGES, const VdvrCertify* q, V from, V to) {
   const V a = GATHER(V, negative, 8 * r.first), b = GATHER(V, negative, 8 * r.second);
   return -MOST(a, b);
 }
-// Extinctions and visible colours over [from, to]. Of colours the negative of the least, as the table has
-// them.
-typedef struct {
-  V t1, minus_t0;
-  V3 c1, minus_c0;
-} Shown;
+// Extinctions and visible colours over [from, to].
 RAY_INLINE Shown shown_between(RANGES, const VdvrCertify* q, V from, V to) {
   const Rows r = rows_of(q, from, to);
 #define FIRST_LOW(n) ranges[2 * LANE(r.first, n)]
@@ -222,7 +222,7 @@ RAY_INLINE I next_piece(FIELD, BRICKS, VdvrGrid grid, __global const uchar* rest
   return shows;
 }
 
-// The least and the largest coefficient of a piece.
+// The least and the largest coefficient of a piece, and the largest step between two.
 RAY_INLINE V least_of(const Piece* s) {
   const V a = LEAST(s->b0, s->b1), b = LEAST(s->b2, s->b3);
   return LEAST(a, b);
@@ -232,88 +232,118 @@ RAY_INLINE V most_of(const Piece* s) {
   return MOST(a, b);
 }
 
+RAY_INLINE V steepest(const Piece* s) {
+  const V a = fabs(s->b1 - s->b0), b = fabs(s->b2 - s->b1), c = fabs(s->b3 - s->b2), ab = MOST(a, b);
+  return MOST(ab, c);
+}
+
 // Into how many parts a piece is cut, so that the coefficients of each spread by 2 kappa e at most.
 RAY_INLINE I parts_of(const VdvrCertify* q, const Piece* s) {
-  const V a = fabs(s->b1 - s->b0), b = fabs(s->b2 - s->b1), c = fabs(s->b3 - s->b2), ab = MOST(a, b),
-          most = MOST(ab, c), e = MOST(s->e, (V)(1e-30f));
-  V n = ceil(q->parts_per_spread * most / e);
-  n = LEAST(n, (V)((float)VDVR_MOST_PARTS));
-  n = MOST(n, (V)(1.0f));
-  return PICK(s->length > 0.0f, TO_I(n), (I)(0));
+  const V n = ceil(q->parts_per_spread * steepest(s) / MOST(s->e, (V)(1e-30f)));
+  const V most = LEAST(n, (V)((float)VDVR_MOST_PARTS));
+  return PICK(s->length > 0.0f, TO_I(MOST(most, (V)(1.0f))), (I)(0));
 }
 
-RAY_INLINE V mixed(V a, V b, V s) { return (1.0f - s) * a + s * b; }
-// Cuts a piece in two at s of its length: [0, s] and [s, 1]. Both are halves of one de Casteljau scheme.
-RAY_INLINE void cut_piece(Piece* piece, float s, Piece* first, Piece* second) {
-  const V b0 = piece->b0, b1 = piece->b1, b2 = piece->b2, b3 = piece->b3, at = (V)(s);
-  const V b01 = mixed(b0, b1, at), b12 = mixed(b1, b2, at), b23 = mixed(b2, b3, at);
-  const V b012 = mixed(b01, b12, at), b123 = mixed(b12, b23, at), middle = mixed(b012, b123, at);
-  first->b0 = b0;
-  first->b1 = b01;
-  first->b2 = b012;
-  first->b3 = middle;
-  second->b0 = middle;
-  second->b1 = b123;
-  second->b2 = b23;
-  second->b3 = b3;
-}
-RAY_INLINE void pick_coefficients(I m, const Piece* from, Piece* to) {
-  to->b0 = PICK(m, from->b0, to->b0);
-  to->b1 = PICK(m, from->b1, to->b1);
-  to->b2 = PICK(m, from->b2, to->b2);
-  to->b3 = PICK(m, from->b3, to->b3);
-}
-
-// One part's colours as they are seen, and what passes it: at its largest and its least extinction.
+// A piece that is cut into n equal parts: the cubic by powers of the place on it, and a part's share of its
+// length.
 typedef struct {
-  V3 c1, c0;
-  V dense, thin;
-  I shows;
-} Part;
-RAY_INLINE Part part_of(RANGES, const VdvrCertify* q, const Piece* coefficients, const Piece* whole, V length,
-                        I active) {
-  const Shown s =
-      shown_between(THE_RANGES, q, least_of(coefficients) - whole->e, most_of(coefficients) + whole->e);
-  Part part;
-  part.shows = active & (s.t1 > 0.0f);
-  part.c1 = s.c1;
-  part.c0 = v3(-s.minus_c0.x, -s.minus_c0.y, -s.minus_c0.z);
+  V b0, d1, s1, s3;
+  V share, length, e;
+} Cut;
+RAY_INLINE Cut cut_of(const Piece* s, I n) {
+  const V d2 = s->b2 - s->b1, d3 = s->b3 - s->b2;
+  Cut c;
+  c.b0 = s->b0;
+  c.d1 = s->b1 - s->b0;
+  c.s1 = d2 - c.d1;
+  c.s3 = (d3 - d2) - c.s1;
+  const V parts = TO_V(n);
+  c.share = 1.0f / MOST(parts, (V)(1.0f));
+  c.length = s->length * c.share;
+  c.e = s->e + VDVR_CUT_ROUNDING * steepest(s);
+  return c;
+}
+// Where two parts meet: the field, and by how much a coefficient beside it differs.
+typedef struct {
+  V value, rise;
+} Joint;
+RAY_INLINE Joint first_joint(const Piece* s, const Cut* c) {
+  const Joint j = {s->b0, c->d1 * c->share};
+  return j;
+}
+RAY_INLINE Joint last_joint(const Piece* s, const Cut* c) {
+  const Joint j = {s->b3, (s->b3 - s->b2) * c->share};
+  return j;
+}
+// Behind part k.
+RAY_INLINE Joint joint_at(const Cut* c, int k) {
+  const V t = (float)k * c->share, w = t * c->s3;
+  const Joint j = {c->b0 + t * (3.0f * c->d1 + t * (3.0f * c->s1 + w)),
+                   (c->d1 + t * (2.0f * c->s1 + w)) * c->share};
+  return j;
+}
+// The coefficients of the part between two.
+RAY_INLINE Piece piece_between(Joint front, Joint behind) {
+  Piece s;
+  s.b0 = front.value;
+  s.b1 = front.value + front.rise;
+  s.b2 = behind.value - behind.rise;
+  s.b3 = behind.value;
+  return s;
+}
+RAY_INLINE Joint pick_joint(I m, Joint a, Joint b) {
+  const Joint j = {PICK(m, a.value, b.value), PICK(m, a.rise, b.rise)};
+  return j;
+}
+
 #if VDVR_LIGHT
-  const V l = whole->lit, h = whole->highlight;
-  part.c1 = v3(part.c1.x * l + h, part.c1.y * l + h, part.c1.z * l + h);
-  part.c0 = v3(part.c0.x * l + h, part.c0.y * l + h, part.c0.z * l + h);
+RAY_INLINE void light_shown(Shown* s, V lit, V highlight) {
+#define LIT(axis)                            \
+  s->c1.axis = s->c1.axis * lit + highlight; \
+  s->minus_c0.axis = s->minus_c0.axis * lit - highlight;
+  LIT(x)
+  LIT(y)
+  LIT(z)
+#undef LIT
+}
 #endif
-  part.dense = exp2(-length * s.t1);
-  part.thin = exp2(length * s.minus_t0);
+
+// The part between two joints, of lanes that are `active`.
+RAY_INLINE Part part_between(RANGES, const VdvrCertify* q, const Piece* whole, const Cut* cut, Joint front,
+                             Joint behind, I active) {
+  const Piece s = piece_between(front, behind);
+  const V from = least_of(&s), to = most_of(&s);
+  Part part = new_part(cut->length, active);
+#if VDVR_CHORD
+  const V middle = 0.5f * (from + to);
+  part.halves[0] = shown_between(THE_RANGES, q, from - cut->e, middle);
+  part.halves[1] = shown_between(THE_RANGES, q, middle, to + cut->e);
+#if VDVR_LIGHT
+  light_shown(&part.halves[0], whole->lit, whole->highlight);
+  light_shown(&part.halves[1], whole->lit, whole->highlight);
+#endif
+  part.all = shown_of_both(&part.halves[0], &part.halves[1]);
+#else
+  part.all = shown_between(THE_RANGES, q, from - cut->e, to + cut->e);
+#if VDVR_LIGHT
+  light_shown(&part.all, whole->lit, whole->highlight);
+#endif
+#endif
+  find_shares(&part);
   return part;
 }
-// The box step (docs/pixel-bounds.md, theorem 3), of one channel, above and below the colour behind.
-RAY_INLINE V step_above(V c1, V behind, const Part* part) {
-  return c1 + (behind - c1) * PICK(c1 > behind, part->dense, part->thin);
-}
-RAY_INLINE V step_below(V c0, V behind, const Part* part) {
-  return c0 + (behind - c0) * PICK(c0 < behind, part->dense, part->thin);
-}
-RAY_INLINE V3 above3(const Part* part, V3 u) {
-  return pick3(part->shows,
-               v3(step_above(part->c1.x, u.x, part), step_above(part->c1.y, u.y, part),
-                  step_above(part->c1.z, u.z, part)),
-               u);
-}
-RAY_INLINE V3 below3(const Part* part, V3 d) {
-  return pick3(part->shows,
-               v3(step_below(part->c0.x, d.x, part), step_below(part->c0.y, d.y, part),
-                  step_below(part->c0.z, d.z, part)),
-               d);
-}
 
-RAY_INLINE V3 least3(V3 a, V3 b) { return v3(LEAST(a.x, b.x), LEAST(a.y, b.y), LEAST(a.z, b.z)); }
-RAY_INLINE V3 most3(V3 a, V3 b) { return v3(MOST(a.x, b.x), MOST(a.y, b.y), MOST(a.z, b.z)); }
+RAY_INLINE V3 widened(V3 a, V by) { return v3(a.x + by, a.y + by, a.z + by); }
+RAY_INLINE V3 negative3(V3 a) { return v3(-a.x, -a.y, -a.z); }
 
-// Every lane's interval of a pixel, in the rows of this launch. [y][x] r, g, b and the parts it took; r, g, b
-// and flags.
+// Every lane's interval of a pixel, in the rows of this launch: its ends, which may be off by `error`, within
+// the extremes of all that can show. [y][x] r, g, b and the parts it took; r, g, b and flags.
 RAY_INLINE void put_interval(const VdvrRaycast* p, const VdvrCertify* q, __global float4* restrict least,
-                             __global float4* restrict most, I px, I py, V3 lo, V3 hi, I parts, I flags) {
+                             __global float4* restrict most, I px, I py, V3 upper, V3 minus_lower, V error,
+                             V3 c_least, V3 c_most, I parts, I flags) {
+  const V once = (V)(q->first_error);
+  const V3 hi = least3(widened(upper, error), widened(c_most, once)),
+           lo = most3(widened(negative3(minus_lower), -error), widened(c_least, -once));
 #define PUT(n)                                                                                     \
   if (LANE(px, n) < p->width && LANE(py, n) < p->height && LANE(py, n) < q->first_row + q->rows) { \
     const ulong i = (ulong)LANE(py, n) * (ulong)p->width + (ulong)LANE(px, n);                     \

@@ -1,6 +1,6 @@
 // Rays cell by cell: the boxes of cells and bricks that rays pass, and the field at the corners of the box
 // that a piece of a ray spans. Each lane walks its own cells: a parameter t and a point c that never steps
-// back. Included by raycast_iso.h and certify_ray.h.
+// back. Included by raycast_iso.h, raycast_integral.h and certify_ray.h.
 #ifndef VDVR_RAY_CELLS_H
 #define VDVR_RAY_CELLS_H
 

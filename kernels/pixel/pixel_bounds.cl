@@ -35,8 +35,6 @@
   const V3 c_least = least3(v3((V)(q.colour_lo[0]), (V)(q.colour_lo[1]), (V)(q.colour_lo[2])), behind); \
   const V3 c_most = most3(v3((V)(q.colour_hi[0]), (V)(q.colour_hi[1]), (V)(q.colour_hi[2])), behind)
 
-RAY_INLINE V3 widened(V3 a, V by) { return v3(a.x + by, a.y + by, a.z + by); }
-
 #if VDVR_KERNEL == VDVR_KERNEL_CERTIFY
 
 #if VDVR_LIGHT
@@ -99,7 +97,8 @@ __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict 
   }
   COLOURS_OF_THE_PIXEL;
   const I ended = (flags & VDVR_PIXEL_ENDED) != 0;
-  V3 hi = pick3(ended, c_most, behind), lo = pick3(ended, c_least, behind);
+  V3 hi = pick3(ended, c_most, behind), minus_lo = negative3(pick3(ended, c_least, behind));
+  V error = (V)(q.first_error);
   for (int k = count - 1; k >= 0; --k) {
     Piece s;
     s.b0 = KEPT(k, 0);
@@ -113,44 +112,71 @@ __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict 
     s.highlight = KEPT(k, 7);
 #endif
     const I n = parts_of(&q, &s);
-    s.e += q.part_slack * TO_V(n);
-    const V length = s.length / MOST(TO_V(n), (V)(1.0f));
+    const Cut cut = cut_of(&s, n);
     parts += n;
+    Joint joint = last_joint(&s, &cut);
     for (int j = most_lane(n); j > 0; --j) {
-      // The last of the j parts that are left.
       const I active = j <= n;
-      Piece rest, last;
-      cut_piece(&s, (float)(j - 1) / (float)j, &rest, &last);
-      const Part part = part_of(THE_RANGES, &q, &last, &s, length, active);
-      hi = above3(&part, hi);
-      lo = below3(&part, lo);
-      pick_coefficients(active, &rest, &s);
+      const Joint front = joint_at(&cut, j - 1);
+      const Part part = part_between(THE_RANGES, &q, &s, &cut, front, joint, active);
+      hi = above_part(&part, hi);
+      minus_lo = minus_below_part(&part, minus_lo);
+      error = error_in_front(&q, &part, error);
+      joint = pick_joint(active, front, joint);
     }
   }
-  // One more for the background, which is interpolated in fp32; the extremes hold it.
-  const V error = q.part_error * TO_V(parts + 1), once = (V)(q.part_error);
-  hi = least3(widened(hi, error), widened(c_most, once));
-  lo = most3(widened(lo, -error), widened(c_least, -once));
-  put_interval(&p, &q, least, most, px, py, lo, hi, parts, flags);
+  error = error_of_ray(&q, error, parts);
+  put_interval(&p, &q, least, most, px, py, hi, minus_lo, error, c_least, c_most, parts, flags);
 }
 
 #else
 
-// The colour in front of what was passed, as a function of the colour behind it: its bounds at the extremes
-// of all colours, and chords between (docs/pixel-bounds.md, section 6).
+// The colour in front of what was passed, as a function of the colour behind it: its upper bounds at the
+// extremes of all colours, and chords between (docs/pixel-bounds.md, section 6).
 typedef struct {
   V3 at_least, at_most;
 } Knots;
-RAY_INLINE V between_knots(V a, V b, V share) { return a + (b - a) * share; }
-// The same with a part behind: `least` and `most` are the part's colours in front of the extremes.
-RAY_INLINE void pass_part(Knots* f, V3 least, V3 most, V3 lowest, V3 inverse) {
-  const V3 a = f->at_least, b = f->at_most;
-#define SHARE(axis, c) ((c.axis - lowest.axis) * inverse.axis)
-  f->at_least = v3(between_knots(a.x, b.x, SHARE(x, least)), between_knots(a.y, b.y, SHARE(y, least)),
-                   between_knots(a.z, b.z, SHARE(z, least)));
-  f->at_most = v3(between_knots(a.x, b.x, SHARE(x, most)), between_knots(a.y, b.y, SHARE(y, most)),
-                  between_knots(a.z, b.z, SHARE(z, most)));
-#undef SHARE
+// The extremes, and 1 over their distance.
+typedef struct {
+  V3 least, most, inverse;
+} Extremes;
+RAY_INLINE V inverse_or_0(V width) {
+  const V none = (V)(0.0f), one = (V)(1.0f);
+  return PICK(width > none, one / PICK(width > none, width, one), none);
+}
+RAY_INLINE Extremes extremes_of(V3 least, V3 most) {
+  const Extremes e = {
+      least, most,
+      v3(inverse_or_0(most.x - least.x), inverse_or_0(most.y - least.y), inverse_or_0(most.z - least.z))};
+  return e;
+}
+// Where between the extremes a colour stands.
+RAY_INLINE V place_of(V c, V least, V inverse) {
+  const V place = (c - least) * inverse, within = LEAST(place, (V)(1.0f));
+  return MOST(within, (V)(0.0f));
+}
+// The same with a part behind that shows c at most. Before the least colour it takes its largest share of the
+// way to c, before the most colourful its least.
+#define PASSED(axis)                                                                   \
+  {                                                                                    \
+    const V width = f->at_most.axis - f->at_least.axis;                                \
+    const V place = place_of(c.axis, e->least.axis, e->inverse.axis);                  \
+    f->at_least.axis += PICK(part->shows, width * (place * part->dense), none);        \
+    f->at_most.axis -= PICK(part->shows, width * ((1.0f - place) * part->thin), none); \
+  }
+RAY_INLINE void pass_part(Knots* f, const Part* part, V3 c, const Extremes* e) {
+  const V none = (V)(0.0f);
+  PASSED(x)
+  PASSED(y)
+  PASSED(z)
+}
+#undef PASSED
+RAY_INLINE V between_knots(V a, V b, V place) { return a + (b - a) * place; }
+RAY_INLINE V3 value_at(const Knots* f, V3 c, const Extremes* e) {
+#define VALUE(axis) \
+  between_knots(f->at_least.axis, f->at_most.axis, place_of(c.axis, e->least.axis, e->inverse.axis))
+  return v3(VALUE(x), VALUE(y), VALUE(z));
+#undef VALUE
 }
 RAY_INLINE V widest(const Knots* f) {
   const V x = f->at_most.x - f->at_least.x, y = f->at_most.y - f->at_least.y,
@@ -166,48 +192,41 @@ __kernel VDVR_HINT void certify_fast(CERTIFY_ARGUMENTS) {
   Walk walk = start_walk(&p, &ray, px, py);
   I flags = (I)(0), parts = (I)(0);
   COLOURS_OF_THE_PIXEL;
-  const V3 width = v3(c_most.x - c_least.x, c_most.y - c_least.y, c_most.z - c_least.z);
-  const V one = (V)(1.0f), none = (V)(0.0f);
-  const V3 inverse = v3(PICK(width.x > 0.0f, one / PICK(width.x > 0.0f, width.x, one), none),
-                        PICK(width.y > 0.0f, one / PICK(width.y > 0.0f, width.y, one), none),
-                        PICK(width.z > 0.0f, one / PICK(width.z > 0.0f, width.z, one), none));
-  Knots above = {c_least, c_most}, below = {c_least, c_most};
+  const V3 minus_behind = negative3(behind);
+  const Extremes up = extremes_of(c_least, c_most), down = extremes_of(negative3(c_most), negative3(c_least));
+  Knots above = {up.least, up.most}, minus_below = {down.least, down.most};
+  V error = (V)(q.first_error);
   while (ANY(walk.active)) {
     Piece s;
     const I shows =
         next_piece(THE_FIELD, bricks, grid, distance, bounds, THE_RANGES, &p, &q, &ray, &walk, &s);
     if (!ANY(shows)) continue;
     flags |= PICK(shows & (s.e == INFINITY), (I)(VDVR_PIXEL_UNTESTED), (I)(0));
-    s.length = PICK(shows, s.length, none);
+    s.length = PICK(shows, s.length, (V)(0.0f));
     const I n = parts_of(&q, &s);
-    s.e += q.part_slack * TO_V(n);
-    const V length = s.length / MOST(TO_V(n), one);
+    const Cut cut = cut_of(&s, n);
     parts += n;
-    for (int j = most_lane(n); j > 0; --j) {
-      const I active = j <= n;
-      Piece first, rest;
-      cut_piece(&s, 1.0f / (float)j, &first, &rest);
-      const Part part = part_of(THE_RANGES, &q, &first, &s, length, active);
-      pass_part(&above, above3(&part, c_least), above3(&part, c_most), c_least, inverse);
-      pass_part(&below, below3(&part, c_least), below3(&part, c_most), c_least, inverse);
-      pick_coefficients(active, &rest, &s);
+    Joint joint = first_joint(&s, &cut);
+    const int count = most_lane(n);
+    for (int j = 1; j <= count; ++j) {
+      const Joint behind_part = joint_at(&cut, j);
+      const Part part = part_between(THE_RANGES, &q, &s, &cut, joint, behind_part, j <= n);
+      pass_part(&above, &part, part.all.c1, &up);
+      pass_part(&minus_below, &part, part.all.minus_c0, &down);
+      // Both knots of a bound are as far off as the further one, and no part makes that less.
+      error += PICK(part.shows, q.sum_error + q.share_error * part.dense, (V)(0.0f));
+      joint = behind_part;
     }
-    const V a = widest(&above), b = widest(&below);
+    const V a = widest(&above), b = widest(&minus_below);
     const I ended = MOST(a, b) <= q.theta;
     flags |= PICK(ended & walk.active, (I)(VDVR_PIXEL_ENDED), (I)(0));
     walk.active &= NOT(ended);
   }
   const I ended = (flags & VDVR_PIXEL_ENDED) != 0;
-  Knots end_above = above, end_below = below;
-  pass_part(&end_above, behind, behind, c_least, inverse);
-  pass_part(&end_below, behind, behind, c_least, inverse);
-  V3 hi = pick3(ended, above.at_most, end_above.at_least),
-     lo = pick3(ended, below.at_least, end_below.at_least);
-  // A part costs two steps of each bound here, and a sum of three roundings more.
-  const V error = 2.0f * q.part_error * TO_V(parts + 1), once = (V)(q.part_error);
-  hi = least3(widened(hi, error), widened(c_most, once));
-  lo = most3(widened(lo, -error), widened(c_least, -once));
-  put_interval(&p, &q, least, most, px, py, lo, hi, parts, flags);
+  const V3 hi = pick3(ended, above.at_most, value_at(&above, behind, &up)),
+           minus_lo = pick3(ended, minus_below.at_most, value_at(&minus_below, minus_behind, &down));
+  error = error_of_ray(&q, error, parts);
+  put_interval(&p, &q, least, most, px, py, hi, minus_lo, error, c_least, c_most, parts, flags);
 }
 
 #endif

@@ -1,5 +1,6 @@
 // Ray-casting of the mixed-resolution field: emission-absorption (dvr), iso-surfaces (iso), maximum (mip),
-// slice. One source for both samplers and for packets of 1 to 16 rays per work-item (device/packet.h).
+// line integral (integral), slice. One source for both samplers and for packets of 1 to 16 rays per work-item
+// (device/packet.h).
 //
 // Sample positions are global along a ray, t_k = t_entry + (k + 1/2) step, the last in the middle of the path
 // that is left. Each belongs to the brick that vdvr_brick_of names; bricks decide what is skipped and which
@@ -8,7 +9,8 @@
 //
 // Layouts: bricks[bz][by][bx], distance[bz][by][bx] (bricks to the nearest one of another class, 0 where
 // worth sampling), ranges[bz][by][bx], table[table_size] (rgb, opacity of one step; then the opacities
-// alone), picture[y][x] (r, g, b, alpha | depth | maximum; with VDVR_GEOMETRY normal, depth | bound). Called
+// alone), picture[y][x] (r, g, b, alpha | depth | maximum |
+// integral; with VDVR_GEOMETRY normal, depth | bound). Called
 // by raycast() in host/render/raycast.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
@@ -35,6 +37,10 @@
 #include "device/packet_sampler.h"
 
 #include "device/raycast_dvr.h"
+// Here for both: a text is put where it is first named, and nowhere else.
+#if VDVR_KERNEL == VDVR_KERNEL_ISO || VDVR_KERNEL == VDVR_KERNEL_INTEGRAL
+#include "device/ray_cells.h"
+#endif
 #if VDVR_KERNEL == VDVR_KERNEL_PREINTEGRATED
 #include "device/raycast_preintegrated.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_LEVEL
@@ -43,6 +49,8 @@
 #include "device/raycast_adaptive.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_ISO
 #include "device/raycast_iso.h"
+#elif VDVR_KERNEL == VDVR_KERNEL_INTEGRAL
+#include "device/raycast_integral.h"
 #elif VDVR_KERNEL == VDVR_KERNEL_MIP
 
 // The largest sample along the ray; a brick that cannot raise it is leapt over. Geometry: where it lies; no

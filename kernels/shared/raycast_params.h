@@ -14,6 +14,7 @@
 #define VDVR_KERNEL_SLICE 6
 #define VDVR_KERNEL_POINTS 7
 #define VDVR_KERNEL_ADAPTIVE 8
+#define VDVR_KERNEL_INTEGRAL 9
 
 // A step adapted to the picture has 2^l parts, l below this.
 #define VDVR_ADAPTED_LEVELS 5

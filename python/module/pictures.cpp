@@ -27,7 +27,8 @@ void add_choices(nb::module_& m) {
       .value("iso", RenderMode::iso)
       .value("mip", RenderMode::mip)
       .value("slice", RenderMode::slice)
-      .value("error", RenderMode::error);
+      .value("error", RenderMode::error)
+      .value("integral", RenderMode::integral);
   nb::enum_<RenderOutput>(m, "RenderOutput")
       .value("colour", RenderOutput::colour)
       .value("depth", RenderOutput::depth)

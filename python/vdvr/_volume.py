@@ -149,10 +149,12 @@ class Volume:
         Parameters
         ----------
         size : width and height, pixels.
-        mode : "dvr", "iso", "mip", "slice", or "error": on a slice what the certificate bounds |V - F| by.
+        mode : "dvr", "iso", "mip", "integral" (an X-ray picture: the field summed up along each ray), "slice", or
+            "error": on a slice what the certificate bounds |V - F| by.
         transfer : a preset (`transfer_presets()`), a file of VDVR, 3D Slicer or ParaView, or points (density,
             red, green, blue, opacity of one cell); by default one that suits the volume.
-        transfer_range : stretches it over these densities; of a slice the window, black to white.
+        transfer_range : stretches it over these densities; of a slice and of integrals the window, black to
+            white (of integrals by default the picture's least and largest).
         azimuth, elevation : degrees; azimuth 0 looks along -y with x to the right, elevation is towards -z.
         zoom : 1 fits what `frame` says: "shown", what the transfer function or the surfaces show, or "grid", the
             whole grid (which costs no look at the samples).
@@ -182,8 +184,10 @@ class Volume:
             return self._held.error_picture(o, values)
         bright = self._held.brightness
         window = None if transfer_range is None else _window(transfer_range)
-        o.transfer = self._transfer(transfer, window)
-        o.slice_range = window or (bright.grey_lo, bright.grey_hi)
+        integral = mode == "integral"
+        # A window of integrals is none of densities.
+        o.transfer = self._transfer(transfer, None if integral else window)
+        o.slice_range = window if integral else window or (bright.grey_lo, bright.grey_hi)
         densities = [bright.threshold] if iso is None else [float(v) for v in np.atleast_1d(np.asarray(iso, float))]
         o.surfaces = _core.iso_surfaces(densities, None if iso_opacity is None else [float(v) for v in iso_opacity])
         o.step = number(step, "step")

@@ -98,6 +98,20 @@ struct Column {
   }
 };
 
+// By pixel the worst channel's bound of V's own picture, levels.
+Column bounds_of(const Scene& s, const TransferFunction& transfer, const PixelBounds& b) {
+  Column bound;
+  for (const std::size_t i : s.hit) {
+    const reference::Rgb3 v = support::colour_of(s.v[i], transfer.points, {0, 0, 0});
+    double most = 0;
+    for (std::size_t c = 0; c < 3; ++c)
+      most = std::max({most, static_cast<double>(b.hi.values[3 * i + c]) - v[c],
+                       v[c] - static_cast<double>(b.lo.values[3 * i + c])});
+    bound.levels.push_back(255 * most);
+  }
+  return bound;
+}
+
 // Of the half widths of some pixels, what an adversary reaches.
 double reached(const Scene& s, const TransferFunction& transfer, const PixelBounds& b, std::int64_t every,
                std::vector<double>& known) {
@@ -131,36 +145,36 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
   s.options.transfer = transfer;
   CertifyPictureOptions half, eighth;
   eighth.kappa = 0.125;
-  const PixelBounds b = certify_pixels(device, resident, s.bounds, s.options, half);
-  Column truth, bound;
+  const auto certified = [&](CertifyPictureOptions c, bool chord) {
+    c.chord = chord;
+    return certify_pixels(device, resident, s.bounds, s.options, c);
+  };
+  const PixelBounds b = certified(half, false), chord = certified(half, true);
+  Column truth, bound = bounds_of(s, transfer, b);
   double parts = 0;
   for (const std::size_t i : s.hit) {
     const reference::Rgb3 f = support::colour_of(s.f[i], transfer.points, {0, 0, 0}),
                           v = support::colour_of(s.v[i], transfer.points, {0, 0, 0});
-    double most = 0, off = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double lo = static_cast<double>(b.lo.values[3 * i + c]),
-                   hi = static_cast<double>(b.hi.values[3 * i + c]);
-      most = std::max({most, hi - v[c], v[c] - lo});
-      off = std::max(off, std::abs(f[c] - v[c]));
-    }
+    double off = 0;
+    for (std::size_t c = 0; c < 3; ++c) off = std::max(off, std::abs(f[c] - v[c]));
     truth.levels.push_back(255 * off);
-    bound.levels.push_back(255 * most);
     parts += b.parts[i];
   }
   std::vector<double> known;
-  double at_half = 0, at_eighth = 0;
-  if (every > 0) {
-    at_half = reached(s, transfer, b, every, known);
-    at_eighth =
-        reached(s, transfer, certify_pixels(device, resident, s.bounds, s.options, eighth), every, known);
-  }
+  std::array<double, 4> share{};
+  if (every > 0)
+    share = {reached(s, transfer, b, every, known),
+             reached(s, transfer, certified(eighth, false), every, known),
+             reached(s, transfer, chord, every, known),
+             reached(s, transfer, certified(eighth, true), every, known)};
+  for (double& x : share) x *= 100;
   std::printf(
-      "| %s | %.2f, %.1f | %.2f, %.1f, %.1f | %.1f | %.1f | %.0f, %.0f, %.0f, %.0f | %.0f | %.0f, %.0f |\n",
+      "| %s | %.2f, %.1f | %.2f, %.1f, %.1f | %.1f | %.1f | %.0f, %.0f, %.0f, %.0f | %.0f | %.0f, %.0f | "
+      "%.2f | %.0f, %.0f |\n",
       transfer.name.c_str(), truth.mean(), truth.at(1), bound.mean(), bound.at(0.99), bound.at(1),
       bound.mean() / truth.mean(), bound.at(1) / truth.at(1), bound.within(1), bound.within(2),
-      bound.within(4), bound.within(8), parts / static_cast<double>(s.hit.size()), 100 * at_half,
-      100 * at_eighth);
+      bound.within(4), bound.within(8), parts / static_cast<double>(s.hit.size()), share[0], share[1],
+      bounds_of(s, transfer, chord).mean(), share[2], share[3]);
   std::fflush(stdout);
 }
 
@@ -182,8 +196,7 @@ int main(int argc, char** argv) {
               1 << std::atoi(argv[3]), mean, most, s.hit.size());
   std::printf(
       "| TF | true mean, max | bound mean, p99, max | mean ratio | max ratio | within 1, 2, 4, 8 (%%) | "
-      "parts a "
-      "ray | adversary at kappa 1/2, 1/8 (%%) |\n");
+      "parts a ray | adversary at kappa 1/2, 1/8 (%%) | chord: bound mean | its adversary (%%) |\n");
   Device device;
   const ResidentVolume resident(device, s.volume);
   for (const TransferFunction& transfer : support::table_transfers())

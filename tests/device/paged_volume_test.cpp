@@ -118,6 +118,7 @@ std::vector<RenderOptions> pictures(const MixedVolume& v) {
     p.output = RenderOutput::normal;
   });
   add([](RenderOptions& p) { p.mode = RenderMode::mip; });
+  add([](RenderOptions& p) { p.mode = RenderMode::integral; });
   add([](RenderOptions& p) { p.mode = RenderMode::slice; });
   add([&](RenderOptions& p) {
     p.mode = RenderMode::slice;
@@ -156,8 +157,9 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
         // Compilers take longer than pictures: what does not depend on types is drawn of floats alone.
         if (&c != &cases().front() &&
             (o.output != RenderOutput::colour || o.clip || o.mode == RenderMode::mip ||
-             o.mode == RenderMode::slice || o.gradient == GradientKind::analytic ||
-             o.step_mode == StepMode::level || o.classification == Classification::preintegrated))
+             o.mode == RenderMode::integral || o.mode == RenderMode::slice ||
+             o.gradient == GradientKind::analytic || o.step_mode == StepMode::level ||
+             o.classification == Classification::preintegrated))
           continue;
         BOOST_TEST_CONTEXT(c.name << (lit ? ", lit" : "") << ", picture " << n) {
           const RenderResult expected = reference.render(o), found = by_bricks.render(o);

@@ -176,7 +176,7 @@ BOOST_AUTO_TEST_CASE(skipping_changes_no_bit_from_inside_the_volume) {
 
 BOOST_AUTO_TEST_CASE(work_group_shape_changes_no_bit) {
   const ResidentVolume v(device(), mixed_blob());
-  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso}) {
+  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::integral}) {
     RenderOptions o = options_for(v.grid(), mode, 37);
     o.surfaces = {{0.5}};
     const auto square = raycast_float(device(), v, o, {8, 8, {}});
@@ -192,7 +192,8 @@ BOOST_AUTO_TEST_CASE(the_number_of_rays_in_a_packet_changes_no_bit) {
   const ResidentVolume scattered(device(), mixed_blob()), coarse(device(), coarse_blob());
   const ResidentVolume uniform(device(), as_mixed(fields::uniform(centred_grid({30, 27, 33}), blob)));
   for (const ResidentVolume* v : {&mixed, &scattered, &coarse, &uniform})
-    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice}) {
+    for (const RenderMode mode :
+         {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice, RenderMode::integral}) {
       RenderOptions o = options_for(v->grid(), mode, 37);
       o.sampler = SamplerKind::buffer;
       o.surfaces = {{0.5}};
@@ -294,7 +295,8 @@ void check_picture_of_decoded_values(const MixedVolume& integers) {
   for (auto& [triple, block] : floats.tiles) block = decoded(block, integers.step);
   const ResidentVolume a(device(), integers), b(device(), floats);
   BOOST_TEST(a.bytes() < b.bytes());
-  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+  for (const RenderMode mode :
+       {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice, RenderMode::integral})
     for (const int lanes : {1, 8}) {
       RenderOptions o = options_for(a.grid(), mode);
       o.surfaces = {{0.5}};
@@ -456,7 +458,8 @@ BOOST_AUTO_TEST_CASE(one_cell_volume_renders_in_every_mode) {
     const Grid grid = centred_grid(cells);
     const ResidentVolume v(device(),
                            as_mixed(fields::uniform(grid, [](double x, double, double) { return x; })));
-    for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+    for (const RenderMode mode :
+         {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice, RenderMode::integral})
       for (const double azimuth : {0.0, 90.0, 45.0}) {
         RenderOptions o = options_for(grid, mode, 17);
         o.camera = orbit_camera(grid, azimuth, 0, 1);

@@ -68,6 +68,7 @@ std::vector<RenderOptions> pictures(bool image3d) {
     p.transfer = transfer_preset("default", 0.2, 0.9);
   });
   add([](RenderOptions& p) { p.output = RenderOutput::error; });
+  add([](RenderOptions& p) { p.mode = RenderMode::integral; });
   if (image3d) add([](RenderOptions& p) { p.sampler = SamplerKind::image3d; });
   return all;
 }

@@ -35,7 +35,8 @@ std::string certificate_of(RenderMode mode) {
 
 std::vector<std::string> seeds(const std::filesystem::path&) {
   std::vector<std::string> texts;
-  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+  for (const RenderMode mode :
+       {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice, RenderMode::integral})
     texts.push_back(certificate_of(mode));
   return texts;
 }

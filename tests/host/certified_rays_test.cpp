@@ -9,6 +9,7 @@
 
 #include "host/rays/crossings.hpp"
 #include "host/rays/emission.hpp"
+#include "host/rays/line_integral.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
@@ -214,6 +215,114 @@ BOOST_AUTO_TEST_CASE(the_largest_f_lies_between_its_bounds) {
     }
     BOOST_TEST(m.low <= most + slope * step);
   });
+}
+
+BOOST_AUTO_TEST_CASE(the_integral_of_f_lies_between_its_bounds) {
+  const RayField field = scene().field();
+  double true_error = 0, reach = 0;
+  for_each_ray([&](const WorldRay& ray) {
+    const auto [begin, end] = field.clipped(ray);
+    const LineIntegral line = integral_along(field, ray);
+    BOOST_TEST(line.any == (begin < end));
+    if (!line.any) return;
+    const int steps = 1 + static_cast<int>(64 * (end - begin));
+    double f = 0;
+    const double h = (end - begin) / steps;
+    for (int i = 0; i < steps; ++i) f += h * lobb(ray.at(begin + (i + 0.5) * h));
+    // Midpoints of a function of slope s err by s h / 4 a length at most.
+    BOOST_TEST(std::abs(f - line.value) <= line.reach + slope * h / 4 * (end - begin));
+    true_error += std::abs(f - line.value);
+    reach += line.reach;
+  });
+  // Errors of either sign cancel along a ray, and bounds add up: a bound above is far off.
+  BOOST_TEST(reach > 3 * true_error);
+}
+
+BOOST_AUTO_TEST_CASE(integrals_of_the_methods_set_up_lie_in_their_intervals) {
+  const support::AnalyticField f = support::marschner_lobb(64, 6);
+  ParallelGeometry wide = geometry();
+  wide.columns = wide.rows = 200;
+  wide.center = 0.5 * static_cast<double>(wide.columns - 1);
+  const Coverage coverage(wide);
+  for (const std::uint8_t level : {0, 1}) {
+    const MixedVolume volume = support::volume_of(f, {LevelTriple{level, level, level}}, 1);
+    const std::vector<float> bounds = support::proved_bounds(f, volume, 0, 8);
+    const RayField field(volume, bounds, coverage);
+    const Camera camera = orbit_camera(volume.grid, 30, 20, 1);
+    constexpr std::int64_t pixels = 64;
+    double reach = 0, error = 0, whole = 0, rays = 0;
+    for (std::int64_t y = 0; y < pixels; ++y)
+      for (std::int64_t x = 0; x < pixels; ++x) {
+        const WorldRay ray = pixel_ray(camera, pixels, pixels, x, y);
+        const auto [begin, end] = field.clipped(ray);
+        if (!(begin < end)) continue;
+        const auto steps = static_cast<int>(std::ceil(32 * (end - begin)));
+        const double h = (end - begin) / steps;
+        double sum = 0;
+        for (int i = 0; i < steps; ++i) {
+          const Vec3 p = ray.at(begin + (i + 0.5) * h);
+          sum += h * f.at(p[0] + 32, p[1] + 32, p[2] + 32);
+        }
+        const LineIntegral line = integral_along(field, ray);
+        // Midpoints err by h^2 / 24 of the second derivative along the ray, which is the three axes' at most.
+        const double midpoints =
+            h * h / 24 * (f.curvature[0] + f.curvature[1] + f.curvature[2]) * (end - begin);
+        BOOST_TEST(std::abs(sum - line.value) <= line.reach + midpoints);
+        reach += line.reach;
+        error += std::abs(sum - line.value);
+        whole += sum;
+        ++rays;
+      }
+    BOOST_TEST(rays > 2000);
+    BOOST_TEST_MESSAGE("level " << int{level} << ": mean bound " << reach / rays << ", mean error "
+                                << error / rays << ", of " << whole / rays);
+    BOOST_TEST(reach > 5 * error);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(the_integral_of_v_is_that_of_its_cubics) {
+  // Without a bound, what is left is V itself: held to midpoints of the pieces, of which every one is cut.
+  const std::vector<float> none(scene().bounds.size(), 0.0f);
+  const RayField field(scene().volume, none, scene().coverage);
+  for_each_ray([&](const WorldRay& ray) {
+    const LineIntegral line = integral_along(field, ray);
+    double sum = 0;
+    constexpr int parts = 64;
+    double error = 0;
+    field.walk(ray, [&](const RayPiece& piece) {
+      const double h = (piece.last - piece.first) / parts;
+      for (int i = 0; i < parts; ++i) {
+        const double at = (i + 0.5) / parts;
+        sum += h * part_of(piece.value, at, at)[0];
+      }
+      // A midpoint rule errs by h^2 / 24 of the second derivative, 6 of the largest second difference.
+      const auto& b = piece.value;
+      const double bent = 6 * std::max(std::abs(b[0] - 2 * b[1] + b[2]), std::abs(b[1] - 2 * b[2] + b[3]));
+      error += (piece.last - piece.first) * bent / (24.0 * parts * parts);
+      return true;
+    });
+    BOOST_TEST(std::abs(sum - line.value) <= error + tolerance::fp64_sum(64 * 256, 40));
+    BOOST_TEST(line.reach <= 0x1p-30 * 40);
+  });
+}
+
+BOOST_AUTO_TEST_CASE(greys_of_integrals_are_cut_at_the_window_and_unknown_where_nothing_was_tested) {
+  RenderOptions o;
+  o.mode = RenderMode::integral;
+  o.width = 4;
+  o.height = 1;
+  o.slice_range = std::pair{1.0, 3.0};
+  constexpr float endless = std::numeric_limits<float>::infinity();
+  const IntegralBounds bounds{
+      {4, 1, {1.5f, -2, -endless, 0}, 1}, {4, 1, {2, 0.5f, endless, 0}, 1}, {1, 1, 1, 0}};
+  const PixelBounds b = greys_of_integrals(bounds, o);
+  const std::vector<std::pair<double, double>> expected{{0.25, 0.5}, {0, 0}, {0, 1}, {0, 0}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    BOOST_TEST(std::abs(static_cast<double>(b.lo.values[3 * i]) - expected[i].first) <= 0x1p-22);
+    BOOST_TEST(std::abs(static_cast<double>(b.hi.values[3 * i + 2]) - expected[i].second) <= 0x1p-22);
+    BOOST_TEST(b.untested[i] == (i == 2 ? 1 : 0));
+    BOOST_TEST(b.parts[i] == (i == 3 ? 0u : 1u));
+  }
 }
 
 namespace {

@@ -104,6 +104,28 @@ BOOST_AUTO_TEST_CASE(the_fast_form_holds_more_than_the_exact_one) {
   BOOST_TEST(fast.at("levels").at("mean").get<double>() > exact.at("levels").at("mean").get<double>());
 }
 
+BOOST_AUTO_TEST_CASE(chord_steps_hold_less_and_are_repeated_when_they_are_verified) {
+  const Ended r = run({"render", small_volume(), "--certify=chord", "--no-shading", "--size", "48x48", "-o",
+                       at("chord.png"), "--json"});
+  BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
+  const Json chord = Json::parse(r.out), exact = json_of(certificate());
+  BOOST_TEST(chord.at("step") == "chord");
+  BOOST_TEST(exact.at("step") == "box");
+  BOOST_TEST(chord.at("levels").at("mean").get<double>() <
+             0.99 * exact.at("levels").at("mean").get<double>());
+  const std::string file = at("chord.certificate.json");
+  const Ended good = run({"verify", small_volume(), "--picture", file});
+  BOOST_TEST(good.code == 0, good.err);
+  Json as_box = json_of(file);
+  as_box["step"] = "box";
+  write(at("as-box.json"), as_box.dump());
+  const Ended bad = run({"verify", small_volume(), "--picture", at("as-box.json")});
+  BOOST_TEST(bad.code == 1);
+  BOOST_TEST((bad.out + bad.err).find("the bound is") != std::string::npos);
+  check_refused({"render", small_volume(), "--mode", "mip", "--certify=chord", "-o", at("never.png")},
+                "--certify");
+}
+
 BOOST_AUTO_TEST_CASE(a_picture_beyond_the_tolerance_ends_with_1_and_is_written) {
   const double worst = json_of(certificate()).at("levels").at("max").get<double>();
   const Ended no = run(certified("beyond.png", {"--picture-tolerance", std::to_string(worst / 2)}));
@@ -177,6 +199,7 @@ BOOST_AUTO_TEST_CASE(a_certificate_that_makes_no_sense_is_refused_by_name) {
   refused(at("cut.json"));
   refused(changed("width.json", [](Json& j) { j["picture"]["width"] = 1'000'000'000; }));
   refused(changed("kappa.json", [](Json& j) { j["kappa"] = -1; }));
+  refused(changed("step.json", [](Json& j) { j["step"] = "sideways"; }));
   refused(changed("type.json", [](Json& j) { j["theta"] = "small"; }));
   refused(changed("points.json", [](Json& j) { j["picture"]["transfer"]["points"] = Json::array(); }));
   refused(changed("format.json", [](Json& j) { j["format"] = "vdvr picture certificate 99"; }));

@@ -42,7 +42,7 @@ BOOST_AUTO_TEST_CASE(projections_are_drawn_only_as_d2vr_can) {
     words.insert(words.end(), more.begin(), more.end());
     check_refused(words, named);
   };
-  for (const char* mode : {"iso", "mip", "slice"}) d2vr({"--mode", mode}, "--mode dvr");
+  for (const char* mode : {"iso", "mip", "integral", "slice"}) d2vr({"--mode", mode}, "--mode dvr");
   d2vr({"--classification", "preintegrated"}, "--classification");
   d2vr({"--step-mode", "level"}, "--step-mode");
   d2vr({"--step-mode", "adaptive"}, "--step-mode");
@@ -83,6 +83,10 @@ BOOST_AUTO_TEST_CASE(views_that_contradict_themselves_are_refused) {
   render("x.png", {"--light", "head", "--no-shading"}, "--light");
   render("x.png", {"--mode", "mip", "--gradient", "central"}, "--gradient");
   render("x.png", {"--mode", "iso", "--step-mode", "level"}, "--step-mode");
+  for (const char* option : {"--no-shading", "--tf=bone", "--step=2", "--background=0,0,0", "--light=head",
+                             "--show=depth", "--show=normal", "--show=error", "--iso=1", "--plain"})
+    render("x.png", {"--mode", "integral", option},
+           std::string(option).substr(0, std::string(option).find('=')));
   render("x.png", {"--mode", "slice", "--classification", "post"}, "--classification");
   render("x.png", {"--classification", "preintegrated", "--step-mode", "level"}, "--step-mode");
   render("x.png", {"--classification", "preintegrated", "--step-mode", "adaptive"}, "--step-mode");
@@ -114,7 +118,7 @@ BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
     BOOST_TEST(r.out.empty());
   };
   draw("ramp.png", {"--tf", "bone", "--axes", "--box", "--colorbar", "--caption"});
-  for (const char* mode : {"dvr", "iso", "mip", "slice"}) {
+  for (const char* mode : {"dvr", "iso", "mip", "integral", "slice"}) {
     draw("ramp.npy", {"--mode", mode});
     const std::string bytes = bytes_of(at("ramp.npy"));
     BOOST_TEST(bytes.find("(16, 24)") != std::string::npos);
@@ -124,6 +128,8 @@ BOOST_AUTO_TEST_CASE(a_volume_is_rendered_as_picture_values_and_turntable) {
        {"--light", "head", "--light", "1,0,-1", "--gradient", "analytic", "--step-mode", "level"});
   draw("ramp.png", {"--classification", "preintegrated"});
   draw("ramp.png", {"--step-mode", "fixed", "--frame", "grid"});
+  draw("integral.png", {"--mode", "integral", "--tf-range", "0,40", "--colorbar", "--box", "--axes"});
+  draw("integral.gif", {"--mode", "integral", "--turntable", "2"});
   draw("ramp.apng", {"--turntable", "3", "--tf", "grey", "--tf-range", "0,63"});
   draw("ramp.gif", {"--turntable", "3"});
   BOOST_TEST(bytes_of(at("ramp.gif")).rfind("GIF89a", 0) == 0);

@@ -172,7 +172,36 @@ def frames(work, launchers):
         for ranks in (1, 3):
             again, _ = turned("--force", before=launch(launcher, ranks))
             check(again == whole, f"{ranks} ranks draw another turntable")
+        hang_while_drawing(work, launcher, turn)
+        check(files() == whole, "a turntable that a rank left differs")
     print(f"frames by devices, pieces and {len(launchers)} kinds of MPI are those of one device")
+
+
+def hang_while_drawing(work, launcher, turn):
+    """Stops a rank of a turntable before it has drawn all; rank 0 draws the rest."""
+    for frame in turn.iterdir():
+        frame.unlink()
+    words = ["render", work.out, "-o", turn, "--size", "72x90", "--turntable", "6", "--force", "--give-up", "1"]
+    with open(work.folder / "messages", "w", encoding="utf-8") as messages:
+        job = subprocess.Popen([str(w) for w in [*launch(launcher, 3), *words]], env=ENVIRONMENT, stdout=messages,
+                               stderr=messages)
+    wait_until(job, lambda: "vdvr-mpi render:" in messages_of(work))
+    stop_a_rank(job, launcher)
+
+
+def stop_a_rank(job, launcher):
+    """The last of three; the job ends without it."""
+    ranks = ranks_of(job.pid, launcher[1])
+    if len(ranks) == 3:
+        os.kill(ranks[2], signal.SIGSTOP)
+    try:
+        end(job)
+    finally:
+        for rank in ranks:
+            try:
+                os.kill(rank, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
 
 
 def launch(mpi, ranks):
@@ -286,7 +315,8 @@ def kills(work, launchers, workers, leaders):
     check(is_done(work) or not left, f"an interrupted job left {left}")
     finish(work, expected, launcher, 2)
     # A rank that hangs is given up, and its blocks are computed elsewhere; at the end it is not waited for.
-    hang(work, launcher, lambda _: time.sleep(0.7 * whole))
+    # (While MPI begins nobody can be given up: all ranks take part in that.)
+    hang(work, launcher, lambda job: wait_until(job, lambda: "plan" in messages_of(work)))
     finish(work, expected, launcher, 2)
     hang(work, launcher, lambda job: wait_until(job, lambda: "verify" in messages_of(work)))
     finish(work, expected, launcher, 2)
@@ -309,17 +339,7 @@ def hang(work, launcher, wait):
     """Stops a rank of a job once `wait` returns; the job ends all the same."""
     job = start(work, launcher, 3, "--give-up", "2")
     wait(job)
-    ranks = ranks_of(job.pid, launcher[1])
-    if len(ranks) == 3:
-        os.kill(ranks[2], signal.SIGSTOP)
-    try:
-        end(job)
-    finally:
-        for rank in ranks:
-            try:
-                os.kill(rank, signal.SIGKILL)
-            except ProcessLookupError:
-                pass
+    stop_a_rank(job, launcher)
 
 
 def main():

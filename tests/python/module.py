@@ -123,6 +123,14 @@ assert "window" in vdvr.build.__doc__ and "closing" in str(inspect.signature(vdv
 raises(vdvr.DeviceError, "no-such-device", lambda: vdvr.build(scan, "20%", device="no-such-device"))
 volume = vdvr.build(scan, "20%")
 raises(vdvr.InputError, "none of dvr", lambda: volume.render(mode="sideways"))
+# Integrals and their greys, which run over the picture's own range unless another is given.
+sums = volume.render(size=(9, 9), mode="integral", azimuth=0, elevation=0, values=True)
+assert sums.shape == (9, 9) and np.isfinite(sums).all() and sums.max() > 0
+greys = volume.render(size=(9, 9), mode="integral", azimuth=0, elevation=0)
+assert greys.min() == 0 and greys.max() == 255 and (greys[..., 0] == greys[..., 2]).all()
+window = volume.render(size=(9, 9), mode="integral", azimuth=0, elevation=0,
+                       transfer_range=(float(sums.min()), float(sums.max())))
+assert np.array_equal(window, greys)
 raises(vdvr.InputError, "box", lambda: volume.to_numpy(box=(90, 90, 90, 99, 99, 99)))
 raises(vdvr.InputError, "[..., 3]", lambda: volume([1.0, 2.0]))
 volume.save("noise.vdvr", overwrite=True)

@@ -11,6 +11,7 @@
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/picture_forecast.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/plan_pictures.hpp"
@@ -76,7 +77,19 @@ void print_spread(const Spread& s) {
              bytes_text(s.messages));
 }
 
-Json plan_json(const Planned& p) {
+// Of pictures, their own foreseen in place of what one tolerance for all bricks takes.
+Json foreseen_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
+  const Plan& plan = p.plan;
+  Json json = {{"gold_samples", plan.gold_samples},
+               {"memory_bytes", forecast ? forecast->memory_bytes : plan.memory_bytes},
+               {"scratch_bytes", scratch_bytes(p.scan)},
+               {"seconds", forecast ? forecast->seconds : plan.seconds},
+               {"samples_ratio", forecast ? forecast->samples_ratio : plan.samples_ratio}};
+  if (forecast) json["pictures"] = forecast_json(*forecast, plan);
+  return json;
+}
+
+Json plan_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
   const Plan& plan = p.plan;
   return {{"epsilon", plan.epsilon},
           {"epsilon_abs", plan.epsilon_abs},
@@ -88,12 +101,7 @@ Json plan_json(const Planned& p) {
           {"base", cells_per_base_sample(plan.layout.coarsening)},
           {"bounds", bounds_json(plan.bounds)},
           {"budget", budget_json(plan.budget)},
-          {"foreseen",
-           {{"gold_samples", plan.gold_samples},
-            {"memory_bytes", plan.memory_bytes},
-            {"scratch_bytes", scratch_bytes(p.scan)},
-            {"seconds", plan.seconds},
-            {"samples_ratio", plan.samples_ratio}}},
+          {"foreseen", foreseen_json(p, forecast)},
           {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
           {"grid", grid_json(plan.grid)},
           {"geometry", geometry_json(p.scan.geometry)},
@@ -102,7 +110,7 @@ Json plan_json(const Planned& p) {
           {"notes", plan.notes}};
 }
 
-void print_plan(const Planned& p) {
+void print_plan(const Planned& p, const std::optional<PictureForecast>& forecast) {
   const Plan& plan = p.plan;
   print_scan(p.scan);
   print_grid(plan.grid);
@@ -116,10 +124,12 @@ void print_plan(const Planned& p) {
   fmt::print("  base         a sample every {} x {} x {} cells\n", base[0], base[1], base[2]);
   fmt::print("  not covered  {} samples ({:.2f} %)\n", plan.not_covered_count,
              100 * plan.not_covered_fraction);
-  fmt::print(
-      "foreseen       {:.3f} samples stored per base sample, {} of memory, {:.1f} s, {} gold samples per "
-      "pass\n",
-      plan.samples_ratio, bytes_text(plan.memory_bytes), plan.seconds, plan.gold_samples);
+  if (forecast) print_forecast(*forecast, plan);
+  else
+    fmt::print(
+        "foreseen       {:.3f} samples stored per base sample, {} of memory, {:.1f} s, {} gold samples per "
+        "pass\n",
+        plan.samples_ratio, bytes_text(plan.memory_bytes), plan.seconds, plan.gold_samples);
   if (const std::uint64_t bytes = scratch_bytes(p.scan); bytes > 0)
     fmt::print("  scratch      {} of files while it runs, since the scan takes an eighth of --max-memory\n",
                bytes_text(bytes));
@@ -169,8 +179,8 @@ int plan_command(Arguments& args) {
   refuse(args, {"window"}, "a plan is for the whole grid; give it to build");
   if (args.has("size"))
     refuse(args, {"roi"}, "with --size a plan is for that grid, the whole of it; leave out one of the two");
-  refuse(args, {"picture-tolerance", "views", "picture-finest"},
-         "a plan foresees one tolerance for all bricks; build refines for pictures, and prints each round");
+  if (args.has("picture-tolerance"))
+    refuse(args, {"ranks"}, "foresees one tolerance for all bricks; leave out --picture-tolerance");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
   if (!args.has("ranks")) refuse(args, {"machines"}, "give --ranks with it");
   Wanted wanted = wanted_of(args);
@@ -185,7 +195,9 @@ int plan_command(Arguments& args) {
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
-  Json json = plan_json(planned), pictures;
+  const std::optional<PictureForecast> forecast =
+      picture_forecast(device, planned, wanted, progress.callback());
+  Json json = plan_json(planned, forecast), pictures;
   const std::optional<Spread> spread = spread_of(args, planned);
   if (spread) json["foreseen"]["spread"] = spread_json(*spread);
   if (folder) {
@@ -195,7 +207,7 @@ int plan_command(Arguments& args) {
   }
   progress.clear();
   print_result(common, json, [&] {
-    print_plan(planned);
+    print_plan(planned, forecast);
     if (spread) print_spread(*spread);
     if (folder) print_pictures(pictures);
   });

@@ -4,8 +4,10 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/integral_certificate.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/ray_certificate.hpp"
@@ -21,7 +23,7 @@ namespace {
 
 const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error", "bound",
                                         "lo",     "hi",    "middle", "class", "band"};
-const std::vector<std::string> kModes{"dvr", "iso", "mip", "slice", "error"};
+const std::vector<std::string> kModes{"dvr", "iso", "mip", "integral", "slice", "error"};
 constexpr Orbit kOrbit{30, 20, 1};
 // Twenty pictures a second: a turn of 60 takes three.
 constexpr int kFrameMs = 50;
@@ -32,12 +34,14 @@ void add_options(Arguments& args) {
           "a certified volume, or a uniform one: MHA, NRRD, FILE.h5:/dataset, TIFF slices; or with --method "
           "d2vr projections")
       .value("output,o", "IMG.png|X.npy",
-             "the picture; or as float32 what lies behind its pixels: opacity, depth, maximum, field, error; "
+             "the picture; or as float32 what lies behind its pixels: opacity, depth, maximum, integral, "
+             "field, error; "
              "with "
              "--turntable a folder, or T.apng or T.gif");
   add_method(args);
-  args.value("mode", "dvr|iso|mip|slice|error",
-             "default dvr; error: on a slice |V - F|, or without --projections what the certificate bounds "
+  args.value("mode", "dvr|iso|mip|integral|slice|error",
+             "default dvr; integral: an X-ray picture, the field summed up along each ray; error: on a slice "
+             "|V - F|, or without --projections what the certificate bounds "
              "it by")
       .value("size", "512x512", "pixels");
   add_transfer(args);
@@ -72,6 +76,7 @@ void add_options(Arguments& args) {
       .value("projections", "IN", "with --mode error: the projections to measure against")
       .flag("resume", "keep the frames that an interrupted turntable of the same command left in the folder")
       .flag("unverified", "render although content and certificate do not match");
+  add_give_up(args, "rank 0 draws its frames; of vdvr-mpi");
   add_certify(args);
   add_clip(args);
   add_scan(args);
@@ -149,11 +154,12 @@ StepMode step_mode_option(const Arguments& args, const RenderOptions& o) {
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
   const std::string mode = args.choice("mode", kModes, "dvr");
-  o.mode = mode == "iso"     ? RenderMode::iso
-           : mode == "mip"   ? RenderMode::mip
-           : mode == "slice" ? RenderMode::slice
-           : mode == "error" ? RenderMode::error
-                             : RenderMode::dvr;
+  o.mode = mode == "iso"        ? RenderMode::iso
+           : mode == "mip"      ? RenderMode::mip
+           : mode == "slice"    ? RenderMode::slice
+           : mode == "error"    ? RenderMode::error
+           : mode == "integral" ? RenderMode::integral
+                                : RenderMode::dvr;
   if (const auto size = args.sizes("size", 2)) {
     o.width = (*size)[0];
     o.height = (*size)[1];
@@ -218,6 +224,13 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
   if (o.mode == RenderMode::mip)
     refuse(args, {"no-shading", "gradient", "light"}, "does not apply to --mode mip, which has no light");
+  if (o.mode == RenderMode::integral) {
+    refuse(args, {"no-shading", "gradient", "light", "background", "tf", "step"},
+           "does not apply to --mode integral, which sums up densities cell by cell");
+    const std::string show = args.text_or("show", "colour");
+    if (show == "depth" || show == "normal" || show == "error")
+      throw InputError(fmt::format("--show {} does not apply to --mode integral: it is of whole rays", show));
+  }
   if (o.mode != RenderMode::dvr) refuse(args, {"step-mode", "classification"}, "applies to --mode dvr");
   if (o.step_mode != StepMode::fixed && o.classification == Classification::preintegrated)
     throw InputError(
@@ -334,7 +347,8 @@ RenderResult draw_frame(const Arguments& args, const Stage& stage, RenderOptions
 /// The words of a command but for those that do not change its pictures, and what they are pictures of.
 std::string key_of(const Arguments& args, const Scene& scene) {
   static const std::vector<std::string> flags{"--force", "--resume", "--quiet", "--json"};
-  static const std::vector<std::string> values{"--device", "--max-memory", "--scratch", "--output", "-o"};
+  static const std::vector<std::string> values{"--device",  "--max-memory", "--scratch",
+                                               "--give-up", "--output",     "-o"};
   const auto is_in = [](const std::vector<std::string>& list, const std::string& word) {
     return std::find(list.begin(), list.end(), word.substr(0, word.find('='))) != list.end();
   };
@@ -445,11 +459,14 @@ int render_command(Arguments& args) {
   if (kind == OutputKind::values)
     refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
   if (kind != OutputKind::folder)
-    refuse(args, {"resume"}, "is of a turntable in a folder, whose frames are kept");
+    refuse(args, {"resume", "give-up"}, "is of a turntable in a folder, whose frames are kept");
+  give_up_option(args);
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
-  check_ray_certificate(args, o.mode, kind == OutputKind::values);
-  // Colours are certified by the device, surfaces and maxima ray by ray on the host.
-  const bool certifies = asks_certify(args) && (o.mode == RenderMode::iso || o.mode == RenderMode::mip);
+  const bool of_integrals = o.mode == RenderMode::integral;
+  if (of_integrals) check_integral_certificate(args, kind == OutputKind::values);
+  else check_ray_certificate(args, o.mode, kind == OutputKind::values);
+  // Colours are certified by the device, surfaces, maxima and integrals ray by ray on the host.
+  const bool certifies = asks_certify(args) && is_certified_by_ray(o.mode);
   if (certifies)
     for (const auto& beside : ray_certificate_paths(output, o.mode))
       check_output(beside, common.force, {file_of_volume(path)});
@@ -461,8 +478,10 @@ int render_command(Arguments& args) {
   const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);
   o.surfaces = surfaces_for(args, bright.threshold);
-  o.transfer = transfer_for(args, bright, scene.volume.grid);
-  o.slice_range = given_range(args).value_or(std::pair{bright.grey_lo, bright.grey_hi});
+  // Of integrals it says what is framed, and --tf-range is no range of densities.
+  o.transfer = of_integrals ? two_material_transfer(bright) : transfer_for(args, bright, scene.volume.grid);
+  o.slice_range = given_range(args);
+  if (!o.slice_range && !of_integrals) o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
   o.sampler = safe_sampler(o.sampler, scene.certificate);
   const Orbit orbit = orbit_options(args, kOrbit);
   const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
@@ -478,6 +497,8 @@ int render_command(Arguments& args) {
     progress.clear();
     return code;
   }
+  // All frames have the window of the first.
+  if (of_integrals && turntable && !o.slice_range) o.slice_range = range_of_values(source.draw(o).values);
   const Stage stage{source, overlay, certified, frame};
   FramesDrawn turned{1, 0};
   const auto into_folder = [&] {
@@ -491,8 +512,11 @@ int render_command(Arguments& args) {
                               : certifies ? source.draw(o)
                                           : draw_one(stage, o, output, kind);
   RayCertificate ray_certificate;
+  if (of_integrals && !o.slice_range) o.slice_range = range_of_values(result.values);
   if (certifies)
-    ray_certificate = write_ray_certificate(args, source, o, result, output, progress.callback());
+    ray_certificate = of_integrals
+                          ? write_integral_certificate(args, source, o, result, output, progress.callback())
+                          : write_ray_certificate(args, source, o, result, output, progress.callback());
   progress.clear();
 
   const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
@@ -517,6 +541,7 @@ int render_command(Arguments& args) {
       {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
       {"outside_certificate", outside_certificate(o)},
       {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
+      {"window", of_integrals ? Json(*o.slice_range) : Json()},
       {"method", method},
       {"certificate", ray_certificate.json},
       {"picture_tolerance", ray_certificate.beyond ? tolerance_json(*ray_certificate.beyond) : Json()},
@@ -541,7 +566,11 @@ int render_command(Arguments& args) {
     if (certified)
       fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
                  scene.certificate->epsilon_abs);
-    if (certifies) print_ray_certificate(ray_certificate);
+    if (of_integrals)
+      fmt::print("  grey         from {:.6g}, black, to {:.6g}, white\n", o.slice_range->first,
+                 o.slice_range->second);
+    if (certifies && of_integrals) print_integral_certificate(ray_certificate);
+    else if (certifies) print_ray_certificate(ray_certificate);
     fmt::print("  not covered  {}\n", outside_certificate(o));
     if (has_transfer)
       fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,

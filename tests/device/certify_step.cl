@@ -1,0 +1,89 @@
+// The steps of certified pictures alone: certify_step_test.cpp puts this text behind that of
+// pixel/pixel_bounds.cl, built as that is built.
+//
+// Layouts: parts[step][number][chain], the numbers of a part in the order of Number; x, share[i];
+// ends[number][chain].
+
+#define NUMBERS_OF_PART 17
+#define NUMBERS_OF_ENDS 7
+
+RAY_INLINE V number_at(__global const float* numbers, int at) {
+  V v;
+#define READ(n) LANE(v, n) = numbers[at + 0x##n];
+  EACH(READ)
+#undef READ
+  return v;
+}
+RAY_INLINE void put_number(__global float* numbers, int at, V v) {
+#define PUT(n) numbers[at + 0x##n] = LANE(v, n);
+  EACH(PUT)
+#undef PUT
+}
+
+__kernel VDVR_HINT void find_absorbed(__global const float* restrict x, __global float* restrict share) {
+  const int first = (int)get_global_id(0) * VDVR_LANES;
+  put_number(share, first, absorbed(number_at(x, first)));
+}
+
+// Pieces b[number][piece] cut into n parts: coefficients[part][number][piece].
+__kernel VDVR_HINT void cut_pieces(__global const float* restrict b, int pieces, int n,
+                                   __global float* restrict coefficients) {
+  const int first = (int)get_global_id(0) * VDVR_LANES;
+  Piece s;
+  s.b0 = number_at(b, first);
+  s.b1 = number_at(b, pieces + first);
+  s.b2 = number_at(b, 2 * pieces + first);
+  s.b3 = number_at(b, 3 * pieces + first);
+  s.length = s.e = (V)(1.0f);
+  const Cut cut = cut_of(&s, (I)(n));
+  Joint behind = last_joint(&s, &cut);
+  for (int part = n; part > 0; --part) {
+    const Joint front = joint_at(&cut, part - 1);
+    const Piece c = piece_between(front, behind);
+    const int at = (part - 1) * 4 * pieces + first;
+    put_number(coefficients, at, c.b0);
+    put_number(coefficients, at + pieces, c.b1);
+    put_number(coefficients, at + 2 * pieces, c.b2);
+    put_number(coefficients, at + 3 * pieces, c.b3);
+    behind = front;
+  }
+}
+
+// Back to front from colours of all chains that are `behind`.
+__kernel VDVR_HINT void step_chains(VdvrCertify q, __global const float* restrict parts, int chains,
+                                    int steps, float behind, __global float* restrict ends) {
+  const int first = (int)get_global_id(0) * VDVR_LANES;
+  if (first >= chains) return;
+  V3 hi = v3((V)(behind), (V)(behind), (V)(behind)), minus_lo = negative3(hi);
+  V error = (V)(0.0f);
+#define NUMBER(n) number_at(parts, (step * NUMBERS_OF_PART + (n)) * chains + first)
+  for (int step = steps - 1; step >= 0; --step) {
+    Part part = new_part(NUMBER(0), (I)(1) == (I)(1));
+    Shown halves[2];
+    for (int k = 0; k < 2; ++k) {
+      const int at = 1 + 8 * k;
+      halves[k].t1 = NUMBER(at);
+      halves[k].minus_t0 = NUMBER(at + 1);
+      halves[k].c1 = v3(NUMBER(at + 2), NUMBER(at + 3), NUMBER(at + 4));
+      halves[k].minus_c0 = v3(NUMBER(at + 5), NUMBER(at + 6), NUMBER(at + 7));
+    }
+#if VDVR_CHORD
+    part.halves[0] = halves[0];
+    part.halves[1] = halves[1];
+#endif
+    part.all = shown_of_both(&halves[0], &halves[1]);
+    find_shares(&part);
+    hi = above_part(&part, hi);
+    minus_lo = minus_below_part(&part, minus_lo);
+    error = error_in_front(&q, &part, error);
+  }
+#undef NUMBER
+  error = error_of_ray(&q, error, (I)(steps));
+  put_number(ends, first, hi.x);
+  put_number(ends, chains + first, hi.y);
+  put_number(ends, 2 * chains + first, hi.z);
+  put_number(ends, 3 * chains + first, minus_lo.x);
+  put_number(ends, 4 * chains + first, minus_lo.y);
+  put_number(ends, 5 * chains + first, minus_lo.z);
+  put_number(ends, 6 * chains + first, error);
+}
