@@ -5,7 +5,7 @@
 namespace vdvr {
 namespace {
 
-// Of an opacity between two points.
+// Three roundings of an opacity between two points.
 constexpr double rounding = 0x1p-50;
 
 double extinction(double opacity) {
@@ -25,6 +25,7 @@ MediumRanges::MediumRanges(const TransferFunction& transfer) {
 MediumRange MediumRanges::over(double low, double high) const {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   double least = infinity, most = 0;
+  bool opaque = true;
   MediumRange out;
   out.low.fill(infinity);
   out.high.fill(-infinity);
@@ -43,16 +44,17 @@ MediumRange MediumRanges::over(double low, double high) const {
     for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
     return p;
   };
-  if (low <= points_.front().value) take(points_.front(), points_.front());
-  if (high >= points_.back().value) take(points_.back(), points_.back());
-  for (std::size_t i = 0; i + 1 < points_.size(); ++i) {
-    const Point &a = points_[i], &b = points_[i + 1];
-    if (b.value < low || a.value > high) continue;
+  const auto stretch = [&](const Point& a, const Point& b) {
+    opaque &= a.opacity >= 1 && b.opacity >= 1;
     if (!(b.value > a.value)) take(a, b);
     else take(a.value < low ? cut(a, b, low) : a, b.value > high ? cut(a, b, high) : b);
-  }
-  // Interpolation rounds: what is opaque must stay so.
-  out.tau_low = extinction(least - rounding);
+  };
+  if (low <= points_.front().value) stretch(points_.front(), points_.front());
+  if (high >= points_.back().value) stretch(points_.back(), points_.back());
+  for (std::size_t i = 0; i + 1 < points_.size(); ++i)
+    if (points_[i + 1].value >= low && points_[i].value <= high) stretch(points_[i], points_[i + 1]);
+  // Near opacity 1 extinction makes much of a rounding; only where all is opaque, nothing shines through.
+  out.tau_low = opaque ? infinity : extinction(least - rounding);
   out.tau_high = most > 0 ? extinction(most + rounding) : 0;
   return out;
 }

@@ -21,12 +21,16 @@ Cubic difference(const Cubic& a, const Cubic& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]};
 }
 
+/// The largest slope of a cubic, per piece.
+double steepest(const Cubic& b) {
+  return 3 * std::max({std::abs(b[1] - b[0]), std::abs(b[2] - b[1]), std::abs(b[3] - b[2])});
+}
+
 /// Into how many parts a cubic is cut so that the coefficients of each spread by 2 kappa times the bound.
 double parts_of(const Cubic& b, double bound, double kappa) {
   constexpr double most = 64;
-  const double steepest = 3 * std::max({std::abs(b[1] - b[0]), std::abs(b[2] - b[1]), std::abs(b[3] - b[2])});
-  if (!(steepest > 0) || !std::isfinite(bound)) return 1;
-  return std::clamp(std::ceil(steepest / (2 * kappa * bound)), 1.0, most);
+  if (!(steepest(b) > 0) || !std::isfinite(bound)) return 1;
+  return std::clamp(std::ceil(steepest(b) / (2 * kappa * bound)), 1.0, most);
 }
 
 }  // namespace
@@ -115,6 +119,41 @@ void LitEmission::pass(const Step& step, LitRay& seen) const {
   }
 }
 
+// Steps end where a piece of any of the seven rays does. Faces that lie at one place up to rounding are taken
+// for one: what a piece says is then used that far beside it, and its bound allows for what it moves there.
+void LitEmission::take_steps(const WorldRay& ray, const Pieces& pieces, LitRay& seen) const {
+  const double one_place = 0x1p-46 * (pieces.back().last + drawn_.cell());
+  const auto bound_of = [&](const RayPiece& p) {
+    return p.bound + steepest(p.value) / (p.last - p.first) * one_place;
+  };
+  const auto around = neighbours(ray, pieces.front().first, pieces.back().last);
+  std::array<std::size_t, 6> at{};
+  for (std::size_t i = 0; i < 6; ++i) at[i] = around[i].size() - 1;
+  for (auto piece = pieces.rbegin(); piece != pieces.rend(); ++piece) {
+    double end = piece->last;
+    while (end > piece->first) {
+      double begin = piece->first;
+      for (std::size_t i = 0; i < 6; ++i) {
+        while (at[i] > 0 && around[i][at[i]].first >= end - one_place) --at[i];
+        const double first = around[i][at[i]].first;
+        if (first > piece->first + one_place) begin = std::max(begin, std::min(first, end));
+      }
+      Step step;
+      step.length = (end - begin) / drawn_.cell();
+      step.value = between(*piece, begin, end);
+      step.bound = piece->bound;
+      step.view = ray.direction;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const RayPiece &low = around[2 * a][at[2 * a]], &high = around[2 * a + 1][at[2 * a + 1]];
+        step.change[a] = difference(between(high, begin, end), between(low, begin, end));
+        step.change_bound[a] = bound_of(low) + bound_of(high);
+      }
+      pass(step, seen);
+      end = begin;
+    }
+  }
+}
+
 LitRay LitEmission::along(const WorldRay& ray, const std::array<double, 3>& background) const {
   LitRay seen;
   seen.colours = {background, background};
@@ -137,31 +176,7 @@ LitRay LitEmission::along(const WorldRay& ray, const std::array<double, 3>& back
       seen.colours.low[c] = std::min(background[c], colour_low_);
       seen.colours.high[c] = std::max(background[c], colour_high_);
     }
-  const auto around = neighbours(ray, pieces.front().first, pieces.back().last);
-  std::array<std::size_t, 6> at{};
-  for (std::size_t i = 0; i < 6; ++i) at[i] = around[i].size() - 1;
-  for (auto piece = pieces.rbegin(); piece != pieces.rend(); ++piece) {
-    double end = piece->last;
-    while (end > piece->first) {
-      double begin = piece->first;
-      for (std::size_t i = 0; i < 6; ++i) {
-        while (at[i] > 0 && around[i][at[i]].first >= end) --at[i];
-        begin = std::max(begin, std::min(around[i][at[i]].first, end));
-      }
-      Step step;
-      step.length = (end - begin) / drawn_.cell();
-      step.value = between(*piece, begin, end);
-      step.bound = piece->bound;
-      step.view = ray.direction;
-      for (std::size_t a = 0; a < 3; ++a) {
-        const RayPiece &low = around[2 * a][at[2 * a]], &high = around[2 * a + 1][at[2 * a + 1]];
-        step.change[a] = difference(between(high, begin, end), between(low, begin, end));
-        step.change_bound[a] = low.bound + high.bound;
-      }
-      pass(step, seen);
-      end = begin;
-    }
-  }
+  take_steps(ray, pieces, seen);
   // Of a part: the step 16 roundings, its colours under light below 240. The 24th power takes its cosine's
   // error 24 times.
   const double rounding = 0x1p-53 * 256 * most * static_cast<double>(seen.parts + 1);

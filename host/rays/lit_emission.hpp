@@ -27,6 +27,7 @@ class LitEmission {
   using Pieces = std::vector<RayPiece>;
   struct Step;
   [[nodiscard]] std::array<Pieces, 6> neighbours(const WorldRay& ray, double first, double last) const;
+  void take_steps(const WorldRay& ray, const Pieces& pieces, LitRay& seen) const;
   void pass(const Step& step, LitRay& seen) const;
 
   const RayField &drawn_, &known_;
