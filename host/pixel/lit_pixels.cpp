@@ -1,8 +1,9 @@
 // Intervals of pixels whose light is that of F, ray by ray on the host (docs/pixel-bounds.md, section 7).
 // Called by the render and verify commands, and tests.
-#include <chrono>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -24,7 +25,7 @@ void check(const MixedVolume& volume, const std::vector<float>& bounds, const Re
   if (!o.shading) throw InputError("a picture without light has none to certify");
   if (o.gradient != GradientKind::central)
     throw InputError("light is certified of `gradient` central alone: differences of F over one base cell");
-  if (c.fast) throw InputError("light is certified by the exact form alone, not by `fast`");
+  if (c.fast || c.chord) throw InputError("light is certified by box steps alone, not by `fast` or `chord`");
   if (c.window)
     throw InputError("light is not certified where the certificate has a window: F's differences across it are "
                      "unknown");
@@ -36,6 +37,9 @@ void check(const MixedVolume& volume, const std::vector<float>& bounds, const Re
     throw InputError(fmt::format("termination {} of a certified picture must lie in (0, 1)", c.theta));
 }
 
+// Of a base cell: far above what clipped rays are rounded by (ray_walk.cpp).
+constexpr double hair = 0x1p-24;
+
 /// The next float outward.
 float down(double x) {
   const auto f = static_cast<float>(x);
@@ -44,6 +48,18 @@ float down(double x) {
 float up(double x) { return -down(-x); }
 
 }  // namespace
+
+Clip inside_of_differences(const Clip& known, const Grid& g) {
+  Clip inside = known;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double half = (0.5 + hair) * g.spacing[a],
+                 end = g.origin[a] + static_cast<double>(g.cells[a]) * g.spacing[a];
+    inside.low[a] = std::max(known.low[a], g.origin[a]) + half;
+    inside.high[a] = std::min(known.high[a], end) - half;
+  }
+  inside.radius = known.radius - (0.5 + hair) * std::max(g.spacing[0], g.spacing[1]);
+  return inside;
+}
 
 PixelBounds certify_lit_pixels(const MixedVolume& volume, const std::vector<float>& bounds, const Clip& known,
                                const std::pair<float, float>& value_range, const RenderOptions& o,

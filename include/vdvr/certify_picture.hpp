@@ -34,8 +34,6 @@ struct CertifyPictureOptions {
   /// The certificate's: beside what its bound says, F may lie anywhere outside of this at any point, and it
   /// does so throughout a brick without a bound. The transfer function must be clear there.
   std::optional<std::pair<double, double>> window{};
-  /// What certify_lit_pixels() does is wanted: the light is F's.
-  bool lit = false;
 };
 
 /// Where rays end for bounds like these: at `theta`, or at a sixteenth of what the middle bound is of the
@@ -73,11 +71,13 @@ VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume
                                     const std::vector<float>& bounds, const RenderOptions& options,
                                     const CertifyPictureOptions& certify = {}, const Progress& progress = {});
 
+/// Where light of F is known of what is known of F in `known`: half a base cell within it, and within the grid.
+VDVR_API Clip inside_of_differences(const Clip& known, const Grid& grid);
 /// The same with the light of F itself (docs/pixel-bounds.md, section 7), on the host in double precision, for
-/// pictures with `gradient` central. `bounds` are of the buffer sampler and hold where `known` says: what
-/// lies within half a base cell of its rim is under any light. `value_range`: of V (ResidentVolume). Cost:
-/// some 0.1 ms a ray of 64 cells. Throws InputError as certify_pixels(), and for `fast`, a window, or a
-/// picture without light; Interrupted.
+/// pictures with `gradient` central. `bounds` are of the buffer sampler and hold where `known` says. What is
+/// drawn beside inside_of_differences() may be under any light; such pixels count as untested. `value_range`: of
+/// V (ResidentVolume). Cost: 0.05 to 1 ms a ray of 64 cells. Throws InputError as certify_pixels(), and for
+/// `fast` and `chord`, a window, or a picture without light; Interrupted.
 VDVR_API PixelBounds certify_lit_pixels(const MixedVolume& volume, const std::vector<float>& bounds,
                                         const Clip& known, const std::pair<float, float>& value_range,
                                         const RenderOptions& options,
@@ -116,7 +116,7 @@ VDVR_API Image picture_of_bound(const PictureBound& bound, const PixelBounds& bo
 /// Share of pixels whose ideal bytes all lie within `levels` of the drawn ones.
 VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, double levels);
 
-/// A pixel of the ideal picture, without light or lit by F, by the field's values in the middles of steps of a ray.
+/// A pixel of the ideal picture by the field's values in the middles of steps of a ray.
 struct IdealPixel {
   std::array<double, 3> rgb{0, 0, 0};
   double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
@@ -134,7 +134,7 @@ struct RaySteps {
 /// `step` in base cells, at most.
 VDVR_API RaySteps steps_of_pixel(const RenderOptions& options, const Grid& grid, std::int64_t x,
                                  std::int64_t y, double step);
-/// `field` gives values at world points, as ExactField::at. `step` in base cells.
+/// Without light. `field` gives values at world points, as ExactField::at. `step` in base cells.
 VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
                                 const RenderOptions& options, const Grid& grid, std::int64_t x,
                                 std::int64_t y, double step);
