@@ -87,7 +87,8 @@ std::vector<std::string> overlay_names(const Overlay& overlay) {
 std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds& bounds,
                                     const Certificate& certificate, bool slice) {
   if (slice)
-    return {bound_line(bound, certificate, bounds.light), "Certified: F at the middles of pixels, where it is covered."};
+    return {bound_line(bound, certificate, bounds.light),
+            "Certified: F at the middles of pixels, where it is covered."};
   return {bound_line(bound, certificate, bounds.light),
           fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
                       text_of(bounds.light))};
@@ -259,10 +260,11 @@ void check_file(const Arguments& args, const Scene& scene, const RenderOptions& 
     throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
   const auto& window = scene.certificate->window;
   if (window && asks_lit(args))
-    throw InputError(fmt::format(
-        "{}: was certified within --window {:.6g},{:.6g}; differences of F across its ends are unknown, and so is "
-        "its light: take --certify-light as-drawn, or build without --window",
-        name, window->first, window->second));
+    throw InputError(
+        fmt::format("{}: was certified within --window {:.6g},{:.6g}; differences of F across its ends are "
+                    "unknown, and so is "
+                    "its light: take --certify-light as-drawn, or build without --window",
+                    name, window->first, window->second));
   if (window && o.mode == RenderMode::slice)
     throw InputError(fmt::format(
         "{}: was certified within --window {:.6g},{:.6g}; where F lies outside of it is unknown, so that no "

@@ -234,8 +234,10 @@ std::string statement_of(RenderMode mode, CertifiedLight light) {
            "beginning "
            "where it is possible.";
   if (light == CertifiedLight::lit)
-    return "In every pixel and channel the ideal picture, continuous emission and absorption over F under the "
-           "light of F's own differences over one base cell, inside the covered region and half a base cell from "
+    return "In every pixel and channel the ideal picture, continuous emission and absorption over F under "
+           "the "
+           "light of F's own differences over one base cell, inside the covered region and half a base cell "
+           "from "
            "its rim, differs from the drawn one by at most the bound of that pixel.";
   return fmt::format(
       "In every pixel and channel the ideal picture, continuous emission and absorption over F inside the "

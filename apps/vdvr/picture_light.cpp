@@ -13,10 +13,11 @@ const std::vector<std::string> kLights{"as-drawn", "lit"};
 }  // namespace
 
 void add_picture_light(Arguments& args) {
-  args.value("certify-light", "as-drawn|lit",
-             "as-drawn: colour and opacity of F under the light of the volume that is drawn. lit: under F's own, by "
-             "its differences over one base cell, of what lies half a cell within the covered region; bounds are of "
-             "use where epsilon is 0.2 % of the range or less (default as-drawn)");
+  args.value(
+      "certify-light", "as-drawn|lit",
+      "as-drawn: colour and opacity of F under the light of the volume that is drawn. lit: under F's own, by "
+      "its differences over one base cell, of what lies half a cell within the covered region; bounds are of "
+      "use where epsilon is 0.2 % of the range or less (default as-drawn)");
 }
 
 bool asks_lit(const Arguments& args) {
@@ -33,10 +34,12 @@ void check_picture_light(const Arguments& args, const RenderOptions& o) {
   const std::string form = args.has("certify") ? args.text_or("certify", "exact") : "exact";
   if (form == "fast" || form == "chord")
     throw InputError(fmt::format(
-        "--certify {} does not go with --certify-light lit, which has the exact form alone: --certify", form));
+        "--certify {} does not go with --certify-light lit, which has the exact form alone: --certify",
+        form));
   if (o.gradient != GradientKind::automatic && o.gradient != GradientKind::central)
     throw InputError(
-        "--certify-light lit: light of F is that of its differences over one base cell: take --gradient central");
+        "--certify-light lit: light of F is that of its differences over one base cell: take --gradient "
+        "central");
   refuse(args, {"explain"}, "is of colours and opacity, not of --certify-light lit");
 }
 
@@ -50,8 +53,8 @@ void cut_to_differences(Clip& clip, const Clip& known, const Grid& grid) {
 PixelBounds certify_lit(const Source& source, const Clip& known, const RenderOptions& options,
                         const CertifyPictureOptions& certify, const Progress& progress) {
   const Scene& scene = source.scene();
-  return certify_lit_pixels(scene.volume, brick_bounds(*scene.certificate, false), known, source.value_range(),
-                            options, certify, progress);
+  return certify_lit_pixels(scene.volume, brick_bounds(*scene.certificate, false), known,
+                            source.value_range(), options, certify, progress);
 }
 
 }  // namespace vdvr::cli

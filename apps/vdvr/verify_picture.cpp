@@ -45,10 +45,10 @@ void certify_again(Device& device, const ResidentVolume& resident, const Certifi
   const RenderOptions& o = picture.options;
   again.value_range = resident.value_range();
   if (picture.lit) {
-    again.bounds = certify_lit_pixels(
-        file.volume, brick_bounds(file.certificate, false),
-        known_clip(file.certificate.covered.value_or(picture.covered), file.certificate), again.value_range, o,
-        picture.certify, progress);
+    again.bounds =
+        certify_lit_pixels(file.volume, brick_bounds(file.certificate, false),
+                           known_clip(file.certificate.covered.value_or(picture.covered), file.certificate),
+                           again.value_range, o, picture.certify, progress);
     return;
   }
   if (o.mode == RenderMode::dvr) {
@@ -106,9 +106,8 @@ void check_colours(const Field& field, const CertifiedPicture& picture, const Gr
   const auto at = static_cast<std::int64_t>(i);
   const RenderOptions& o = picture.options;
   const std::int64_t x = at % o.width, y = at / o.width;
-  const IdealPixel ideal = picture.lit
-                               ? ideal_lit_pixel(field, again.value_range, o, grid, x, y, kRayStep)
-                               : ideal_pixel(field, o, grid, x, y, kRayStep);
+  const IdealPixel ideal = picture.lit ? ideal_lit_pixel(field, again.value_range, o, grid, x, y, kRayStep)
+                                       : ideal_pixel(field, o, grid, x, y, kRayStep);
   for (std::size_t c = 0; c < 3; ++c)
     take(check, ideal.rgb[c],
          static_cast<double>(again.bounds.lo.values[3 * i + c]) - ideal.quadrature - 0x1p-12,
@@ -333,7 +332,8 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
   else compare(claims, bound, again, wrong);
   std::optional<RayCheck> rays;
   const bool as_drawn = mode == RenderMode::dvr && picture.options.shading && !picture.lit;
-  if (args.has("projections") && !as_drawn) rays = check_rays(args, picture, file, again, progress.callback());
+  if (args.has("projections") && !as_drawn)
+    rays = check_rays(args, picture, file, again, progress.callback());
   if (rays && rays->outside > 0)
     wrong.push_back(fmt::format("F lies outside of what is certain in {} places", rays->outside));
   progress.clear();

@@ -86,7 +86,8 @@ IdealPixel ideal_lit_pixel(const Field& field, const std::pair<float, float>& va
   if (s.points.empty()) return summed(s, {}, {}, o, g, y);
   const Lights light(o, full_gradient(value_range));
   std::vector<Light> lights;
-  for (const Vec3& gradient : differences(field, s.points, g)) lights.push_back(light.at(gradient, s.direction));
+  for (const Vec3& gradient : differences(field, s.points, g))
+    lights.push_back(light.at(gradient, s.direction));
   return summed(s, field(s.points), lights, o, g, y);
 }
 

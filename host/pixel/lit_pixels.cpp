@@ -27,8 +27,9 @@ void check(const MixedVolume& volume, const std::vector<float>& bounds, const Re
     throw InputError("light is certified of `gradient` central alone: differences of F over one base cell");
   if (c.fast || c.chord) throw InputError("light is certified by box steps alone, not by `fast` or `chord`");
   if (c.window)
-    throw InputError("light is not certified where the certificate has a window: F's differences across it are "
-                     "unknown");
+    throw InputError(
+        "light is not certified where the certificate has a window: F's differences across it are "
+        "unknown");
   if (bounds.size() != static_cast<std::size_t>(volume.brick_count()))
     throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), volume.brick_count()));
   if (!(c.kappa >= 0x1p-10 && c.kappa <= 1024))

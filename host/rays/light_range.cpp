@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace vdvr {
@@ -32,19 +33,98 @@ std::pair<double, double> lit_colours(double low, double high, const LightRange&
   return {least, most};
 }
 
-// Directions within `wide` of that of `middle`.
-struct Lights::Cone {
+// The directions of a box of gradients.
+struct Lights::Directions {
+  GradientBox box;
+  std::array<Vec3, 8> corner{};
   Vec3 middle{};
-  double wide = pi;
-  /// Cosines to a direction of unit length.
-  [[nodiscard]] std::pair<double, double> cosines(const Vec3& to) const {
-    if (!(wide < pi)) return {-1, 1};
-    const Vec3 across{middle[1] * to[2] - middle[2] * to[1], middle[2] * to[0] - middle[0] * to[2],
-                      middle[0] * to[1] - middle[1] * to[0]};
-    const double angle = std::atan2(length(across), dot(middle, to));
-    return {std::cos(std::min(angle + wide, pi)), std::cos(std::max(angle - wide, 0.0))};
-  }
+  double wide = pi;                 ///< no direction lies farther from that of the middle
+  double nearest = 0, largest = 0;  ///< of lengths, and of coordinates
+
+  explicit Directions(const GradientBox& g);
+  /// Least and largest cosine to a direction of unit length.
+  [[nodiscard]] std::pair<double, double> cosines(const Vec3& to) const;
+
+ private:
+  [[nodiscard]] std::pair<double, double> on_one_side(const Vec3& to, const std::array<double, 8>& along,
+                                                      double side) const;
+  [[nodiscard]] bool holds_multiple_of(const Vec3& to, double side) const;
 };
+
+Lights::Directions::Directions(const GradientBox& g) : box(g) {
+  Vec3 half{}, least{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    middle[a] = 0.5 * (g.low[a] + g.high[a]);
+    half[a] = 0.5 * (g.high[a] - g.low[a]);
+    least[a] = std::max({0.0, g.low[a], -g.high[a]});
+    largest = std::max({largest, std::abs(g.low[a]), std::abs(g.high[a])});
+    for (std::size_t i = 0; i < 8; ++i) corner[i][a] = (i >> a & 1) == 0 ? g.low[a] : g.high[a];
+  }
+  nearest = length(least);
+  // Of the ball around the box. Near a right angle asin makes of 8 roundings the root of 16.
+  const double share = length(half) / length(middle);
+  if (share < 1) wide = std::asin(share) + 0x1p-24;
+}
+
+std::pair<double, double> Lights::Directions::cosines(const Vec3& to) const {
+  std::array<double, 8> along{};
+  for (std::size_t i = 0; i < 8; ++i) along[i] = dot(corner[i], to);
+  const auto [low, high] = std::minmax_element(along.begin(), along.end());
+  // Far enough from a right angle for what follows to round by 2^-42 at most.
+  if (*low > largest / 64) return on_one_side(to, along, 1);
+  if (*high < -largest / 64) return on_one_side(to, along, -1);
+  std::pair<double, double> range{-1, 1};
+  if (nearest > 0)
+    range = {std::max(-1.0, std::min(0.0, *low - 0x1p-40 * largest) / nearest),
+             std::min(1.0, std::max(0.0, *high + 0x1p-40 * largest) / nearest)};
+  if (!(wide < pi)) return range;
+  const Vec3 across{middle[1] * to[2] - middle[2] * to[1], middle[2] * to[0] - middle[0] * to[2],
+                    middle[0] * to[1] - middle[1] * to[0]};
+  const double angle = std::atan2(length(across), dot(middle, to));
+  return {std::max(range.first, std::cos(std::min(angle + wide, pi))),
+          std::min(range.second, std::cos(std::max(angle - wide, 0.0)))};
+}
+
+// Exact. Seen from the origin the box is a polygon of the plane at distance 1 along `to`: its farthest point
+// from the plane's foot is a corner, and unless it holds the foot its nearest lies on an edge, of which the
+// box's own are more.
+std::pair<double, double> Lights::Directions::on_one_side(const Vec3& to, const std::array<double, 8>& along,
+                                                          double side) const {
+  constexpr double rounding = 0x1p-40;
+  std::array<Vec3, 8> q;
+  double farthest = 0, near = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 8; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) q[i][a] = corner[i][a] / along[i] - to[a];
+    farthest = std::max(farthest, dot(q[i], q[i]));
+  }
+  if (holds_multiple_of(to, side)) near = 0;
+  for (std::size_t i = 0; i < 8 && near > 0; ++i)
+    for (std::size_t bit = 1; bit < 8; bit *= 2) {
+      if ((i & bit) != 0) continue;
+      const Vec3 edge = minus(q[i | bit], q[i]);
+      const double edge2 = dot(edge, edge),
+                   t = edge2 > 0 ? std::clamp(-dot(q[i], edge) / edge2, 0.0, 1.0) : 0;
+      const Vec3 at{q[i][0] + t * edge[0], q[i][1] + t * edge[1], q[i][2] + t * edge[2]};
+      near = std::min(near, dot(at, at));
+    }
+  const double least = 1 / std::sqrt(1 + farthest) - rounding,
+               most = std::min(1.0, 1 / std::sqrt(1 + near) + rounding);
+  return side > 0 ? std::pair(least, most) : std::pair(-most, -least);
+}
+
+bool Lights::Directions::holds_multiple_of(const Vec3& to, double side) const {
+  double from = 0, end = std::numeric_limits<double>::infinity();
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double d = side * to[a];
+    if (d == 0) {
+      if (box.low[a] > 0 || box.high[a] < 0) return false;
+      continue;
+    }
+    from = std::max(from, std::min(box.low[a] / d, box.high[a] / d));
+    end = std::min(end, std::max(box.low[a] / d, box.high[a] / d));
+  }
+  return from <= end;
+}
 
 Lights::Lights(const RenderOptions& options, double gradient_full)
     : head_(options.head_light), full_(gradient_full) {
@@ -79,10 +159,11 @@ LightRange Lights::any() const {
   return {{0, 0, 0}, {1, 0.75, static_cast<double>(lights_.size()) + (head_ ? 1 : 0)}};
 }
 
-// The sums of all lights on normals that are `side` times the cone's directions.
-void Lights::add(const Cone& cone, const Vec3& view, double side, Light& least, Light& most) const {
+// The sums of all lights on normals that are `side` times the directions.
+void Lights::add(const Directions& directions, const Vec3& view, double side, Light& least,
+                 Light& most) const {
   const auto cosines = [&](const Vec3& to) {
-    const auto [low, high] = cone.cosines(to);
+    const auto [low, high] = directions.cosines(to);
     return side > 0 ? std::pair(low, high) : std::pair(-high, -low);
   };
   Light low, high;
@@ -111,31 +192,24 @@ void Lights::add(const Cone& cone, const Vec3& view, double side, Light& least, 
 }
 
 LightRange Lights::over(const GradientBox& g, const Vec3& view) const {
-  Vec3 middle{}, nearest{}, farthest{}, half{};
-  double along_low = 0, along_high = 0, largest = 0;
+  Vec3 farthest{};
+  double along_low = 0, along_high = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!std::isfinite(g.low[a]) || !std::isfinite(g.high[a])) return any();
-    middle[a] = 0.5 * (g.low[a] + g.high[a]);
-    half[a] = 0.5 * (g.high[a] - g.low[a]);
-    nearest[a] = std::max({0.0, g.low[a], -g.high[a]});
     farthest[a] = std::max(std::abs(g.low[a]), std::abs(g.high[a]));
     along_low += view[a] * (view[a] > 0 ? g.low[a] : g.high[a]);
     along_high += view[a] * (view[a] > 0 ? g.high[a] : g.low[a]);
-    largest = std::max(largest, farthest[a]);
   }
+  const Directions directions(g);
   const auto strength = [&](double magnitude) {
     return full_ > 0 ? std::min(magnitude / full_, 1.0) : magnitude > 0 ? 1.0 : 0.0;
   };
-  LightRange range{{strength(length(nearest)), INFINITY, INFINITY},
+  LightRange range{{strength(directions.nearest), INFINITY, INFINITY},
                    {strength(length(farthest)), -INFINITY, -INFINITY}};
-  Cone cone{middle, pi};
-  // All directions of the ball around the box. Near a right angle asin makes of 8 roundings the root of 16.
-  const double share = length(half) / length(middle);
-  if (share < 1) cone.wide = std::asin(share) + 0x1p-24;
   // Either side of a surface may show, as far as rounding tells.
-  const double rounding = 0x1p-48 * largest;
-  if (!(along_low > rounding)) add(cone, view, 1, range.least, range.most);
-  if (!(along_high <= -rounding)) add(cone, view, -1, range.least, range.most);
+  const double rounding = 0x1p-48 * directions.largest;
+  if (!(along_low > rounding)) add(directions, view, 1, range.least, range.most);
+  if (!(along_high <= -rounding)) add(directions, view, -1, range.least, range.most);
   return range;
 }
 

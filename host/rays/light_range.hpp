@@ -45,8 +45,8 @@ class Lights {
   [[nodiscard]] LightRange any() const;
 
  private:
-  struct Cone;
-  void add(const Cone& cone, const Vec3& view, double side, Light& least, Light& most) const;
+  struct Directions;
+  void add(const Directions& directions, const Vec3& view, double side, Light& least, Light& most) const;
 
   std::vector<Vec3> lights_;
   bool head_;

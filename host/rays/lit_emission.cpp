@@ -40,18 +40,14 @@ struct LitEmission::Step {
   double length = 0;  // base cells
   Cubic value{};
   double bound = 0;
-  std::array<Cubic, 3> change{};        // of V over one base cell along each axis
-  std::array<double, 3> change_bound{}; // of F's change beside it
+  std::array<Cubic, 3> change{};         // of V over one base cell along each axis
+  std::array<double, 3> change_bound{};  // of F's change beside it
   Vec3 view{};
 };
 
 LitEmission::LitEmission(const RayField& drawn, const RayField& known, const Grid& grid,
                          const RenderOptions& o, double gradient_full, const EmissionOptions& emission)
-    : drawn_(drawn),
-      known_(known),
-      ranges_(o.transfer),
-      lights_(o, gradient_full),
-      emission_(emission) {
+    : drawn_(drawn), known_(known), ranges_(o.transfer), lights_(o, gradient_full), emission_(emission) {
   const double unit = std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]});
   for (std::size_t a = 0; a < 3; ++a) {
     half_[a] = 0.5 * grid.spacing[a];

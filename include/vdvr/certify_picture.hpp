@@ -45,8 +45,8 @@ VDVR_API double ending_share(double theta, const std::vector<float>& bounds,
 VDVR_API bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, double>& window);
 
 /// What of the light is certified. as_drawn: colour and opacity of F under the light that V was drawn with, a
-/// function on the ray that the drawn step fixes. lit: the light of F itself, of its differences over one base
-/// cell.
+/// function on the ray that the drawn step fixes. lit: the light of F itself, of its differences over one
+/// base cell.
 enum class CertifiedLight { unlit, as_drawn, lit };
 /// "unlit", "as drawn", "lit".
 VDVR_API const char* text_of(CertifiedLight light);
@@ -71,13 +71,14 @@ VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume
                                     const std::vector<float>& bounds, const RenderOptions& options,
                                     const CertifyPictureOptions& certify = {}, const Progress& progress = {});
 
-/// Where light of F is known of what is known of F in `known`: half a base cell within it, and within the grid.
+/// Where light of F is known of what is known of F in `known`: half a base cell within it, and within the
+/// grid.
 VDVR_API Clip inside_of_differences(const Clip& known, const Grid& grid);
-/// The same with the light of F itself (docs/pixel-bounds.md, section 7), on the host in double precision, for
-/// pictures with `gradient` central. `bounds` are of the buffer sampler and hold where `known` says. What is
-/// drawn beside inside_of_differences() may be under any light; such pixels count as untested. `value_range`: of
-/// V (ResidentVolume). Cost: 0.05 to 1 ms a ray of 64 cells. Throws InputError as certify_pixels(), and for
-/// `fast` and `chord`, a window, or a picture without light; Interrupted.
+/// The same with the light of F itself (docs/pixel-bounds.md, section 7), on the host in double precision,
+/// for pictures with `gradient` central. `bounds` are of the buffer sampler and hold where `known` says. What
+/// is drawn beside inside_of_differences() may be under any light; such pixels count as untested.
+/// `value_range`: of V (ResidentVolume). Cost: 0.05 to 1 ms a ray of 64 cells. Throws InputError as
+/// certify_pixels(), and for `fast` and `chord`, a window, or a picture without light; Interrupted.
 VDVR_API PixelBounds certify_lit_pixels(const MixedVolume& volume, const std::vector<float>& bounds,
                                         const Clip& known, const std::pair<float, float>& value_range,
                                         const RenderOptions& options,

@@ -1,6 +1,6 @@
-// How tight intervals of lit pixels are: the error of V's picture under its own light beside the bound, and beside
-// what an adversary reaches who chooses values and differences within their bounds, on fields with an analytic F
-// (docs/pixel-bounds.md, section 7). scripts/lit-tightness makes the table.
+// How tight intervals of lit pixels are: the error of V's picture under its own light beside the bound, and
+// beside what an adversary reaches who chooses values and differences within their bounds, on fields with an
+// analytic F (docs/pixel-bounds.md, section 7). scripts/lit-tightness makes the table.
 //   lit_tightness FIELD CELLS LEVEL
 // FIELD: marschner-lobb or blobs; LEVEL: samples 2^LEVEL to a cell.
 
@@ -44,14 +44,13 @@ void take_ray(Scene& s, std::size_t i) {
   const Vec3& low = s.volume.grid.origin;
   s.f[i] = support::along_lit_ray(
       [&](const Vec3& p) { return s.field.at(p[0] - low[0], p[1] - low[1], p[2] - low[2]); }, ray, step);
-  s.v[i] = support::along_lit_ray(
-      [&](const Vec3& p) { return static_cast<double>(sample_at(s.volume, p)); }, ray, step);
+  s.v[i] = support::along_lit_ray([&](const Vec3& p) { return static_cast<double>(sample_at(s.volume, p)); },
+                                  ray, step);
   const support::LitFieldOnRay e =
       support::along_lit_ray([&](const Vec3& p) { return bound_at(s, p); }, ray, step);
   s.e[i] = e.values;
   for (const auto& around : e.around)
-    s.d[i].push_back(
-        {around[0][0] + around[0][1], around[1][0] + around[1][1], around[2][0] + around[2][1]});
+    s.d[i].push_back({around[0][0] + around[0][1], around[1][0] + around[1][1], around[2][0] + around[2][1]});
 }
 
 Scene scene_of(const std::string& name, std::int64_t cells, std::uint8_t level) {
@@ -104,7 +103,8 @@ double reached(const Scene& s, double full, const PixelBounds& b) {
     for (std::size_t c = 0; c < 3; ++c)
       for (const bool up : {false, true})
         span[static_cast<std::size_t>(k)] +=
-            (up ? 1 : -1) * support::lit_adversary_of(s.v[i], s.e[i], s.d[i], s.options, view, full, 0, c, up, random);
+            (up ? 1 : -1) *
+            support::lit_adversary_of(s.v[i], s.e[i], s.d[i], s.options, view, full, 0, c, up, random);
   });
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     sum += span[k];

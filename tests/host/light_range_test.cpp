@@ -31,7 +31,8 @@ RenderOptions lights_of(std::mt19937& random) {
   return o;
 }
 
-// Cosines and powers of some tens of roundings: the highlight takes its cosine's 24 times, of 9 lights at most.
+// Cosines and powers of some tens of roundings: the highlight takes its cosine's 24 times, of 9 lights at
+// most.
 constexpr double rounding = 0x1p-53 * 24 * 64 * 9;
 
 }  // namespace
@@ -48,7 +49,8 @@ BOOST_AUTO_TEST_CASE(light_of_a_gradient_is_the_renderers) {
     for (double& x : g) x *= length;
     const Light l = lights.at(g, view);
     const reference::IdealLight expected = reference::light_on(g, view, o, 0.7);
-    BOOST_TEST(std::abs(lit_colour(colour, l.strength, l.diffuse, l.highlight) - expected.on(colour)) <= rounding);
+    BOOST_TEST(std::abs(lit_colour(colour, l.strength, l.diffuse, l.highlight) - expected.on(colour)) <=
+               rounding);
   }
 }
 

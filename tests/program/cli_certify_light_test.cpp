@@ -1,5 +1,5 @@
-// vdvr render --certify-light: pictures under the light of F itself, what verify --picture finds in them, what is
-// refused.
+// vdvr render --certify-light: pictures under the light of F itself, what verify --picture finds in them,
+// what is refused.
 #define BOOST_TEST_MODULE cli_certify_light
 #include <boost/test/unit_test.hpp>
 
@@ -19,8 +19,8 @@ namespace {
 Json json_of(const std::string& path) { return Json::parse(bytes_of(path)); }
 
 Ended lit_picture(const std::string& volume, const std::string& out, const Words& more = {}) {
-  Words words{"render", volume,  "--certify", "--certify-light", "lit", "--size", "40x40",
-              "-o",     at(out), "--force",   "--json"};
+  Words words{"render", volume, "--certify", "--certify-light", "lit",   "--size",
+              "40x40",  "-o",   at(out),     "--force",         "--json"};
   words.insert(words.end(), more.begin(), more.end());
   return run(words);
 }
@@ -36,7 +36,8 @@ const std::string& certificate() {
 }
 
 void check_held(const std::string& volume, const std::string& picture, const std::string& scan) {
-  const Ended r = run({"verify", volume, "--picture", picture, "--projections", scan, "--rays", "8", "--json"});
+  const Ended r =
+      run({"verify", volume, "--picture", picture, "--projections", scan, "--rays", "8", "--json"});
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   const Json json = Json::parse(r.out);
   BOOST_TEST(json.at("same_pixels") == true);
@@ -61,10 +62,11 @@ void check_found(const std::string& name, const std::string& named, Change&& cha
 BOOST_AUTO_TEST_CASE(the_certificate_says_that_light_is_that_of_f_and_holds_less_than_light_as_drawn) {
   const Json lit = json_of(certificate());
   BOOST_TEST(lit.at("light") == "lit");
-  BOOST_TEST(lit.at("statement").get<std::string>().find("light of F's own differences") != std::string::npos);
+  BOOST_TEST(lit.at("statement").get<std::string>().find("light of F's own differences") !=
+             std::string::npos);
   BOOST_TEST(lit.at("pixels").at("untested") == 0);
-  const Ended r = run({"render", small_volume(), "--certify", "--certify-light=as-drawn", "--size", "40x40", "-o",
-                       at("drawn.png"), "--json"});
+  const Ended r = run({"render", small_volume(), "--certify", "--certify-light=as-drawn", "--size", "40x40",
+                       "-o", at("drawn.png"), "--json"});
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   const Json drawn = Json::parse(r.out);
   BOOST_TEST(drawn.at("light") == "as drawn");
@@ -79,8 +81,9 @@ BOOST_AUTO_TEST_CASE(the_certificate_says_that_light_is_that_of_f_and_holds_less
 
 BOOST_AUTO_TEST_CASE(f_is_found_in_its_intervals) {
   check_held(small_volume(), certificate(), small_scan());
-  const Ended r = lit_picture(small_volume(), "three.png",
-                              {"--light", "head", "--light", "1,2,-1", "--light", "-1,0,0", "--certify-parts", "0.25"});
+  const Ended r =
+      lit_picture(small_volume(), "three.png",
+                  {"--light", "head", "--light", "1,2,-1", "--light", "-1,0,0", "--certify-parts", "0.25"});
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   check_held(small_volume(), at("three.certificate.json"), small_scan());
 }
@@ -117,8 +120,8 @@ BOOST_AUTO_TEST_CASE(regions_of_interest_and_cone_beam_have_it_too) {
   check_held(volume, at("roi.certificate.json"), small_scan());
 
   const std::string scan = at("cone"), cone = at("cone.vdvr");
-  const Ended made = run({"simulate", "--phantom", "sphere", "--detector", "24x24", "--angles", "40", "--cone",
-                          "80,80", "-o", scan});
+  const Ended made = run({"simulate", "--phantom", "sphere", "--detector", "24x24", "--angles", "40",
+                          "--cone", "80,80", "-o", scan});
   BOOST_REQUIRE_MESSAGE(made.code == 0, made.err);
   const Ended certified = run({"build", scan, "--epsilon", "20%", "-o", cone});
   BOOST_REQUIRE_MESSAGE(certified.code == 0, certified.err);
@@ -166,8 +169,8 @@ BOOST_AUTO_TEST_CASE(a_picture_beyond_the_tolerance_ends_with_1) {
 
 BOOST_AUTO_TEST_CASE(an_interrupted_picture_leaves_nothing) {
   const std::string out = at("stopped.png");
-  const pid_t child = start({"render", small_volume(), "--certify", "--certify-light", "lit", "--certify-parts",
-                             "0.002", "--size", "1600x1600", "-o", out});
+  const pid_t child = start({"render", small_volume(), "--certify", "--certify-light", "lit",
+                             "--certify-parts", "0.002", "--size", "1600x1600", "-o", out});
   wait_for("certify");
   ::kill(child, SIGINT);
   const Ended r = finish(child);

@@ -1,5 +1,5 @@
-// The renderer's light by its definition (docs/rendering.md), in double precision: what a colour looks like where
-// a field has a gradient. Nothing here knows of kernels or of intervals.
+// The renderer's light by its definition (docs/rendering.md), in double precision: what a colour looks like
+// where a field has a gradient. Nothing here knows of kernels or of intervals.
 #pragma once
 
 #include <algorithm>

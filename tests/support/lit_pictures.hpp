@@ -1,5 +1,5 @@
-// Pictures under the light of the field itself: of fields with an analytic F, and of what an adversary within the
-// bounds may make of values and differences (docs/pixel-bounds.md, section 7).
+// Pictures under the light of the field itself: of fields with an analytic F, and of what an adversary within
+// the bounds may make of values and differences (docs/pixel-bounds.md, section 7).
 #pragma once
 
 #include <array>
@@ -12,7 +12,8 @@
 
 namespace vdvr::support {
 
-/// The middles of equal steps of a ray: the field there, and half a base cell before and after along each axis.
+/// The middles of equal steps of a ray: the field there, and half a base cell before and after along each
+/// axis.
 struct LitFieldOnRay {
   double length = 0;  ///< of a step, base cells
   std::vector<double> values;
@@ -20,8 +21,8 @@ struct LitFieldOnRay {
 };
 
 /// On a grid of spacing 1.
-inline LitFieldOnRay along_lit_ray(const std::function<double(const Vec3&)>& f, const reference::IdealRay& ray,
-                                   double step) {
+inline LitFieldOnRay along_lit_ray(const std::function<double(const Vec3&)>& f,
+                                   const reference::IdealRay& ray, double step) {
   LitFieldOnRay out;
   if (!(ray.first < ray.last)) return out;
   const auto n = static_cast<std::size_t>(std::ceil((ray.last - ray.first) / step));
@@ -58,15 +59,14 @@ inline reference::Rgb3 lit_colour_of(const LitFieldOnRay& field, const RenderOpt
   for (std::size_t i = field.values.size(); i-- > 0;) {
     const TransferPoint p = reference::shown_at(o.transfer.points, field.values[i]);
     if (p.opacity == 0) continue;
-    const reference::IdealLight light =
-        reference::light_on(gradient_of(field.around[i]), view, o, full);
+    const reference::IdealLight light = reference::light_on(gradient_of(field.around[i]), view, o, full);
     for (std::size_t c = 0; c < 3; ++c) seen[c] = seen_through(p, light, field.length, c, seen[c]);
   }
   return seen;
 }
 
-/// Of values within `e` of V and differences within `d` of V's, step by step what shows most, or least, before
-/// what lies behind.
+/// Of values within `e` of V and differences within `d` of V's, step by step what shows most, or least,
+/// before what lies behind.
 inline double lit_adversary_of(const LitFieldOnRay& v, const std::vector<double>& e,
                                const std::vector<Vec3>& d, const RenderOptions& o, const Vec3& view,
                                double full, double background, std::size_t c, bool up, std::mt19937& random) {
@@ -75,7 +75,8 @@ inline double lit_adversary_of(const LitFieldOnRay& v, const std::vector<double>
   for (std::size_t i = v.values.size(); i-- > 0;) {
     const double low = v.values[i] - e[i], high = v.values[i] + e[i];
     std::vector<TransferPoint> shown;
-    for (int k = 0; k <= 4; ++k) shown.push_back(reference::shown_at(o.transfer.points, low + (high - low) * k / 4));
+    for (int k = 0; k <= 4; ++k)
+      shown.push_back(reference::shown_at(o.transfer.points, low + (high - low) * k / 4));
     for (const TransferPoint& p : o.transfer.points)
       if (p.value >= low && p.value <= high) shown.push_back(p);
     bool any = false;
@@ -113,13 +114,13 @@ inline double lit_adversary_of(const LitFieldOnRay& v, const std::vector<double>
   return behind;
 }
 
-/// What a field within bounds of V may be on each step, constant there, and half a base cell beside it: middles and
-/// half widths. `low` and `high` give V - e and V + e.
+/// What a field within bounds of V may be on each step, constant there, and half a base cell beside it:
+/// middles and half widths. `low` and `high` give V - e and V + e.
 struct LitRoom {
   LitFieldOnRay middle;
-  std::vector<double> value;       ///< half widths
-  std::vector<Vec3> differences;   ///< of differences
-  bool enough = true;              ///< no step is too long for the bound
+  std::vector<double> value;      ///< half widths
+  std::vector<Vec3> differences;  ///< of differences
+  bool enough = true;             ///< no step is too long for the bound
 };
 inline LitRoom room_on_ray(const std::function<double(const Vec3&)>& low,
                            const std::function<double(const Vec3&)>& high, const reference::IdealRay& ray,
