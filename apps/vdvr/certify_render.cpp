@@ -99,16 +99,20 @@ struct Made {
 };
 Made draw_and_certify(Source& source, const RenderOptions& o, const CertifyPictureOptions& options,
                       const Progress& progress) {
-  report(progress, "draw", 0);
-  Made made{source.draw(o), {}};
-  throw_if_stopped();
-  report(progress, "certify", 0);
   if (o.mode == RenderMode::slice) {
+    Made made{source.draw(o, progress), {}};
+    throw_if_stopped();
+    report(progress, "certify", 0);
     made.bounds = certify_slice(source.scene().volume, *source.scene().certificate, o, progress);
     clear_absent(made.drawn.image, made.bounds);
-  } else {
-    made.bounds = source.certify(o, options, progress);
+    return made;
   }
+  // First what needs more memory: where it is too little, the error says how much would do for both.
+  report(progress, "certify", 0);
+  Made made{{}, source.certify(o, options, progress)};
+  throw_if_stopped();
+  report(progress, "draw", 0);
+  made.drawn = source.draw(o, progress);
   return made;
 }
 
@@ -225,6 +229,7 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
   Json printed = json;
   printed["output"] = out.picture.string();
   printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
+  printed["paging"] = paging_json(source.paging());
   if (beyond) printed["picture_tolerance"] = tolerance_json(*beyond);
   if (why) printed["explain"] = explained_json(*why);
   print_result(common, printed, [&] {
@@ -236,6 +241,7 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
     if (!slice)
       fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
                  made.drawn.seconds, made.bounds.seconds, source.device().info().name);
+    print_paging(source.paging());
     if (why)
       print_explained(
           *why, scene, o,
