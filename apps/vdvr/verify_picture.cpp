@@ -124,11 +124,11 @@ Again made_again(const CommonOptions& common, const CertifiedPicture& picture, c
   again.same_device = device.info().name == picture.device && device.info().driver == picture.driver;
   try {
     // As render does: what needs more memory first.
-    const bool colours = picture.options.mode == RenderMode::dvr;
-    if (colours) certify_again(shown, picture, file, progress, again);
+    const bool on_device = picture.options.mode == RenderMode::dvr && !picture.lit;
+    if (on_device) certify_again(shown, picture, file, progress, again);
     again.drawn = shown.draw(picture.options, progress);
     throw_if_stopped();
-    if (!colours) certify_again(shown, picture, file, progress, again);
+    if (!on_device) certify_again(shown, picture, file, progress, again);
   } catch (const InputError& e) {
     throw FileError(fmt::format("{}: does not describe a picture: {}", name, e.what()));
   }

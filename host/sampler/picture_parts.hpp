@@ -1,5 +1,5 @@
 // A picture of a volume that comes by bricks, in parts whose bricks fit the device. Called by paged_frame.cpp
-// and paged_bounds.cpp.
+// and pixel_bounds.cpp.
 #pragma once
 
 #include <cstdint>

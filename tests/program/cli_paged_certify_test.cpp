@@ -60,6 +60,7 @@ Made made(const Words& more) {
 BOOST_AUTO_TEST_CASE(certified_pictures_by_bricks_are_those_of_the_whole_volume_byte_for_byte) {
   const std::vector<Words> modes{{"--no-shading", "--explain", "36,28"},
                                  {"--clip", "-9,-20,-20,20,5,20"},
+                                 {"--certify-light", "lit"},
                                  {"--mode", "iso"},
                                  {"--mode", "mip"},
                                  {"--mode", "integral"},
