@@ -8,6 +8,7 @@
 #include <random>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
 #include "vdvr/error.hpp"
@@ -36,11 +37,20 @@ struct Again {
   MaximumBounds maxima;      ///< of mip
   IntegralBounds integrals;  ///< of integral
   SurfaceBounds surface;     ///< of iso
+  std::pair<float, float> value_range;
   bool same_device = false;
 };
 void certify_again(Device& device, const ResidentVolume& resident, const CertifiedPicture& picture,
                    const VdvrFile& file, const Progress& progress, Again& again) {
   const RenderOptions& o = picture.options;
+  again.value_range = resident.value_range();
+  if (picture.lit) {
+    again.bounds =
+        certify_lit_pixels(file.volume, brick_bounds(file.certificate, false),
+                           known_clip(file.certificate.covered.value_or(picture.covered), file.certificate),
+                           again.value_range, o, picture.certify, progress);
+    return;
+  }
   if (o.mode == RenderMode::dvr) {
     again.bounds =
         certify_pixels(device, resident, brick_bounds(file.certificate, o.sampler == SamplerKind::image3d), o,
@@ -95,7 +105,9 @@ void check_colours(const Field& field, const CertifiedPicture& picture, const Gr
                    std::size_t i, RayCheck& check) {
   const auto at = static_cast<std::int64_t>(i);
   const RenderOptions& o = picture.options;
-  const IdealPixel ideal = ideal_pixel(field, o, grid, at % o.width, at / o.width, kRayStep);
+  const std::int64_t x = at % o.width, y = at / o.width;
+  const IdealPixel ideal = picture.lit ? ideal_lit_pixel(field, again.value_range, o, grid, x, y, kRayStep)
+                                       : ideal_pixel(field, o, grid, x, y, kRayStep);
   for (std::size_t c = 0; c < 3; ++c)
     take(check, ideal.rgb[c],
          static_cast<double>(again.bounds.lo.values[3 * i + c]) - ideal.quadrature - 0x1p-12,
@@ -277,7 +289,7 @@ void compare_surface(const Json& claims, const SurfaceBounds& surface, std::vect
 }
 
 std::string line_of(const Again& again, const PictureBound& bound, const VdvrFile& file, RenderMode mode) {
-  if (mode != RenderMode::iso) return bound_line(bound, file.certificate);
+  if (mode != RenderMode::iso) return bound_line(bound, file.certificate, again.bounds.light);
   return fmt::format("{:.1f} % of the pixels show the surface for sure, {:.1f} % may, {:.1f} % do not",
                      100 * again.surface.share(2), 100 * again.surface.share(1),
                      100 * again.surface.share(0));
@@ -319,8 +331,9 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
   if (iso) compare_surface(claims.iso, again.surface, wrong);
   else compare(claims, bound, again, wrong);
   std::optional<RayCheck> rays;
-  const bool lit = mode == RenderMode::dvr && picture.options.shading;
-  if (args.has("projections") && !lit) rays = check_rays(args, picture, file, again, progress.callback());
+  const bool as_drawn = mode == RenderMode::dvr && picture.options.shading && !picture.lit;
+  if (args.has("projections") && !as_drawn)
+    rays = check_rays(args, picture, file, again, progress.callback());
   if (rays && rays->outside > 0)
     wrong.push_back(fmt::format("F lies outside of what is certain in {} places", rays->outside));
   progress.clear();
@@ -342,7 +355,7 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
           "  F along {} random rays: {} times outside{}\n", rays->rays, rays->outside,
           iso ? "" : fmt::format("; it takes at most {:.0f} % of half an interval", 100 * rays->worst));
     else if (args.has("projections"))
-      fmt::print("  F was not evaluated: the picture has light, which no field of F alone gives\n");
+      fmt::print("  F was not evaluated: the picture is under the light of V\n");
   });
   if (!wrong.empty()) throw MismatchError(fmt::format("{}: {}", certificate_path.string(), wrong.front()));
   return 0;

@@ -21,6 +21,8 @@ namespace {
 
 constexpr std::int64_t side = 64;
 constexpr double step = 1.0 / 32;
+// The prototype's: on black every level is a ninth more, or an eighth.
+constexpr reference::Rgb3 background{0.1, 0.1, 0.1};
 
 struct Scene {
   support::AnalyticField field;
@@ -47,7 +49,7 @@ Scene scene_of(const std::string& name, std::int64_t cells, std::uint8_t level) 
   o.width = o.height = side;
   o.shading = false;
   o.sampler = SamplerKind::buffer;
-  o.background_top = o.background_bottom = {0, 0, 0};
+  o.background_top = o.background_bottom = background;
   o.camera = orbit_camera(s.volume.grid, 30, 20, 1.35);
   const auto pixels = static_cast<std::size_t>(side * side);
   s.f.resize(pixels);
@@ -102,7 +104,7 @@ struct Column {
 Column bounds_of(const Scene& s, const TransferFunction& transfer, const PixelBounds& b) {
   Column bound;
   for (const std::size_t i : s.hit) {
-    const reference::Rgb3 v = support::colour_of(s.v[i], transfer.points, {0, 0, 0});
+    const reference::Rgb3 v = support::colour_of(s.v[i], transfer.points, background);
     double most = 0;
     for (std::size_t c = 0; c < 3; ++c)
       most = std::max({most, static_cast<double>(b.hi.values[3 * i + c]) - v[c],
@@ -127,8 +129,8 @@ double reached(const Scene& s, const TransferFunction& transfer, const PixelBoun
       const std::size_t i = chosen[static_cast<std::size_t>(k)];
       for (std::size_t c = 0; c < 3; ++c)
         known[static_cast<std::size_t>(k)] +=
-            support::adversary_of(s.v[i], s.e[i], transfer.points, {0, 0, 0}, c, true) -
-            support::adversary_of(s.v[i], s.e[i], transfer.points, {0, 0, 0}, c, false);
+            support::adversary_of(s.v[i], s.e[i], transfer.points, background, c, true) -
+            support::adversary_of(s.v[i], s.e[i], transfer.points, background, c, false);
     });
   }
   for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -153,8 +155,8 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
   Column truth, bound = bounds_of(s, transfer, b);
   double parts = 0;
   for (const std::size_t i : s.hit) {
-    const reference::Rgb3 f = support::colour_of(s.f[i], transfer.points, {0, 0, 0}),
-                          v = support::colour_of(s.v[i], transfer.points, {0, 0, 0});
+    const reference::Rgb3 f = support::colour_of(s.f[i], transfer.points, background),
+                          v = support::colour_of(s.v[i], transfer.points, background);
     double off = 0;
     for (std::size_t c = 0; c < 3; ++c) off = std::max(off, std::abs(f[c] - v[c]));
     truth.levels.push_back(255 * off);
