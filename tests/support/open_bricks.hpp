@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "host/certify/open_bricks.hpp"
+#include "host/closing/open_bricks.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr::support {
@@ -26,7 +26,7 @@ struct Case {
 
 inline const std::vector<LevelTriple> isotropic{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
 inline const std::vector<LevelTriple> anisotropic{{0, 0, 0}, {1, 1, 1}, {0, 2, 1}, {2, 0, 0},
-                                           {0, 1, 0}, {1, 0, 2}, {2, 2, 2}};
+                                                  {0, 1, 0}, {1, 0, 2}, {2, 2, 2}};
 
 inline std::int64_t id_of(const Index3& bricks, const Index3& p) {
   return (p[2] * bricks[1] + p[1]) * bricks[0] + p[0];
