@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/vdvr/certified_drawing.hpp"
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
 #include "apps/vdvr/picture_light.hpp"
@@ -65,16 +66,6 @@ CertifyPictureOptions certify_options(const Arguments& args, const Certificate& 
   return c;
 }
 
-/// The steps in which the picture is drawn are a part of its bound, so they are fine unless they were chosen.
-void refine_drawing(const Arguments& args, RenderOptions& o, double theta) {
-  if (!args.has("step") && !args.has("classification") && !args.has("step-mode")) {
-    o.classification = Classification::preintegrated;
-    o.step_mode = StepMode::fixed;  // a pre-integrated table is of one step
-  }
-  o.termination = 1 - theta;
-  if (o.gradient == GradientKind::automatic) o.gradient = GradientKind::central;
-}
-
 std::vector<std::string> overlay_names(const Overlay& overlay) {
   std::vector<std::string> names;
   if (overlay.axes) names.emplace_back("axes");
@@ -92,29 +83,6 @@ std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds
   return {bound_line(bound, certificate, bounds.light),
           fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
                       text_of(bounds.light))};
-}
-
-/// What was drawn and what is proved of it: of a slice the picture without its frame.
-struct Made {
-  RenderResult drawn;
-  PixelBounds bounds;
-};
-/// `known`: where F is, of pictures under its own light.
-Made draw_and_certify(Source& source, const RenderOptions& o, const CertifyPictureOptions& options,
-                      const std::optional<Clip>& known, const Progress& progress) {
-  report(progress, "draw", 0);
-  Made made{source.draw(o), {}};
-  throw_if_stopped();
-  report(progress, "certify", 0);
-  if (o.mode == RenderMode::slice) {
-    made.bounds = certify_slice(source.scene().volume, *source.scene().certificate, o, progress);
-    clear_absent(made.drawn.image, made.bounds);
-  } else if (known) {
-    made.bounds = certify_lit(source, *known, o, options, progress);
-  } else {
-    made.bounds = source.certify(o, options, progress);
-  }
-  return made;
 }
 
 /// The slice alone where there is a frame around it.
@@ -205,8 +173,8 @@ struct Show {
   std::int64_t width = 0, height = 0;  ///< asked for; a slice in a frame is smaller
 };
 
-void write_picture(const Outputs& out, Show& show, Made& made, const PictureBound& bound, const Scene& scene,
-                   const RenderOptions& o, const Overlay& overlay) {
+void write_picture(const Outputs& out, Show& show, CertifiedDrawing& made, const PictureBound& bound,
+                   const Scene& scene, const RenderOptions& o, const Overlay& overlay) {
   if (show.what != "colour") {
     write_shown(out, show.what, made.bounds, bound);
     return;
@@ -223,7 +191,7 @@ void write_picture(const Outputs& out, Show& show, Made& made, const PictureBoun
 
 /// Prints what was found. Throws MismatchError where --picture-tolerance is not met.
 int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
-        const Outputs& out, const Made& made, const PictureBound& bound, const Json& json) {
+        const Outputs& out, const CertifiedDrawing& made, const PictureBound& bound, const Json& json) {
   const Scene& scene = source.scene();
   const auto why = explained(args, scene, o, made.bounds.sampler);
   const std::optional<PixelsBeyond> beyond = pixels_beyond(args, bound);
@@ -368,9 +336,11 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   } else {
     o.clip = certified_clip(args, scene, o, progress);
     if (lit) cut_to_differences(*o.clip, covered, scene.volume.grid);
-    refine_drawing(args, o, options.theta);
+    prepare_drawing(args, o, options.theta);
   }
-  Made made = draw_and_certify(source, o, options, lit ? std::optional(covered) : std::nullopt, progress);
+  const Asked asked{options, lit ? std::optional(covered) : std::nullopt, args.number("picture-tolerance")};
+  CertifiedDrawing made = draw_and_certify(source, o, asked, progress);
+  if (!show.slice && !chose_steps(args)) draw_finer(source, o, asked, made, progress);
   o.sampler = made.drawn.sampler;
   const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
   CertifiedPicture picture{o,

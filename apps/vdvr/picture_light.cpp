@@ -45,6 +45,13 @@ void check_picture_light(const Arguments& args, const RenderOptions& o) {
 
 void cut_to_differences(Clip& clip, const Clip& known, const Grid& grid) {
   const Clip inside = inside_of_differences(known, grid);
+  for (std::size_t a = 0; a < 3; ++a)
+    if (!(inside.low[a] < inside.high[a]))
+      throw InputError(
+          fmt::format("--certify-light lit: light of F needs half a base cell to either side, and along {} "
+                      "no more than one cell "
+                      "is covered: take --certify-light as-drawn",
+                      "xyz"[a]));
   cut(clip, inside.low, inside.high);
   clip.radius = std::min(clip.radius, inside.radius);
   require_some(clip);

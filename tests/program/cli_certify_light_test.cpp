@@ -152,8 +152,14 @@ BOOST_AUTO_TEST_CASE(options_that_do_not_fit_are_refused_before_anything_is_writ
   refused({"--certify", "--certify-light", "lit", "--mode", "iso", "--iso", "0.5"}, "--certify-light");
   refused({"--certify", "--certify-light", "lit", "--mode", "integral"}, "--certify-light");
   refused({"--certify", "--certify-light", "lit", "--certify-parts", "1e9"}, "certify_parts");
-  // Too thin for any difference.
   refused({"--certify", "--certify-light", "lit", "--clip", "900,900,-900,901,901,900"}, "--clip");
+  // Too thin for any difference.
+  const std::string sheet = at("sheet.vdvr");
+  const Ended flat =
+      run({"build", small_scan(), "--epsilon", "20%", "--roi=-6,-6,-0.4,6,6,0.4", "-o", sheet});
+  BOOST_REQUIRE_MESSAGE(flat.code == 0, flat.err);
+  check_refused({"render", sheet, "--certify", "--certify-light", "lit", "-o", out},
+                "along z no more than one cell");
   const std::string volume = at("window.vdvr");
   const Ended built = run({"build", small_scan(), "--epsilon", "20%", "--window", "0.2,0.8", "-o", volume});
   BOOST_REQUIRE_MESSAGE(built.code == 0, built.err);
