@@ -121,6 +121,7 @@ VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, doub
 struct IdealPixel {
   std::array<double, 3> rgb{0, 0, 0};
   double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
+  double light = 0;       ///< what rounding of the light that is drawn may move a channel by
   std::size_t points = 0;
 };
 /// The ray of a pixel within the grid and `options.clip`, and the middles of its steps.
@@ -143,5 +144,11 @@ VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const st
 VDVR_API IdealPixel ideal_lit_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
                                     const std::pair<float, float>& value_range, const RenderOptions& options,
                                     const Grid& grid, std::int64_t x, std::int64_t y, double step);
+/// The same under the light that V was drawn with by the buffer sampler and `gradient` central: of V's
+/// differences in the middles of intervals of `options.step`. `volume`: V.
+VDVR_API IdealPixel
+ideal_drawn_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                  const MixedVolume& volume, const std::pair<float, float>& value_range,
+                  const RenderOptions& options, std::int64_t x, std::int64_t y, double step);
 
 }  // namespace vdvr

@@ -70,6 +70,7 @@ BOOST_AUTO_TEST_CASE(the_certificate_says_that_light_is_that_of_f_and_holds_less
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   const Json drawn = Json::parse(r.out);
   BOOST_TEST(drawn.at("light") == "as drawn");
+  check_held(small_volume(), at("drawn.certificate.json"), small_scan());
   BOOST_TEST(lit.at("levels").at("mean").get<double>() > drawn.at("levels").at("mean").get<double>());
   // Differences over one cell are known half a cell within what is covered.
   const Json &inner = lit.at("picture").at("clip"), &outer = drawn.at("picture").at("clip");
