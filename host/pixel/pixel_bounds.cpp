@@ -26,7 +26,7 @@ namespace {
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
 
-static_assert(sizeof(VdvrCertify) == 88);
+static_assert(sizeof(VdvrCertify) == 112);
 
 constexpr double kUnit = 0x1p-24;
 // Of the list of pieces; what a picture needs beyond is made by bands of fewer rows.
@@ -46,8 +46,6 @@ void check(const Impl& v, const std::vector<float>& bounds, const RenderOptions&
     throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), v.host_ranges.size()));
   if (!(c.kappa >= 0x1p-10 && c.kappa <= 1024))
     throw InputError(fmt::format("`certify_parts` kappa {} must lie between 1/1024 and 1024", c.kappa));
-  if (c.chord && c.fast)
-    throw InputError("chord steps need what lies behind a part, which the one pass of `fast` does not know");
   if (!(c.theta > 0 && c.theta < 1))
     throw InputError(fmt::format("termination {} of a certified picture must lie in (0, 1)", c.theta));
   if (c.window && !is_clear_outside(o.transfer, *c.window))
@@ -102,8 +100,13 @@ VdvrCertify make_certify(const Impl& v, const RenderOptions& o, const CertifyPic
   // Of theorem 6 too. The background is interpolated: 5 u of a quotient, and four roundings.
   q.first_error = static_cast<float>(10 * kUnit * most);
   q.sum_error = static_cast<float>(kUnit / 2 * std::exp2(std::ceil(std::log2(most))));
-  const int of_share = c.fast ? VDVR_FAST_ROUNDING : c.chord ? VDVR_CHORD_ROUNDING : VDVR_BOX_ROUNDING;
-  q.share_error = static_cast<float>(of_share * kUnit * most);
+  q.share_error = static_cast<float>((c.fast ? VDVR_FAST_ROUNDING : VDVR_STEP_ROUNDING) * kUnit * most);
+  q.joint_rounding = static_cast<float>(VDVR_JOINT_ROUNDING * kUnit * most);
+  q.extinction_error = table.extinction_error;
+  q.joint_error = 5 * static_cast<float>(most) * table.extinction_error;
+  q.first_edge = table.first_edge;
+  q.first_bend = table.first_bend;
+  q.or_clear = c.window ? 1 : 0;
   return q;
 }
 
@@ -126,7 +129,7 @@ opencl::Defines with_kernel(opencl::Defines defines, const CertifyPictureOptions
   for (auto& [name, value] : defines)
     if (name == "VDVR_KERNEL") value = c.fast ? "VDVR_KERNEL_CERTIFY_FAST" : "VDVR_KERNEL_CERTIFY";
   defines.push_back({"VDVR_LIGHT", light ? "1" : "0"});
-  defines.push_back({"VDVR_CHORD", c.chord ? "1" : "0"});
+  defines.push_back({"VDVR_JOINT", c.box || c.fast ? "0" : "1"});
   return defines;
 }
 
