@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/vdvr/certified_drawing.hpp"
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
+#include "apps/vdvr/picture_light.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/explain_pixel.hpp"
@@ -64,16 +66,6 @@ CertifyPictureOptions certify_options(const Arguments& args, const Certificate& 
   return c;
 }
 
-/// The steps in which the picture is drawn are a part of its bound, so they are fine unless they were chosen.
-void refine_drawing(const Arguments& args, RenderOptions& o, double theta) {
-  if (!args.has("step") && !args.has("classification") && !args.has("step-mode")) {
-    o.classification = Classification::preintegrated;
-    o.step_mode = StepMode::fixed;  // a pre-integrated table is of one step
-  }
-  o.termination = 1 - theta;
-  if (o.gradient == GradientKind::automatic) o.gradient = GradientKind::central;
-}
-
 std::vector<std::string> overlay_names(const Overlay& overlay) {
   std::vector<std::string> names;
   if (overlay.axes) names.emplace_back("axes");
@@ -86,30 +78,11 @@ std::vector<std::string> overlay_names(const Overlay& overlay) {
 std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds& bounds,
                                     const Certificate& certificate, bool slice) {
   if (slice)
-    return {bound_line(bound, certificate), "Certified: F at the middles of pixels, where it is covered."};
-  return {bound_line(bound, certificate),
+    return {bound_line(bound, certificate, bounds.light),
+            "Certified: F at the middles of pixels, where it is covered."};
+  return {bound_line(bound, certificate, bounds.light),
           fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
                       text_of(bounds.light))};
-}
-
-/// What was drawn and what is proved of it: of a slice the picture without its frame.
-struct Made {
-  RenderResult drawn;
-  PixelBounds bounds;
-};
-Made draw_and_certify(Source& source, const RenderOptions& o, const CertifyPictureOptions& options,
-                      const Progress& progress) {
-  report(progress, "draw", 0);
-  Made made{source.draw(o), {}};
-  throw_if_stopped();
-  report(progress, "certify", 0);
-  if (o.mode == RenderMode::slice) {
-    made.bounds = certify_slice(source.scene().volume, *source.scene().certificate, o, progress);
-    clear_absent(made.drawn.image, made.bounds);
-  } else {
-    made.bounds = source.certify(o, options, progress);
-  }
-  return made;
 }
 
 /// The slice alone where there is a frame around it.
@@ -200,8 +173,8 @@ struct Show {
   std::int64_t width = 0, height = 0;  ///< asked for; a slice in a frame is smaller
 };
 
-void write_picture(const Outputs& out, Show& show, Made& made, const PictureBound& bound, const Scene& scene,
-                   const RenderOptions& o, const Overlay& overlay) {
+void write_picture(const Outputs& out, Show& show, CertifiedDrawing& made, const PictureBound& bound,
+                   const Scene& scene, const RenderOptions& o, const Overlay& overlay) {
   if (show.what != "colour") {
     write_shown(out, show.what, made.bounds, bound);
     return;
@@ -218,7 +191,7 @@ void write_picture(const Outputs& out, Show& show, Made& made, const PictureBoun
 
 /// Prints what was found. Throws MismatchError where --picture-tolerance is not met.
 int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
-        const Outputs& out, const Made& made, const PictureBound& bound, const Json& json) {
+        const Outputs& out, const CertifiedDrawing& made, const PictureBound& bound, const Json& json) {
   const Scene& scene = source.scene();
   const auto why = explained(args, scene, o, made.bounds.sampler);
   const std::optional<PixelsBeyond> beyond = pixels_beyond(args, bound);
@@ -229,13 +202,14 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
   if (why) printed["explain"] = explained_json(*why);
   print_result(common, printed, [&] {
     const bool slice = o.mode == RenderMode::slice;
-    fmt::print("{}\n", bound_line(bound, *scene.certificate));
+    fmt::print("{}\n", bound_line(bound, *scene.certificate, made.bounds.light));
     fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", out.picture.string(), o.width, o.height,
                slice ? "" : fmt::format(", light {}", text_of(made.bounds.light)), out.bound.string(),
                out.certificate.string());
     if (!slice)
       fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
-                 made.drawn.seconds, made.bounds.seconds, source.device().info().name);
+                 made.drawn.seconds, made.bounds.seconds,
+                 made.bounds.light == CertifiedLight::lit ? "the host" : source.device().info().name);
     if (why)
       print_explained(
           *why, scene, o,
@@ -253,6 +227,12 @@ void check_file(const Arguments& args, const Scene& scene, const RenderOptions& 
   if (scene.certificate->comparison)
     throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
   const auto& window = scene.certificate->window;
+  if (window && asks_lit(args))
+    throw InputError(
+        fmt::format("{}: was certified within --window {:.6g},{:.6g}; differences of F across its ends are "
+                    "unknown, and so is "
+                    "its light: take --certify-light as-drawn, or build without --window",
+                    name, window->first, window->second));
   if (window && o.mode == RenderMode::slice)
     throw InputError(fmt::format(
         "{}: was certified within --window {:.6g},{:.6g}; where F lies outside of it is unknown, so that no "
@@ -286,11 +266,13 @@ void add_certify(Arguments& args) {
       .value("explain", "X,Y",
              "what makes the bound of this pixel: bricks, and points of the transfer function")
       .value("picture-tolerance", "N", "exit with 1 where a pixel is not certain to N levels of 255");
+  add_picture_light(args);
 }
 
 bool asks_certify(const Arguments& args) { return args.has("certify") || args.has("picture-tolerance"); }
 
 void check_certify(const Arguments& args, const RenderOptions& o) {
+  check_picture_light(args, o);
   const std::string show = args.text_or("show", "colour");
   const bool of_bounds = std::find(kShown.begin(), kShown.end(), show) != kShown.end();
   if (!asks_certify(args)) {
@@ -341,6 +323,7 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
+  const bool lit = asks_lit(args);
   const CertifyPictureOptions options = certify_options(args, certificate, o);
   Show show;
   show.what = args.text_or("show", "colour");
@@ -352,13 +335,17 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
     show.frame = set_slice(o, scene, !show.framed);
   } else {
     o.clip = certified_clip(args, scene, o, progress);
-    refine_drawing(args, o, options.theta);
+    if (lit) cut_to_differences(*o.clip, covered, scene.volume.grid);
+    prepare_drawing(args, o, options.theta);
   }
-  Made made = draw_and_certify(source, o, options, progress);
+  const Asked asked{options, lit ? std::optional(covered) : std::nullopt, args.number("picture-tolerance")};
+  CertifiedDrawing made = draw_and_certify(source, o, asked, progress);
+  if (!show.slice && !chose_steps(args)) draw_finer(source, o, asked, made, progress);
   o.sampler = made.drawn.sampler;
   const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
   CertifiedPicture picture{o,
                            options,
+                           lit,
                            {covered.radius, {covered.low[2], covered.high[2]}},
                            certificate.content_sha256,
                            output.filename().string(),

@@ -49,12 +49,16 @@ Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& pro
         fmt::format("{}: does not say where it is covered, since an earlier version wrote it; "
                     "name its scan by --covered-from, or build it again",
                     name_of(args)));
+  return known_clip(*covered, c);
+}
+
+Clip known_clip(const CoveredCylinder& covered, const Certificate& certificate) {
   Clip clip;
-  clip.radius = covered->radius;
-  clip.low[2] = covered->z.first;
-  clip.high[2] = covered->z.second;
-  if (c.roi) {
-    const std::array<double, 6>& r = *c.roi;
+  clip.radius = covered.radius;
+  clip.low[2] = covered.z.first;
+  clip.high[2] = covered.z.second;
+  if (certificate.roi) {
+    const std::array<double, 6>& r = *certificate.roi;
     cut(clip, {r[0], r[1], r[2]}, {r[3], r[4], r[5]});
   }
   return clip;

@@ -13,6 +13,8 @@ void add_clip(Arguments& args);
 /// not say, from the scan that --covered-from names. Throws InputError for a scene without certificate, and
 /// for a file that does not say where no scan is named.
 Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& progress);
+/// The certificate's cylinder, cut with its region of interest: where bounds speak of F.
+Clip known_clip(const CoveredCylinder& covered, const Certificate& certificate);
 /// What the options ask for; nothing where they ask for nothing. Throws as covered_clip.
 std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Progress& progress);
 /// Cuts `clip` to what also lies in `box`.

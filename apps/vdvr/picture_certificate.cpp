@@ -190,6 +190,10 @@ void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPic
   o.clip = clip_of(j.at("clip"));
 }
 
+/// Light of F has box steps alone, and the one pass has them too.
+const char* text_of_step(const CertifiedPicture& picture) {
+  return picture.certify.box || picture.certify.fast || picture.lit ? "box" : "joint";
+}
 /// Files without the member are older than joint steps.
 bool is_box(const std::string& step, const std::filesystem::path& path) {
   if (step != "box" && step != "joint")
@@ -233,6 +237,12 @@ std::string statement_of(RenderMode mode, CertifiedLight light) {
            "pixel's band where the pixel is sure; nowhere where it is none; and not before the band's "
            "beginning "
            "where it is possible.";
+  if (light == CertifiedLight::lit)
+    return "In every pixel and channel the ideal picture, continuous emission and absorption over F under "
+           "the "
+           "light of F's own differences over one base cell, inside the covered region and half a base cell "
+           "from "
+           "its rim, differs from the drawn one by at most the bound of that pixel.";
   return fmt::format(
       "In every pixel and channel the ideal picture, continuous emission and absorption over F inside the "
       "covered region{}, differs from the drawn one by at most the bound of that pixel.",
@@ -306,7 +316,7 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
           {"kappa", picture.certify.kappa},
           {"theta", picture.certify.theta},
           {"fast", picture.certify.fast},
-          {"step", picture.certify.box || picture.certify.fast ? "box" : "joint"},
+          {"step", text_of_step(picture)},
           {"device", picture.device},
           {"driver", picture.driver},
           {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
@@ -348,6 +358,8 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.covered.z = {z[0], z[1]};
     picture.options.sampler =
         j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
+    picture.lit = picture.options.mode == RenderMode::dvr && picture.options.shading &&
+                  j.at("light").get<std::string>() == text_of(CertifiedLight::lit);
     if (picture.options.mode == RenderMode::iso)
       return {std::move(picture), {j.at("statement").get<std::string>(), "", 0, 0, {}, 0, j.at("iso")}};
     return {std::move(picture),
@@ -363,12 +375,12 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
   }
 }
 
-std::string bound_line(const PictureBound& b, const Certificate& certificate) {
+std::string bound_line(const PictureBound& b, const Certificate& certificate, CertifiedLight light) {
   std::string line = fmt::format(
       "certain: {:.0f} % of the pixels to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst {:.1f}",
       100 * b.within[2].second, 100 * b.within[3].second, b.mean, b.max);
-  // The bound is linear in epsilon (docs/pixel-bounds.md).
-  if (b.mean > 1)
+  // The bound is linear in epsilon (docs/pixel-bounds.md); under F's own light it is not, where any may fall.
+  if (b.mean > 1 && light != CertifiedLight::lit)
     line += fmt::format("; certain to 1 level in the mean near epsilon {:.2g}", certificate.epsilon / b.mean);
   if (b.untested > 0) line += fmt::format("; {} pixels see bricks that were not tested", b.untested);
   return line;

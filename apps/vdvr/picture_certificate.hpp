@@ -20,6 +20,7 @@ namespace vdvr::cli {
 struct CertifiedPicture {
   RenderOptions options;
   CertifyPictureOptions certify;
+  bool lit = false;  ///< the light is F's
   CoveredCylinder covered;
   std::string content_sha256, file, pixels_sha256,
       file_sha256;                    ///< of the volume; the picture, its rgb bytes before overlays, its file
@@ -58,7 +59,7 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
 /// The levels and shares that are compared when a picture is verified.
 Json bound_json(const PictureBound& bound);
 /// "certain: 58 % of the pixels to 4 levels of 255, ..."
-std::string bound_line(const PictureBound& bound, const Certificate& certificate);
+std::string bound_line(const PictureBound& bound, const Certificate& certificate, CertifiedLight light);
 std::string sha256_of_pixels(const Image& image);
 
 }  // namespace vdvr::cli

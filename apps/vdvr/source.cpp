@@ -139,6 +139,10 @@ PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOp
                         progress);
 }
 
+std::pair<float, float> Source::value_range() const {
+  return paged_ ? paged_->value_range() : resident_->value_range();
+}
+
 std::uint64_t Source::bytes() const {
   return field_ ? field_->bytes() : paged_ ? device_->peak_memory() : resident_->bytes();
 }

@@ -37,6 +37,8 @@ class Source {
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
   [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                                     const Progress& progress);
+  /// Of a volume's samples.
+  [[nodiscard]] std::pair<float, float> value_range() const;
   /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most
   /// so far.
   [[nodiscard]] std::uint64_t bytes() const;

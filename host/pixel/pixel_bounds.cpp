@@ -289,7 +289,9 @@ bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, 
   return true;
 }
 
-const char* text_of(CertifiedLight light) { return light == CertifiedLight::unlit ? "unlit" : "as drawn"; }
+const char* text_of(CertifiedLight light) {
+  return light == CertifiedLight::unlit ? "unlit" : light == CertifiedLight::lit ? "lit" : "as drawn";
+}
 
 PixelBounds certify_pixels(Device& device, const ResidentVolume& volume, const std::vector<float>& bounds,
                            const RenderOptions& options, const CertifyPictureOptions& certify,

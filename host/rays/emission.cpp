@@ -5,7 +5,11 @@
 namespace vdvr {
 namespace {
 
+// Three roundings of an opacity between two points.
+constexpr double rounding = 0x1p-50;
+
 double extinction(double opacity) {
+  if (!(opacity > 0)) return 0;
   return opacity >= 1 ? std::numeric_limits<double>::infinity() : -std::log1p(-opacity);
 }
 
@@ -21,6 +25,7 @@ MediumRanges::MediumRanges(const TransferFunction& transfer) {
 MediumRange MediumRanges::over(double low, double high) const {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   double least = infinity, most = 0;
+  bool opaque = true;
   MediumRange out;
   out.low.fill(infinity);
   out.high.fill(-infinity);
@@ -39,16 +44,18 @@ MediumRange MediumRanges::over(double low, double high) const {
     for (std::size_t c = 0; c < 3; ++c) p.rgb[c] = (1 - f) * a.rgb[c] + f * b.rgb[c];
     return p;
   };
-  if (low <= points_.front().value) take(points_.front(), points_.front());
-  if (high >= points_.back().value) take(points_.back(), points_.back());
-  for (std::size_t i = 0; i + 1 < points_.size(); ++i) {
-    const Point &a = points_[i], &b = points_[i + 1];
-    if (b.value < low || a.value > high) continue;
+  const auto stretch = [&](const Point& a, const Point& b) {
+    opaque &= a.opacity >= 1 && b.opacity >= 1;
     if (!(b.value > a.value)) take(a, b);
     else take(a.value < low ? cut(a, b, low) : a, b.value > high ? cut(a, b, high) : b);
-  }
-  out.tau_low = extinction(least);
-  out.tau_high = extinction(most);
+  };
+  if (low <= points_.front().value) stretch(points_.front(), points_.front());
+  if (high >= points_.back().value) stretch(points_.back(), points_.back());
+  for (std::size_t i = 0; i + 1 < points_.size(); ++i)
+    if (points_[i + 1].value >= low && points_[i].value <= high) stretch(points_[i], points_[i + 1]);
+  // Near opacity 1 extinction makes much of a rounding; only where all is opaque, nothing shines through.
+  out.tau_low = opaque ? infinity : extinction(least - rounding);
+  out.tau_high = most > 0 ? extinction(most + rounding) : 0;
   return out;
 }
 
@@ -58,13 +65,17 @@ double stepped(double behind, double colour, double tau, double length) {
   return colour + (behind - colour) * std::exp(-tau * length);
 }
 
-void step(ColourInterval& w, const MediumRange& r, double length) {
+}  // namespace
+
+void box_step(ColourInterval& w, const MediumRange& r, double length) {
   if (!(r.tau_high > 0)) return;
   for (std::size_t c = 0; c < 3; ++c) {
     w.high[c] = stepped(w.high[c], r.high[c], r.high[c] > w.high[c] ? r.tau_high : r.tau_low, length);
     w.low[c] = stepped(w.low[c], r.low[c], r.low[c] < w.low[c] ? r.tau_high : r.tau_low, length);
   }
 }
+
+namespace {
 
 int parts_of(const RayPiece& piece, double kappa) {
   const Cubic& b = piece.value;
@@ -104,15 +115,15 @@ ColourInterval colour_interval(const RayField& field, const WorldRay& ray, const
       const Cubic b = parts == 1 ? piece->value
                                  : part_of(piece->value, static_cast<double>(i) / parts,
                                            static_cast<double>(i + 1) / parts);
-      step(w, ranges.over(least(b) - piece->bound, largest(b) + piece->bound), length);
+      box_step(w, ranges.over(least(b) - piece->bound, largest(b) + piece->bound), length);
       ++steps;
     }
   }
   // Ten roundings a step.
-  const double rounding = 0x1p-53 * 16 * static_cast<double>(steps + 1);
+  const double summed = 0x1p-53 * 16 * static_cast<double>(steps + 1);
   for (std::size_t c = 0; c < 3; ++c) {
-    w.low[c] -= rounding;
-    w.high[c] += rounding;
+    w.low[c] -= summed;
+    w.high[c] += summed;
   }
   return w;
 }

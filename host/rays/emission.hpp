@@ -1,6 +1,6 @@
 // The interval that holds an ideal pixel's colour: box steps from the back to the front
 // (docs/pixel-bounds.md, theorem 3), with exact ranges of the transfer function. Double precision on the
-// host. Called by certified_rays.cpp.
+// host. Called by certified_rays.cpp, lit_emission.cpp.
 #pragma once
 
 #include <array>
@@ -36,6 +36,9 @@ class MediumRanges {
 struct ColourInterval {
   std::array<double, 3> low{}, high{};
 };
+
+/// The colours in front of a part of so many base cells, from those behind it.
+void box_step(ColourInterval& behind, const MediumRange& shown, double length);
 
 struct EmissionOptions {
   double kappa = 0.5;          ///< parts of a piece are as long as this share of the bound's width

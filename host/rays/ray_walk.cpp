@@ -48,6 +48,16 @@ RayField::RayField(const MixedVolume& volume, const std::vector<float>& bounds, 
   box_[5] = std::min(box_[5], coverage.heights().second);
 }
 
+RayField::RayField(const MixedVolume& volume, const std::vector<float>& bounds, const Clip& clip)
+    : volume_(volume), bounds_(bounds), bricks_(volume.bricks()), axis_(clip.axis), radius_(clip.radius) {
+  const Grid& g = volume.grid;
+  cell_ = std::min({g.spacing[0], g.spacing[1], g.spacing[2]});
+  for (std::size_t a = 0; a < 3; ++a) {
+    box_[a] = std::max(clip.low[a], g.origin[a]);
+    box_[a + 3] = std::min(clip.high[a], g.origin[a] + static_cast<double>(g.cells[a]) * g.spacing[a]);
+  }
+}
+
 std::pair<double, double> RayField::clipped(const WorldRay& ray) const {
   double first = 0, last = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < 3; ++a) {
@@ -61,9 +71,14 @@ std::pair<double, double> RayField::clipped(const WorldRay& ray) const {
     last = std::min(last, std::max(p, q));
   }
   // The cylinder about the axis: |o + t d| <= radius across z.
-  const double dd = ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1],
-               od = ray.origin[0] * ray.direction[0] + ray.origin[1] * ray.direction[1],
-               rest = ray.origin[0] * ray.origin[0] + ray.origin[1] * ray.origin[1] - radius_ * radius_;
+  const double ox = ray.origin[0] - axis_[0], oy = ray.origin[1] - axis_[1],
+               dd = ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1],
+               od = ox * ray.direction[0] + oy * ray.direction[1],
+               rest = ox * ox + oy * oy - radius_ * radius_;
+  if (!std::isfinite(radius_)) {
+    const double slack = inward * (std::abs(last) + cell_);
+    return {first > 0 ? first + slack : first, last - slack};
+  }
   if (dd < 1e-24) {
     if (rest > 0) return {0, 0};
   } else {

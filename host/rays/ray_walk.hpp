@@ -16,6 +16,7 @@
 #include "vdvr/camera.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/mixed_volume.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr {
 
@@ -57,6 +58,8 @@ class RayField {
   /// `bounds` by brick; `coverage`: beside it F is not defined. Refers to all of them.
   RayField(const MixedVolume& volume, const std::vector<float>& bounds, const Coverage& coverage,
            const std::optional<std::array<double, 6>>& roi = {});
+  /// The same within the grid and a clip.
+  RayField(const MixedVolume& volume, const std::vector<float>& bounds, const Clip& clip);
 
   /// The part of the ray within the covered cylinder, the grid and the region of interest, from the eye on,
   /// rounded inward; empty (first >= last) where it misses them.
@@ -66,6 +69,11 @@ class RayField {
   template <class Visit>
   void walk(const WorldRay& ray, Visit&& visit) const {
     const auto [first, last] = clipped(ray);
+    walk_between(ray, first, last, visit);
+  }
+  /// The same of a part of the ray that lies within the grid, up to rounding.
+  template <class Visit>
+  void walk_between(const WorldRay& ray, double first, double last, Visit&& visit) const {
     if (!(first < last)) return;
     Steps bricks(*this, ray, first, last);
     for (;;) {
@@ -129,6 +137,7 @@ class RayField {
   const std::vector<float>& bounds_;
   Index3 bricks_{};
   std::array<double, 6> box_{};
+  std::array<double, 2> axis_{0, 0};
   double radius_ = 0, cell_ = 1;
 };
 

@@ -46,9 +46,10 @@ VDVR_API double ending_share(double theta, const std::vector<float>& bounds,
 VDVR_API bool is_clear_outside(const TransferFunction& transfer, const std::pair<double, double>& window);
 
 /// What of the light is certified. as_drawn: colour and opacity of F under the light that V was drawn with, a
-/// function on the ray that the drawn step fixes.
-enum class CertifiedLight { unlit, as_drawn };
-/// "unlit", "as drawn".
+/// function on the ray that the drawn step fixes. lit: the light of F itself, of its differences over one
+/// base cell.
+enum class CertifiedLight { unlit, as_drawn, lit };
+/// "unlit", "as drawn", "lit".
 VDVR_API const char* text_of(CertifiedLight light);
 
 /// [y][x] an interval a channel, display values.
@@ -70,6 +71,20 @@ struct PixelBounds {
 VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume,
                                     const std::vector<float>& bounds, const RenderOptions& options,
                                     const CertifyPictureOptions& certify = {}, const Progress& progress = {});
+
+/// Where light of F is known of what is known of F in `known`: half a base cell within it, and within the
+/// grid.
+VDVR_API Clip inside_of_differences(const Clip& known, const Grid& grid);
+/// The same with the light of F itself (docs/pixel-bounds.md, section 7), on the host in double precision,
+/// for pictures with `gradient` central. `bounds` are of the buffer sampler and hold where `known` says. What
+/// is drawn beside inside_of_differences() may be under any light; such pixels count as untested.
+/// `value_range`: of V (ResidentVolume). Cost: 0.05 to 1 ms a ray of 64 cells. Throws InputError as
+/// certify_pixels(), and for `fast` and `chord`, a window, or a picture without light; Interrupted.
+VDVR_API PixelBounds certify_lit_pixels(const MixedVolume& volume, const std::vector<float>& bounds,
+                                        const Clip& known, const std::pair<float, float>& value_range,
+                                        const RenderOptions& options,
+                                        const CertifyPictureOptions& certify = {},
+                                        const Progress& progress = {});
 
 /// The same of a slice, whose `slice_range` says its greys: F at the middle of each pixel, by V and the bound
 /// of its brick. What is not covered, or outside the region of interest, is absent: clear_absent() makes a
@@ -103,10 +118,11 @@ VDVR_API Image picture_of_bound(const PictureBound& bound, const PixelBounds& bo
 /// Share of pixels whose ideal bytes all lie within `levels` of the drawn ones.
 VDVR_API double share_within(const PixelBounds& bounds, const Image& drawn, double levels);
 
-/// A pixel of the ideal picture, without light, by the field's values in the middles of steps of a ray.
+/// A pixel of the ideal picture by the field's values in the middles of steps of a ray.
 struct IdealPixel {
   std::array<double, 3> rgb{0, 0, 0};
   double quadrature = 0;  ///< how far three times longer steps are off; an estimate, no bound
+  double light = 0;       ///< what rounding of the light that is drawn may move a channel by
   std::size_t points = 0;
 };
 /// The ray of a pixel within the grid and `options.clip`, and the middles of its steps.
@@ -121,9 +137,19 @@ struct RaySteps {
 /// `step` in base cells, at most.
 VDVR_API RaySteps steps_of_pixel(const RenderOptions& options, const Grid& grid, std::int64_t x,
                                  std::int64_t y, double step);
-/// `field` gives values at world points, as ExactField::at. `step` in base cells.
+/// Without light. `field` gives values at world points, as ExactField::at. `step` in base cells.
 VDVR_API IdealPixel ideal_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
                                 const RenderOptions& options, const Grid& grid, std::int64_t x,
                                 std::int64_t y, double step);
+/// The same under the light of the field's differences over one base cell: seven values a step.
+VDVR_API IdealPixel ideal_lit_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                                    const std::pair<float, float>& value_range, const RenderOptions& options,
+                                    const Grid& grid, std::int64_t x, std::int64_t y, double step);
+/// The same under the light that V was drawn with by the buffer sampler and `gradient` central: of V's
+/// differences in the middles of intervals of `options.step`. `volume`: V.
+VDVR_API IdealPixel
+ideal_drawn_pixel(const std::function<std::vector<double>(const std::vector<Vec3>&)>& field,
+                  const MixedVolume& volume, const std::pair<float, float>& value_range,
+                  const RenderOptions& options, std::int64_t x, std::int64_t y, double step);
 
 }  // namespace vdvr

@@ -125,6 +125,35 @@ BOOST_AUTO_TEST_CASE(box_steps_hold_more_and_are_repeated_when_they_are_verified
                 "--certify");
 }
 
+BOOST_AUTO_TEST_CASE(where_the_drawing_would_be_much_of_the_bound_steps_are_shorter) {
+  const std::string volume = at("tight.vdvr"), tf = at("steep-tf.json");
+  write(tf, R"({"points": [{"value": 0.4, "rgb": [1, 0.5, 0], "opacity": 0},
+                           {"value": 0.6, "rgb": [0, 0.5, 1], "opacity": 0.95}]})");
+  const Ended built = run({"build", small_scan(), "--epsilon", "0.4%", "-o", volume});
+  BOOST_REQUIRE_MESSAGE(built.code == 0, built.err);
+  for (const Words& light : {Words{"--no-shading"}, Words{}}) {
+    const auto drawn = [&](const Words& more) {
+      Words words{"render", volume, "--certify",     "--size",  "48x48", "--tf",
+                  tf,       "-o",   at("tight.png"), "--force", "--json"};
+      words.insert(words.end(), light.begin(), light.end());
+      words.insert(words.end(), more.begin(), more.end());
+      const Ended r = run(words);
+      BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
+      return Json::parse(r.out);
+    };
+    const Json coarse = drawn({"--step", "1", "--classification", "preintegrated", "--step-mode", "fixed"}),
+               fine = drawn({});
+    BOOST_TEST(coarse.at("picture").at("step") == 1.0);
+    BOOST_TEST(fine.at("picture").at("step").get<double>() < 1);
+    BOOST_TEST(fine.at("levels").at("mean").get<double>() <
+               0.9 * coarse.at("levels").at("mean").get<double>());
+    const Ended v = run({"verify", volume, "--picture", at("tight.certificate.json")});
+    BOOST_TEST(v.code == 0, v.err);
+  }
+  // Wide bounds leave the step as it is.
+  BOOST_TEST(json_of(certificate()).at("picture").at("step") == 1.0);
+}
+
 BOOST_AUTO_TEST_CASE(a_picture_beyond_the_tolerance_ends_with_1_and_is_written) {
   const double worst = json_of(certificate()).at("levels").at("max").get<double>();
   const Ended no = run(certified("beyond.png", {"--picture-tolerance", std::to_string(worst / 2)}));
