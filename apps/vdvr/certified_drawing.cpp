@@ -20,7 +20,7 @@ PixelBounds certified(Source& source, const RenderOptions& o, const Asked& asked
 RenderResult drawn(Source& source, const RenderOptions& o, const Progress& progress) {
   throw_if_stopped();
   report(progress, "draw", 0);
-  return source.draw(o);
+  return source.draw(o, progress);
 }
 
 /// Of pixels that show something, levels of 255.
@@ -78,14 +78,15 @@ void prepare_drawing(const Arguments& args, RenderOptions& o, double theta) {
 
 CertifiedDrawing draw_and_certify(Source& source, const RenderOptions& o, const Asked& asked,
                                   const Progress& progress) {
-  CertifiedDrawing made{drawn(source, o, progress), {}};
   if (o.mode == RenderMode::slice) {
+    CertifiedDrawing made{drawn(source, o, progress), {}};
     made.bounds = certify_slice(source.scene().volume, *source.scene().certificate, o, progress);
     clear_absent(made.drawn.image, made.bounds);
-  } else {
-    made.bounds = certified(source, o, asked, progress);
+    return made;
   }
-  return made;
+  // First what needs more memory: where it is too little, the error says how much would do for both.
+  PixelBounds bounds = certified(source, o, asked, progress);
+  return {drawn(source, o, progress), std::move(bounds)};
 }
 
 void draw_finer(Source& source, RenderOptions& o, const Asked& asked, CertifiedDrawing& made,

@@ -198,6 +198,7 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
   Json printed = json;
   printed["output"] = out.picture.string();
   printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
+  printed["paging"] = paging_json(source.paging());
   if (beyond) printed["picture_tolerance"] = tolerance_json(*beyond);
   if (why) printed["explain"] = explained_json(*why);
   print_result(common, printed, [&] {
@@ -210,6 +211,7 @@ int say(const Arguments& args, const CommonOptions& common, Source& source, cons
       fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
                  made.drawn.seconds, made.bounds.seconds,
                  made.bounds.light == CertifiedLight::lit ? "the host" : source.device().info().name);
+    print_paging(source.paging());
     if (why)
       print_explained(
           *why, scene, o,

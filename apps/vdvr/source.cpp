@@ -17,6 +17,21 @@ const std::vector<std::string> kProjectionOptions{"cells",  "spacing",       "or
 
 }  // namespace
 
+Json paging_json(const std::optional<PagingCounts>& counts) {
+  if (!counts) return {};
+  return {{"parts", counts->parts},
+          {"bricks", counts->bricks},
+          {"bytes", counts->bytes},
+          {"largest_part_bytes", counts->largest_part}};
+}
+
+void print_paging(const std::optional<PagingCounts>& counts) {
+  if (!counts) return;
+  fmt::print("  by bricks    {} parts of pictures, {:.1f} MiB of tiles for the largest, {:.1f} MiB in all\n",
+             counts->parts, static_cast<double>(counts->largest_part) / (1 << 20),
+             static_cast<double>(counts->bytes) / (1 << 20));
+}
+
 const std::vector<std::string>& render_methods() {
   static const std::vector<std::string> names{"vdvr", "dvr", "d2vr"};
   return names;
@@ -114,7 +129,7 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
   scene_ = Scene{as_mixed(projections_->samples()), std::nullopt, false};
 }
 
-RenderResult Source::draw(const RenderOptions& options) {
+RenderResult Source::draw(const RenderOptions& options, const Progress& progress) {
   if (options.output == RenderOutput::error && !bounds_set_) {
     if (!scene_->certificate)
       throw InputError("--show error: the volume has no certificate to take bounds from");
@@ -125,15 +140,14 @@ RenderResult Source::draw(const RenderOptions& options) {
     else renderer_->set_bounds(bounds);
     bounds_set_ = true;
   }
-  return crew_ ? crew_->render(options) : renderer_->render(options);
+  return crew_ ? crew_->render(options, progress) : renderer_->render(options);
 }
 
 PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                             const Progress& progress) {
   if (paged_)
-    throw ResourceError(
-        "--certify: intervals of pixels need the whole volume on the device, which has no room for it: raise "
-        "--max-memory, or take another --device");
+    return certify_pixels(*device_, *paged_, brick_bounds(*scene_->certificate, false), options, certify,
+                          progress);
   const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
   return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify,
                         progress);

@@ -15,6 +15,11 @@
 
 namespace vdvr::cli {
 
+/// Null for a volume that is on the device as a whole.
+Json paging_json(const std::optional<PagingCounts>& counts);
+/// A line, or none.
+void print_paging(const std::optional<PagingCounts>& counts);
+
 const std::vector<std::string>& render_methods();
 void add_method(Arguments& args);
 /// A group of the options that only d2vr has, without the scan's (add_scan).
@@ -33,7 +38,8 @@ class Source {
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
   [[nodiscard]] Device& device() { return *device_; }
-  [[nodiscard]] RenderResult draw(const RenderOptions& options);
+  /// `progress` hears of pictures by several devices, or by bricks.
+  [[nodiscard]] RenderResult draw(const RenderOptions& options, const Progress& progress = {});
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
   [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                                     const Progress& progress);

@@ -14,6 +14,8 @@
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/paged_volume.hpp"
+#include "vdvr/render_crew.hpp"
 #include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
@@ -30,6 +32,44 @@ struct RayCheck {
 };
 using Field = std::function<std::vector<double>(const std::vector<Vec3>&)>;
 
+/// A volume on the device, whole where there is room for it, else by bricks.
+class Shown {
+ public:
+  Shown(Device& device, const VdvrFile& file, const RenderOptions& o, const std::string& name)
+      : device_(device), file_(file) {
+    if (file.volume.tiles.empty() || fits(device, file.volume)) {
+      whole_.emplace(device, file.volume);
+      return;
+    }
+    if (o.sampler == SamplerKind::image3d)
+      throw ResourceError(fmt::format(
+          "{}: was drawn with the image3d sampler, which needs the whole volume on the device: raise "
+          "--max-memory",
+          name));
+    by_bricks_.emplace(device, file.volume);
+  }
+
+  [[nodiscard]] RenderResult draw(const RenderOptions& o, const Progress& progress) const {
+    if (whole_) return raycast(device_, *whole_, o);
+    return RenderCrew({{&device_, nullptr, &*by_bricks_}}).render(o, progress);
+  }
+  [[nodiscard]] PixelBounds certify(const RenderOptions& o, const CertifyPictureOptions& certify,
+                                    const Progress& progress) const {
+    const auto bounds = brick_bounds(file_.certificate, o.sampler == SamplerKind::image3d);
+    return whole_ ? certify_pixels(device_, *whole_, bounds, o, certify, progress)
+                  : certify_pixels(device_, *by_bricks_, bounds, o, certify, progress);
+  }
+  [[nodiscard]] std::pair<float, float> value_range() const {
+    return whole_ ? whole_->value_range() : by_bricks_->value_range();
+  }
+
+ private:
+  Device& device_;
+  const VdvrFile& file_;
+  std::optional<ResidentVolume> whole_;  ///< or
+  std::optional<PagedVolume> by_bricks_;
+};
+
 /// The intervals again, of what this device draws.
 struct Again {
   RenderResult drawn;
@@ -41,11 +81,11 @@ struct Again {
   std::pair<float, float> value_range;
   bool same_device = false;
 };
-void certify_again(Device& device, const ResidentVolume& resident, const CertifiedPicture& picture,
-                   const VdvrFile& file, const Progress& progress, Again& again) {
+void certify_again(const Shown& shown, const CertifiedPicture& picture, const VdvrFile& file,
+                   const Progress& progress, Again& again) {
   const RenderOptions& o = picture.options;
   again.volume = &file.volume;
-  again.value_range = resident.value_range();
+  again.value_range = shown.value_range();
   if (picture.lit) {
     again.bounds =
         certify_lit_pixels(file.volume, brick_bounds(file.certificate, false),
@@ -54,9 +94,7 @@ void certify_again(Device& device, const ResidentVolume& resident, const Certifi
     return;
   }
   if (o.mode == RenderMode::dvr) {
-    again.bounds =
-        certify_pixels(device, resident, brick_bounds(file.certificate, o.sampler == SamplerKind::image3d), o,
-                       picture.certify, progress);
+    again.bounds = shown.certify(o, picture.certify, progress);
     return;
   }
   if (o.mode == RenderMode::slice) {
@@ -81,13 +119,16 @@ void certify_again(Device& device, const ResidentVolume& resident, const Certifi
 Again made_again(const CommonOptions& common, const CertifiedPicture& picture, const VdvrFile& file,
                  const std::string& name, const Progress& progress) {
   Device device = open_device(common);
-  const ResidentVolume resident(device, file.volume);
+  const Shown shown(device, file, picture.options, name);
   Again again;
   again.same_device = device.info().name == picture.device && device.info().driver == picture.driver;
   try {
-    again.drawn = raycast(device, resident, picture.options);
+    // As render does: what needs more memory first.
+    const bool on_device = picture.options.mode == RenderMode::dvr && !picture.lit;
+    if (on_device) certify_again(shown, picture, file, progress, again);
+    again.drawn = shown.draw(picture.options, progress);
     throw_if_stopped();
-    certify_again(device, resident, picture, file, progress, again);
+    if (!on_device) certify_again(shown, picture, file, progress, again);
   } catch (const InputError& e) {
     throw FileError(fmt::format("{}: does not describe a picture: {}", name, e.what()));
   }

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 #include "host/opencl/kernel.hpp"
 #include "host/render/frame.hpp"
 #include "host/sampler/paged_volume.hpp"
+#include "host/sampler/picture_parts.hpp"
 #include "host/sampler/resident_volume.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -59,10 +61,6 @@ struct FramePlan {
 float range_slack(Device& device, const FieldFacts& facts, SamplerKind sampler);
 /// What `automatic` stands for, stored ones having room or not. Throws InputError for stored ones of images.
 GradientKind choose_gradient(const RenderOptions& options, SamplerKind sampler, bool stored_fit);
-/// Pixels [x0, x1) x [y0, y1).
-struct PixelBox {
-  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-};
 /// Launches the kernel over pixels, and over more to the right and below: up to whole work-groups. `table` as
 /// Frame::prepare gave it.
 void draw_pixels(Frame& frame, const ResidentVolume::Impl& volume, const RenderOptions& options,
@@ -119,10 +117,13 @@ std::pair<SamplerKind, std::string> choose_sampler(SamplerKind asked);
 /// Whether GradientKind::automatic takes stored gradients: what a device of which half is free
 /// would do for the whole volume.
 bool stored_would_fit(const PagedVolume& volume);
+/// Is told of what was drawn.
+using Drawn = std::function<void(const PixelBox&)>;
 /// Draws part after part, and waits for each: bricks of the next take the place of those before. `frame` is
-/// of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render, and ResourceError
-/// where the bricks of a few pixels do not fit.
+/// of the volume's drawn_field(). `rows`: draws no others. Throws as Renderer::render, ResourceError where
+/// the bricks of a few pixels do not fit, and Interrupted.
 Enqueued enqueue_frame(Frame& frame, Device& device, const PagedVolume& volume, const RenderOptions& options,
-                       const RaycastTuning& tuning = {}, std::optional<Rows> rows = std::nullopt);
+                       const RaycastTuning& tuning = {}, std::optional<Rows> rows = std::nullopt,
+                       const Drawn& drawn = {});
 
 }  // namespace vdvr

@@ -14,6 +14,7 @@
 #include "host/render/check_render_options.hpp"
 #include "host/render/raycast.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/stop.hpp"
 
 namespace vdvr {
 
@@ -55,7 +56,7 @@ std::int64_t rows_together(std::int64_t height, std::size_t devices) {
 
 }  // namespace
 
-RenderResult RenderCrew::render(const RenderOptions& asked) {
+RenderResult RenderCrew::render(const RenderOptions& asked, const Progress& progress) {
   check_options(asked);
   auto& members = impl_->members;
   const auto start = std::chrono::steady_clock::now();
@@ -76,17 +77,25 @@ RenderResult RenderCrew::render(const RenderOptions& asked) {
   std::atomic<std::int64_t> next{0}, samples{0};
   std::atomic<bool> stop{false};
   std::exception_ptr failure;
-  std::mutex failure_lock;
+  std::mutex failure_lock, progress_lock;
+  std::int64_t drawn = 0;
+  const Drawn report_drawn = [&](const PixelBox& part) {
+    const std::lock_guard guard(progress_lock);
+    drawn += (part.x1 - part.x0) * (part.y1 - part.y0);
+    report(progress, "draw", static_cast<double>(drawn) / static_cast<double>(o.width * o.height));
+  };
   const auto work = [&](Impl::Part& m) {
     try {
       for (std::int64_t y = next.fetch_add(step); y < o.height && !stop; y = next.fetch_add(step)) {
         const Rows rows{y, std::min(y + step, o.height)};
         if (m.volume) enqueue_frame(m.frame, *m.device, *m.volume, o, {}, rows);
-        else enqueue_frame(m.frame, *m.device, *m.paged, o, {}, rows);
+        else enqueue_frame(m.frame, *m.device, *m.paged, o, {}, rows, report_drawn);
         m.frame.picture().read(std::span(pixels).subspan(static_cast<std::size_t>(y * o.width),
                                                          static_cast<std::size_t>((rows.end - y) * o.width)),
                                static_cast<std::uint64_t>(y * o.width));
         samples += m.frame.samples();
+        throw_if_stopped();
+        if (m.volume) report_drawn({0, rows.first, o.width, rows.end});
       }
     } catch (...) {
       const std::lock_guard guard(failure_lock);

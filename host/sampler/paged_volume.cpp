@@ -40,7 +40,7 @@ SampleBlock borrowed(const SampleBlock& b, std::uint64_t count) {
 }  // namespace
 
 PagedVolume::Impl::Impl(Device& device, const MixedVolume& v, std::uint64_t memory_bytes)
-    : state(&device.state()), volume(&v), grid(sampler_grid(v)) {
+    : state(&device.state()), volume(&v), grid(sampler_grid(v)), asked(memory_bytes) {
   check_drawn_grid(v.grid);
   find_kinds();
   facts = std::make_shared<const FieldFacts>(facts_of(v));
@@ -120,17 +120,20 @@ std::uint64_t PagedVolume::Impl::fixed_bytes(bool lit) const {
   return bytes;
 }
 
-bool PagedVolume::Impl::fits(std::uint64_t samples, std::uint64_t stored_bytes, std::uint64_t device_bytes,
-                             bool lit, std::uint64_t limit) const {
+std::uint64_t PagedVolume::Impl::device_bytes(std::uint64_t bricks_bytes, bool lit) const {
+  std::uint64_t bytes = fixed_bytes(lit) + bricks_bytes;
+  for (const std::uint32_t brick : anchors) bytes += bytes_of(brick, lit);
+  return bytes;
+}
+
+bool PagedVolume::Impl::is_addressable(std::uint64_t samples, std::uint64_t stored_bytes, bool lit) const {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
   std::uint64_t all_samples = volume->base.size() + samples, all_bytes = volume->base.bytes() + stored_bytes;
-  std::uint64_t on_device = fixed_bytes(lit) + device_bytes;
-  for (const std::uint32_t brick : anchors) {  // counted twice at most
+  for (const std::uint32_t brick : anchors) {
     all_samples += samples_of(brick);
     all_bytes += stored_bytes_of(brick) + 4;
-    on_device += bytes_of(brick, lit);
   }
-  if (on_device > limit || all_bytes > state->info.max_allocation) return false;
+  if (all_bytes > state->info.max_allocation) return false;
   return !lit || (all_samples <= most && 8 * all_samples <= state->info.max_allocation);
 }
 

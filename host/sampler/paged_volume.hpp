@@ -1,5 +1,5 @@
 // What a PagedVolume knows of its bricks, and how the tiles of some of them become a volume on the device.
-// Called by paged_frame.cpp, renderer.cpp.
+// Called by picture_parts.cpp, paged_frame.cpp, pixel_bounds.cpp.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,10 @@ struct PagedVolume::Impl {
   [[nodiscard]] std::uint64_t bytes_of(std::size_t brick, bool lit) const;
   /// What is on the device with any part.
   [[nodiscard]] std::uint64_t fixed_bytes(bool lit) const;
-  /// Whether bricks with so many samples, and so many bytes of them as they are stored, fit beside that
-  /// within `limit`.
-  [[nodiscard]] bool fits(std::uint64_t samples, std::uint64_t stored_bytes, std::uint64_t device_bytes,
-                          bool lit, std::uint64_t limit) const;
+  /// With a part whose bricks take so much, counting the bricks that every part has twice at most.
+  [[nodiscard]] std::uint64_t device_bytes(std::uint64_t bricks_bytes, bool lit) const;
+  /// Whether buffers can hold a part with so many samples, and so many bytes of them as they are stored.
+  [[nodiscard]] bool is_addressable(std::uint64_t samples, std::uint64_t stored_bytes, bool lit) const;
   [[nodiscard]] std::uint64_t samples_of(std::size_t brick) const;
   [[nodiscard]] std::uint64_t stored_bytes_of(std::size_t brick) const;
   /// `here`: by brick 1 where its tile is wanted; bricks that every part has are added.
@@ -39,6 +39,7 @@ struct PagedVolume::Impl {
   VdvrGrid grid;
   std::uint64_t whole_lit = 0;  ///< samples of the whole volume
   std::uint64_t memory = 0;
+  std::uint64_t asked = 0;             ///< of memory in all; 0: what the account has
   std::vector<std::uint32_t> anchors;  ///< the bricks of each kind's tile 0: with any part
   mutable PagingCounts counts;
 

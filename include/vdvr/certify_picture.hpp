@@ -15,6 +15,7 @@
 #include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/mixed_volume.hpp"
+#include "vdvr/paged_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/resident_volume.hpp"
@@ -69,6 +70,11 @@ struct PixelBounds {
 /// or `analytic`. Throws InputError for other modes, gradients, counts of bounds, a transfer function that
 /// shows what lies outside the window, and what render() refuses; Interrupted.
 VDVR_API PixelBounds certify_pixels(Device& device, const ResidentVolume& volume,
+                                    const std::vector<float>& bounds, const RenderOptions& options,
+                                    const CertifyPictureOptions& certify = {}, const Progress& progress = {});
+/// The same of a volume that comes by bricks: those intervals, to the bit, by the buffer sampler. Throws
+/// ResourceError too, before anything is certified, where the bricks of a few pixels do not fit.
+VDVR_API PixelBounds certify_pixels(Device& device, const PagedVolume& volume,
                                     const std::vector<float>& bounds, const RenderOptions& options,
                                     const CertifyPictureOptions& certify = {}, const Progress& progress = {});
 

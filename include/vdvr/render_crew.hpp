@@ -6,6 +6,7 @@
 
 #include "vdvr/export.hpp"
 #include "vdvr/paged_volume.hpp"
+#include "vdvr/progress.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {
@@ -30,8 +31,9 @@ class VDVR_API RenderCrew {
   RenderCrew(RenderCrew&&) noexcept;
   RenderCrew& operator=(RenderCrew&&) noexcept;
 
-  /// As Renderer::render; `seconds` are those of all devices together.
-  RenderResult render(const RenderOptions& options);
+  /// As Renderer::render; `seconds` are those of all devices together. `progress` is told of what is drawn,
+  /// one device at a time. Throws Interrupted too.
+  RenderResult render(const RenderOptions& options, const Progress& progress = {});
   void set_bounds(const std::vector<float>& bounds);
 
  private:

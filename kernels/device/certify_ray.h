@@ -378,7 +378,12 @@ RAY_INLINE Part part_between(RANGES, const VdvrCertify* q, const Piece* whole, c
 RAY_INLINE V3 widened(V3 a, V by) { return v3(a.x + by, a.y + by, a.z + by); }
 RAY_INLINE V3 negative3(V3 a) { return v3(-a.x, -a.y, -a.z); }
 
-// Every lane's interval of a pixel, in the rows of this launch: its ends, which may be off by `error`, within
+// Whether a pixel is this launch's.
+RAY_INLINE bool in_launch(const VdvrRaycast* p, const VdvrCertify* q, int x, int y) {
+  return x < p->width && x < q->first_column + q->columns && y < p->height && y < q->first_row + q->rows;
+}
+
+// Every lane's interval of a pixel of this launch: its ends, which may be off by `error`, within
 // the extremes of all that can show. [y][x] r, g, b and the parts it took; r, g, b and flags.
 RAY_INLINE void put_interval(const VdvrRaycast* p, const VdvrCertify* q, __global float4* restrict least,
                              __global float4* restrict most, I px, I py, V3 upper, V3 minus_lower, V error,
@@ -386,11 +391,11 @@ RAY_INLINE void put_interval(const VdvrRaycast* p, const VdvrCertify* q, __globa
   const V once = (V)(q->first_error);
   const V3 hi = least3(widened(upper, error), widened(c_most, once)),
            lo = most3(widened(negative3(minus_lower), -error), widened(c_least, -once));
-#define PUT(n)                                                                                     \
-  if (LANE(px, n) < p->width && LANE(py, n) < p->height && LANE(py, n) < q->first_row + q->rows) { \
-    const ulong i = (ulong)LANE(py, n) * (ulong)p->width + (ulong)LANE(px, n);                     \
-    least[i] = (float4)(LANE(lo.x, n), LANE(lo.y, n), LANE(lo.z, n), (float)LANE(parts, n));       \
-    most[i] = (float4)(LANE(hi.x, n), LANE(hi.y, n), LANE(hi.z, n), (float)LANE(flags, n));        \
+#define PUT(n)                                                                               \
+  if (in_launch(p, q, LANE(px, n), LANE(py, n))) {                                           \
+    const ulong i = (ulong)LANE(py, n) * (ulong)p->width + (ulong)LANE(px, n);               \
+    least[i] = (float4)(LANE(lo.x, n), LANE(lo.y, n), LANE(lo.z, n), (float)LANE(parts, n)); \
+    most[i] = (float4)(LANE(hi.x, n), LANE(hi.y, n), LANE(hi.z, n), (float)LANE(flags, n));  \
   }
   EACH(PUT)
 #undef PUT

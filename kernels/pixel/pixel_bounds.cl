@@ -29,6 +29,12 @@
       __global const float *restrict bounds, RANGES, VdvrRaycast p, VdvrCertify q, \
       __global float4 *restrict least, __global float4 *restrict most
 
+// Of a packet, whose rays outside of the launch are walked for nothing.
+#define PIXELS_OF_THE_LAUNCH                                                \
+  const I px = q.first_column + (int)get_global_id(0) * PACKET_X + COLUMNS; \
+  const I py = q.first_row + (int)get_global_id(1) * PACKET_Y + ROWS;       \
+  if (!in_launch(&p, &q, LANE(px, 0), LANE(py, 0))) return
+
 // The extremes of all that can show in a pixel of row py.
 #define COLOURS_OF_THE_PIXEL                                                                            \
   const V3 behind = background(&p, py);                                                                 \
@@ -51,9 +57,7 @@
 
 __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict list,
                                         __global uint* restrict fullest) {
-  const I px = (int)get_global_id(0) * PACKET_X + COLUMNS;
-  const I py = q.first_row + (int)get_global_id(1) * PACKET_Y + ROWS;
-  if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height || LANE(py, 0) >= q.first_row + q.rows) return;
+  PIXELS_OF_THE_LAUNCH;
   const ulong item = get_global_id(1) * get_global_size(0) + get_global_id(0);
 #if VDVR_LANES == 1
   const ulong items = get_global_size(0) * get_global_size(1);
@@ -185,9 +189,7 @@ RAY_INLINE V widest(const Knots* f) {
 }
 
 __kernel VDVR_HINT void certify_fast(CERTIFY_ARGUMENTS) {
-  const I px = (int)get_global_id(0) * PACKET_X + COLUMNS;
-  const I py = q.first_row + (int)get_global_id(1) * PACKET_Y + ROWS;
-  if (LANE(px, 0) >= p.width || LANE(py, 0) >= p.height || LANE(py, 0) >= q.first_row + q.rows) return;
+  PIXELS_OF_THE_LAUNCH;
   const Ray ray = cast_rays(&p, grid, px, py);
   Walk walk = start_walk(&p, &ray, px, py);
   I flags = (I)(0), parts = (I)(0);

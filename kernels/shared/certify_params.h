@@ -28,7 +28,7 @@
 #define VDVR_PIXEL_UNTESTED 1
 #define VDVR_PIXEL_ENDED 2
 
-// Scalars only. 112 bytes.
+// Scalars only. 120 bytes.
 typedef struct {
   float range_lo, range_scale;  // bin = (value - lo) * scale
   int bins;
@@ -45,8 +45,9 @@ typedef struct {
   // part takes what makes it.
   float first_error, sum_error, share_error;
   float colour_lo[3], colour_hi[3];  // of all that may show, light included
-  int first_row, rows;               // of the picture
-  int capacity;                      // pieces that the list of a packet holds
+  int first_row, rows;               // of the picture, in this launch
+  int first_column, columns;
+  int capacity;  // pieces that the list of a packet holds
 } VdvrCertify;
 
 #endif

@@ -4,76 +4,20 @@
 #define BOOST_TEST_MODULE paged_volume
 #include <boost/test/unit_test.hpp>
 
-#include <bit>
-#include <cmath>
-
-#include "tests/support/mixed_volumes.hpp"
+#include "tests/support/paged_cases.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/paged_volume.hpp"
 #include "vdvr/render_crew.hpp"
 
 using namespace vdvr;
+using support::budget_for;
+using support::from_within;
+using support::kAside;
+using support::PagedCase;
+using support::same_bits;
 
 namespace {
-
-const std::vector<LevelTriple> kTriples{{0, 0, 0}, {1, 1, 1}, {0, 2, 1}, {2, 2, 2}};
-// What tables and a picture take beside volumes.
-constexpr std::uint64_t kAside = 2'500'000;
-
-/// Base and index, and of the tiles less than half: more than a few pixels need of so small a volume.
-std::uint64_t budget_for(const MixedVolume& v, bool lit) {
-  const auto lit_bytes = [&](const SampleBlock& b) { return b.bytes() + (lit ? 8 * b.size() : 0); };
-  std::uint64_t tiles = 0;
-  for (const auto& [triple, block] : v.tiles) tiles += lit_bytes(block);
-  return 97 * v.level.size() + v.base.bytes() + lit_bytes(v.base) + tiles / 2;
-}
-
-Grid grid() { return {{37, 34, 43}, {-18, -17, -20}, {1, 1, 0.9}, ""}; }
-
-struct Case {
-  const char* name;
-  MixedVolume volume;
-};
-
-/// The same volume in integers of both types.
-MixedVolume with_integers(MixedVolume v) {
-  v.step = 0x1p-14;
-  std::size_t n = 0;
-  const auto convert = [&](SampleBlock& b, std::size_t tiles) {
-    const bool wide = n++ % 2 == 0;
-    b.type = wide ? SampleType::u16 : SampleType::u8;
-    const std::vector<float> from(b.f32.begin(), b.f32.end());
-    b.f32.clear();
-    const int shift = wide ? 0 : 7;
-    for (const float s : from) {
-      const auto stored = static_cast<std::int32_t>((s + 1) * 0.5f * (wide ? 65535.0f : 255.0f));
-      if (wide) b.u16.push_back(static_cast<std::uint16_t>(stored));
-      else b.u8.push_back(static_cast<std::uint8_t>(stored));
-    }
-    for (std::size_t t = 0; t < tiles; ++t) {
-      // Tiles differ in what their integers stand for.
-      b.offset.push_back(-16384 + static_cast<std::int32_t>(t % 5) * 1024);
-      b.shift.push_back(static_cast<std::uint8_t>(shift));
-    }
-  };
-  convert(v.base, 1);
-  for (auto& [triple, block] : v.tiles)
-    convert(block, block.size() / static_cast<std::size_t>(v.tile_size(triple)));
-  return v;
-}
-
-const std::vector<Case>& cases() {
-  static const std::vector<Case> all{
-      {"float", support::random_mixed(grid(), 4, 4, kTriples, 3)},
-      {"integers", with_integers(support::random_mixed(grid(), 4, 4, kTriples, 5))},
-      {"coarse base", support::random_mixed({{36, 32, 44}, {-18, -16, -20}, {1, 1, 1}, ""}, 4, 4,
-                                            {{0, 0, 0}, {2, 2, 2}, {1, 2, 3}, {3, 2, 2}}, 7, {1, 0, 1})},
-  };
-  return all;
-}
-
-Camera from_within() { return look_at({3, -2, 1}, {-20, 11, 7}, std::nullopt, 70); }
 
 /// Every kernel, and what each of them can be asked for.
 std::vector<RenderOptions> pictures(const MixedVolume& v) {
@@ -133,16 +77,10 @@ std::vector<RenderOptions> pictures(const MixedVolume& v) {
   return all;
 }
 
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-  return std::ranges::equal(a, b, [](float x, float y) {
-    return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
-  });
-}
-
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit) {
-  for (const Case& c : cases())
+  for (const PagedCase& c : support::paged_cases())
     for (const bool lit : {false, true}) {
       const ResidentVolume whole(support::device(), c.volume);
       Renderer reference(support::device(), whole);
@@ -155,7 +93,7 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
       for (const RenderOptions& o : pictures(c.volume)) {
         if ((o.gradient == GradientKind::stored) != lit) continue;
         // Compilers take longer than pictures: what does not depend on types is drawn of floats alone.
-        if (&c != &cases().front() &&
+        if (&c != &support::paged_cases().front() &&
             (o.output != RenderOutput::colour || o.clip || o.mode == RenderMode::mip ||
              o.mode == RenderMode::integral || o.mode == RenderMode::slice ||
              o.gradient == GradientKind::analytic || o.step_mode == StepMode::level ||
@@ -178,7 +116,7 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
 }
 
 BOOST_AUTO_TEST_CASE(several_devices_draw_the_picture_of_one) {
-  const MixedVolume& v = cases().front().volume;
+  const MixedVolume& v = support::paged_cases().front().volume;
   Device first, second;
   const ResidentVolume whole(first, v), again(second, v);
   Renderer alone(first, whole);
@@ -202,7 +140,7 @@ BOOST_AUTO_TEST_CASE(several_devices_draw_the_picture_of_one) {
 }
 
 BOOST_AUTO_TEST_CASE(automatic_takes_what_the_whole_volume_takes) {
-  const MixedVolume& v = cases().front().volume;
+  const MixedVolume& v = support::paged_cases().front().volume;
   const ResidentVolume whole(support::device(), v);
   Device small("", budget_for(v, true) + kAside);
   const PagedVolume paged(small, v, budget_for(v, true));
@@ -215,7 +153,7 @@ BOOST_AUTO_TEST_CASE(automatic_takes_what_the_whole_volume_takes) {
 }
 
 BOOST_AUTO_TEST_CASE(bounds_by_brick_are_those_of_the_whole_volume) {
-  const MixedVolume& v = cases().front().volume;
+  const MixedVolume& v = support::paged_cases().front().volume;
   std::vector<float> bounds;
   for (std::size_t i = 0; i < v.level.size(); ++i) bounds.push_back(static_cast<float>(1 + i % 7) / 64);
   const ResidentVolume whole(support::device(), v);
@@ -231,7 +169,7 @@ BOOST_AUTO_TEST_CASE(bounds_by_brick_are_those_of_the_whole_volume) {
 }
 
 BOOST_AUTO_TEST_CASE(what_does_not_fit_is_refused_with_what_it_needs) {
-  const MixedVolume& v = cases().front().volume;
+  const MixedVolume& v = support::paged_cases().front().volume;
   Device device;
   const auto says = [](const char* text) {
     return [text](const ResourceError& e) { return std::string(e.what()).find(text) != std::string::npos; };

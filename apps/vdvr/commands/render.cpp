@@ -415,14 +415,6 @@ Json transfer_json(const TransferFunction& f) {
   return {{"name", f.name}, {"range", {f.points.front().value, f.points.back().value}}, {"note", f.note}};
 }
 
-Json paging_json(const std::optional<PagingCounts>& counts) {
-  if (!counts) return {};
-  return {{"parts", counts->parts},
-          {"bricks", counts->bricks},
-          {"bytes", counts->bytes},
-          {"largest_part_bytes", counts->largest_part}};
-}
-
 /// One picture, or the values behind it.
 RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::filesystem::path& output,
                       OutputKind kind) {
@@ -552,11 +544,7 @@ int render_command(Arguments& args) {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
     fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
-    if (const auto paging = source.paging())
-      fmt::print(
-          "  by bricks    {} parts of pictures, {:.1f} MiB of tiles for the largest, {:.1f} MiB in all\n",
-          paging->parts, static_cast<double>(paging->largest_part) / (1 << 20),
-          static_cast<double>(paging->bytes) / (1 << 20));
+    print_paging(source.paging());
     if (result.gradient == GradientKind::stored)
       fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n",
                  static_cast<double>(source.bytes()) / (1 << 20));
