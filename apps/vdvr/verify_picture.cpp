@@ -144,14 +144,26 @@ void take(RayCheck& check, double value, double low, double high) {
   if (!(share <= 1)) ++check.outside;
 }
 
+/// A pixel by chance, and what F there is held to.
+struct RandomPixel {
+  const Field& field;
+  const CertifiedPicture& picture;
+  const Again& again;
+  std::size_t number;  ///< in rows
+  [[nodiscard]] const RenderOptions& options() const { return picture.options; }
+  [[nodiscard]] const Grid& grid() const { return again.volume->grid; }
+  [[nodiscard]] std::int64_t x() const { return static_cast<std::int64_t>(number) % options().width; }
+  [[nodiscard]] std::int64_t y() const { return static_cast<std::int64_t>(number) / options().width; }
+  [[nodiscard]] RaySteps ray() const { return steps_of_pixel(options(), grid(), x(), y(), kRayStep); }
+};
+
 /// F's own pixel, under whatever light the picture is of.
-IdealPixel ideal_of(const Field& field, const CertifiedPicture& picture, const Again& again, std::int64_t x,
-                    std::int64_t y) {
-  const RenderOptions& o = picture.options;
-  const Grid& grid = again.volume->grid;
-  if (picture.lit) return ideal_lit_pixel(field, again.value_range, o, grid, x, y, kRayStep);
-  if (o.shading) return ideal_drawn_pixel(field, *again.volume, again.value_range, o, x, y, kRayStep);
-  return ideal_pixel(field, o, grid, x, y, kRayStep);
+IdealPixel ideal_of(const RandomPixel& p) {
+  const RenderOptions& o = p.options();
+  const auto range = p.again.value_range;
+  if (p.picture.lit) return ideal_lit_pixel(p.field, range, o, p.grid(), p.x(), p.y(), kRayStep);
+  if (o.shading) return ideal_drawn_pixel(p.field, *p.again.volume, range, o, p.x(), p.y(), kRayStep);
+  return ideal_pixel(p.field, o, p.grid(), p.x(), p.y(), kRayStep);
 }
 
 /// Of the light that was drawn the host knows that of central differences by the buffer sampler.
@@ -161,27 +173,21 @@ bool evaluates_f(const CertifiedPicture& picture) {
          (o.gradient == GradientKind::central && o.sampler == SamplerKind::buffer);
 }
 
-void check_colours(const Field& field, const CertifiedPicture& picture, const Grid&, const Again& again,
-                   std::size_t i, RayCheck& check) {
-  const auto at = static_cast<std::int64_t>(i);
-  const RenderOptions& o = picture.options;
-  const IdealPixel ideal = ideal_of(field, picture, again, at % o.width, at / o.width);
+void check_colours(const RandomPixel& p, RayCheck& check) {
+  const IdealPixel ideal = ideal_of(p);
   const double reach = ideal.quadrature + ideal.light + 0x1p-12;
   for (std::size_t c = 0; c < 3; ++c)
-    take(check, ideal.rgb[c], static_cast<double>(again.bounds.lo.values[3 * i + c]) - reach,
-         static_cast<double>(again.bounds.hi.values[3 * i + c]) + reach);
+    take(check, ideal.rgb[c], static_cast<double>(p.again.bounds.lo.values[3 * p.number + c]) - reach,
+         static_cast<double>(p.again.bounds.hi.values[3 * p.number + c]) + reach);
 }
 
-void check_grey(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
-                std::size_t i, RayCheck& check) {
-  if (again.bounds.parts[i] == 0) return;  // absent
-  const auto at = static_cast<std::int64_t>(i);
-  const RenderOptions& o = picture.options;
-  const auto [low, high] = o.slice_range.value();
-  const double value = field({slice_point(o, grid, at % o.width, at / o.width)}).front(),
+void check_grey(const RandomPixel& p, RayCheck& check) {
+  if (p.again.bounds.parts[p.number] == 0) return;  // absent
+  const auto [low, high] = p.options().slice_range.value();
+  const double value = p.field({slice_point(p.options(), p.grid(), p.x(), p.y())}).front(),
                grey = high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0;
-  take(check, grey, static_cast<double>(again.bounds.lo.values[3 * i]) - 0x1p-23,
-       static_cast<double>(again.bounds.hi.values[3 * i]) + 0x1p-23);
+  take(check, grey, static_cast<double>(p.again.bounds.lo.values[3 * p.number]) - 0x1p-23,
+       static_cast<double>(p.again.bounds.hi.values[3 * p.number]) + 0x1p-23);
 }
 
 /// What a value between two of a row's may rise above both, as second differences tell: an estimate.
@@ -192,37 +198,31 @@ double rise(const std::vector<double>& values) {
   return most;
 }
 
-void check_maximum(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
-                   std::size_t i, RayCheck& check) {
-  const auto at = static_cast<std::int64_t>(i);
-  const RenderOptions& o = picture.options;
-  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
-  if (steps.points.empty() || std::isnan(again.maxima.low.values[i])) return;
+void check_maximum(const RandomPixel& p, RayCheck& check) {
+  const RaySteps steps = p.ray();
+  if (steps.points.empty() || std::isnan(p.again.maxima.low.values[p.number])) return;
   // Both ends too: the largest value may lie where the region does.
   std::vector<Vec3> points{steps.at(steps.first)};
   for (const Vec3& point : steps.points) points.push_back(point);
   points.push_back(steps.at(steps.last));
-  const std::vector<double> values = field(points);
+  const std::vector<double> values = p.field(points);
   take(check, *std::max_element(values.begin(), values.end()),
-       static_cast<double>(again.maxima.low.values[i]) - rise(values),
-       static_cast<double>(again.maxima.high.values[i]));
+       static_cast<double>(p.again.maxima.low.values[p.number]) - rise(values),
+       static_cast<double>(p.again.maxima.high.values[p.number]));
 }
 
 /// By midpoints; what steps three times as long are off is an estimate of what these are.
-void check_integral(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
-                    std::size_t i, RayCheck& check) {
-  const auto at = static_cast<std::int64_t>(i);
-  const RenderOptions& o = picture.options;
-  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+void check_integral(const RandomPixel& p, RayCheck& check) {
+  const RaySteps steps = p.ray();
   if (steps.points.empty()) return;
-  const std::vector<double> values = field(steps.points);
+  const std::vector<double> values = p.field(steps.points);
   double fine = 0, coarse = 0;
   for (std::size_t k = 0; k < values.size(); ++k) {
     fine += values[k] * steps.length;
     if (k % 3 == 1) coarse += values[k] * 3 * steps.length;
   }
-  take(check, fine, static_cast<double>(again.integrals.low.values[i]) - std::abs(fine - coarse),
-       static_cast<double>(again.integrals.high.values[i]) + std::abs(fine - coarse));
+  take(check, fine, static_cast<double>(p.again.integrals.low.values[p.number]) - std::abs(fine - coarse),
+       static_cast<double>(p.again.integrals.high.values[p.number]) + std::abs(fine - coarse));
 }
 
 /// Whether F comes to the value before `last`, where it is surely on one side, or as near to it from there as
@@ -237,23 +237,20 @@ bool meets(const Field& field, const RaySteps& steps, const std::vector<double>&
   return other >= -moves;
 }
 
-void check_crossing(const Field& field, const CertifiedPicture& picture, const Grid& grid, const Again& again,
-                    std::size_t i, RayCheck& check) {
-  const auto at = static_cast<std::int64_t>(i);
-  const RenderOptions& o = picture.options;
-  const RaySteps steps = steps_of_pixel(o, grid, at % o.width, at / o.width, kRayStep);
+void check_crossing(const RandomPixel& p, RayCheck& check) {
+  const RaySteps steps = p.ray();
   if (steps.points.empty()) return;
-  const int hit = again.surface.hit[i];
-  const double value = o.surfaces.front().value,
-               first = hit == 0 ? steps.last : static_cast<double>(again.surface.first.values[i]);
-  const std::vector<double> values = field(steps.points);
+  const int hit = p.again.surface.hit[p.number];
+  const double value = p.options().surfaces.front().value,
+               first = hit == 0 ? steps.last : static_cast<double>(p.again.surface.first.values[p.number]);
+  const std::vector<double> values = p.field(steps.points);
   // The most that F moves from one place to the next, as neighbours show.
   double moves = 0;
   for (std::size_t k = 1; k < values.size(); ++k)
     moves = std::max(moves, std::abs(values[k] - values[k - 1]));
   if (!(first > steps.first)) {  // the side is unknown on which F begins
-    if (hit == 2 &&
-        !meets(field, steps, values, static_cast<double>(again.surface.last.values[i]), value, moves))
+    if (hit == 2 && !meets(p.field, steps, values, static_cast<double>(p.again.surface.last.values[p.number]),
+                           value, moves))
       ++check.outside;
     return;
   }
@@ -264,9 +261,10 @@ void check_crossing(const Field& field, const CertifiedPicture& picture, const G
              !(side * (values[k] - value) < 0);
   bool reached = hit != 2;
   if (hit == 2) {
-    const double last = static_cast<double>(again.surface.last.values[i]);
+    const double last = static_cast<double>(p.again.surface.last.values[p.number]);
     // The end of the band is rounded to float32: four units of it.
-    reached = side * (field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * moves / steps.length;
+    reached =
+        side * (p.field({steps.at(last)}).front() - value) >= -4 * 0x1p-23 * last * moves / steps.length;
   }
   if (early || !reached) ++check.outside;
 }
@@ -297,7 +295,7 @@ RayCheck check_rays(const Arguments& args, const CertifiedPicture& picture, cons
                      : mode == RenderMode::integral ? check_integral
                      : mode == RenderMode::slice    ? check_grey
                                                     : check_colours;
-    one(field, picture, file.volume.grid, again, i, check);
+    one({field, picture, again, i}, check);
   }
   return check;
 }

@@ -34,8 +34,7 @@ void scale_bounds(std::vector<float>& totals, int exponent) {
 
 void scale(MixedVolume& volume, int exponent) {
   if (exponent == 0) return;
-  scale(volume.base.f32, exponent);
-  for (auto& [kind, block] : volume.tiles) scale(block.f32, exponent);
+  for_each_block(volume, [&](SampleBlock& block) { scale(block.f32, exponent); });
   volume.step = std::ldexp(volume.step, exponent);
 }
 

@@ -12,9 +12,9 @@
 #include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
-#include "host/certify/close_boundaries.hpp"
+#include "host/closing/close_boundaries.hpp"
 #include "host/certify/fill_certificate.hpp"
-#include "host/certify/raise_levels.hpp"
+#include "host/closing/raise_levels.hpp"
 #include "host/crew/crew.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
@@ -228,13 +228,11 @@ std::vector<std::uint8_t> raise_violating(const Inputs& in, const ClassifyBricks
 }
 
 // Of what lies in memory.
-std::uint64_t memory_bytes(const SampleBlock& block) {
-  const bool in_scratch = block.f32.scratch() || block.u16.scratch() || block.u8.scratch();
-  return in_scratch ? 0 : block.bytes();
-}
 std::uint64_t memory_bytes(const MixedVolume& volume) {
-  std::uint64_t bytes = memory_bytes(volume.base);
-  for (const auto& [kind, block] : volume.tiles) bytes += memory_bytes(block);
+  std::uint64_t bytes = 0;
+  for_each_array(volume, [&](const auto& samples) {
+    if (!samples.scratch()) bytes += samples.size() * sizeof(*samples.data());
+  });
   return bytes;
 }
 

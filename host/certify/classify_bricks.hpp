@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/open_bricks.hpp"
+#include "host/closing/open_bricks.hpp"
 #include "host/crew/journalled_gold.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"

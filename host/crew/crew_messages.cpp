@@ -314,24 +314,20 @@ MixedVolume get_shape(ByteReader& in, const Room& room) {
 
 std::vector<std::span<const std::byte>> samples_of(const MixedVolume& volume) {
   std::vector<std::span<const std::byte>> out;
-  const auto add = [&](const SampleBlock& b) {
+  for_each_block(volume, [&](const SampleBlock& b) {
     out.emplace_back(static_cast<const std::byte*>(b.data()), b.bytes());
-  };
-  add(volume.base);
-  for (const auto& [kind, block] : volume.tiles) add(block);
+  });
   return out;
 }
 
 std::vector<std::span<std::byte>> samples_to(MixedVolume& volume) {
   std::vector<std::span<std::byte>> out;
-  const auto add = [&](SampleBlock& b) {
+  for_each_block(volume, [&](SampleBlock& b) {
     void* first = b.type == SampleType::f32   ? static_cast<void*>(b.f32.data())
                   : b.type == SampleType::u16 ? static_cast<void*>(b.u16.data())
                                               : b.u8.data();
     out.emplace_back(static_cast<std::byte*>(first), b.bytes());
-  };
-  add(volume.base);
-  for (auto& [kind, block] : volume.tiles) add(block);
+  });
   return out;
 }
 

@@ -211,18 +211,11 @@ std::pair<double, double> range_of_samples(const MixedVolume& v, const Progress&
 
 std::uint64_t resident_bytes(const MixedVolume& v) {
   std::uint64_t bytes = v.level.size() * (sizeof(LevelTriple) + sizeof(std::uint32_t)), in_scratch = 0;
-  const auto add = [&](const auto& samples) {
+  for_each_array(v, [&](const auto& samples) {
     // All files of one scratch share what may be resident.
     if (samples.scratch()) in_scratch = std::max(in_scratch, samples.resident_bytes());
     else bytes += samples.resident_bytes();
-  };
-  const auto add_block = [&](const SampleBlock& block) {
-    add(block.f32);
-    add(block.u16);
-    add(block.u8);
-  };
-  add_block(v.base);
-  for (const auto& [kind, block] : v.tiles) add_block(block);
+  });
   return bytes + in_scratch;
 }
 

@@ -124,6 +124,11 @@ class KeptGold {
   /// Kept heights around those asked for: boxes of other halos will read them.
   static constexpr std::int64_t run_margin = 32;
 
+  /// The quotient rounded down.
+  static constexpr std::int64_t floor_div(std::int64_t a, std::int64_t b) {
+    return a >= 0 ? a / b : -((b - 1 - a) / b);
+  }
+
   using TileAt = std::pair<std::int64_t, std::int64_t>;  // y, x
   struct Place {
     std::size_t page = 0;

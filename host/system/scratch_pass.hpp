@@ -27,13 +27,7 @@ class ScratchPass {
     if (samples.scratch()) arrays_.emplace_back(samples.data(), sizeof(T) * samples.size());
   }
   void add(const MixedVolume& volume) {
-    const auto of = [&](const SampleBlock& block) {
-      add(block.f32);
-      add(block.u16);
-      add(block.u8);
-    };
-    of(volume.base);
-    for (const auto& [kind, block] : volume.tiles) of(block);
+    for_each_array(volume, [&](const auto& samples) { add(samples); });
   }
 
   void touched(std::uint64_t bytes) {

@@ -15,8 +15,8 @@ namespace vdvr {
 namespace {
 
 std::uint64_t samples_of(const MixedVolume& volume) {
-  std::uint64_t sum = volume.base.size();
-  for (const auto& [kind, block] : volume.tiles) sum += block.size();
+  std::uint64_t sum = 0;
+  for_each_block(volume, [&](const SampleBlock& block) { sum += block.size(); });
   return sum;
 }
 

@@ -25,8 +25,8 @@ std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }
 }  // namespace
 
 int sample_types(const MixedVolume& v) {
-  int types = 1 << static_cast<int>(v.base.type);
-  for (const auto& [triple, block] : v.tiles) types |= 1 << static_cast<int>(block.type);
+  int types = 0;
+  for_each_block(v, [&](const SampleBlock& block) { types |= 1 << static_cast<int>(block.type); });
   return types;
 }
 
@@ -76,8 +76,8 @@ std::map<TileKind, std::uint64_t> tile_offsets(const MixedVolume& v) {
 }
 
 std::uint64_t sample_buffer_bytes(const MixedVolume& v) {
-  std::uint64_t n = aligned(v.base.bytes());
-  for (const auto& [triple, block] : v.tiles) n += aligned(block.bytes());
+  std::uint64_t n = 0;
+  for_each_block(v, [&](const SampleBlock& block) { n += aligned(block.bytes()); });
   return n;
 }
 
@@ -134,12 +134,10 @@ VdvrBrick brick_record(const MixedVolume& v, const std::map<TileKind, std::uint6
 RecordKind record_kind(const MixedVolume& v, bool texels) {
   if (sample_types(v) == 1 << VDVR_F32) return RecordKind::f32;
   bool compact = !texels && sample_buffer_bytes(v) >> 32 == 0;
-  const auto look = [&](const SampleBlock& b) {
+  for_each_block(v, [&](const SampleBlock& b) {
     for (std::size_t i = 0; compact && i < b.offset.size(); ++i)
       compact = fits_compact(b.offset[i], b.shift[i]);
-  };
-  look(v.base);
-  for (const auto& [kind, block] : v.tiles) look(block);
+  });
   return compact ? RecordKind::compact : RecordKind::wide;
 }
 

@@ -167,8 +167,8 @@ std::optional<Problem> block_problem(const std::string& where, const SampleBlock
 }
 
 bool has_integers(const MixedVolume& v) {
-  bool any = v.base.type != SampleType::f32;
-  for (const auto& [triple, block] : v.tiles) any = any || block.type != SampleType::f32;
+  bool any = false;
+  for_each_block(v, [&](const SampleBlock& block) { any = any || block.type != SampleType::f32; });
   return any;
 }
 

@@ -139,6 +139,22 @@ struct MixedVolume {
   }
 };
 
+/// Calls `work` with the base, then with the tiles' blocks in order of their kinds. `volume` may be const.
+template <class Volume, class Work>
+void for_each_block(Volume& volume, const Work& work) {
+  work(volume.base);
+  for (auto& [kind, block] : volume.tiles) work(block);
+}
+/// Calls `work` with each array of samples of each block, whatever its type; two of three are empty.
+template <class Volume, class Work>
+void for_each_array(Volume& volume, const Work& work) {
+  for_each_block(volume, [&](auto& block) {
+    work(block.f32);
+    work(block.u16);
+    work(block.u8);
+  });
+}
+
 /// A volume with every brick at level 0: the uniform grid as a mixed one, so that one sampler serves both.
 VDVR_API MixedVolume as_mixed(const Volume& volume, int granularity = 4);
 

@@ -1,4 +1,4 @@
-// The largest lane of a vector. Included by classify.cl, node_slack.cl, measure.cl and verify_field.cl.
+// The largest lane of a vector. Included by classify.cl, node_slack.cl, measure.cl and verify_pieces.cl.
 #ifndef VDVR_LARGEST_H
 #define VDVR_LARGEST_H
 

@@ -85,19 +85,6 @@ std::vector<float> random_bounds(const MixedVolume& v, std::mt19937& random) {
   return bounds;
 }
 
-// Where rays enter and leave: the clip as much smaller as its definition says (include/vdvr/raycast.hpp,
-// kernels/device/raycast_dvr.h), since the ideal picture is of what is left.
-RenderOptions as_entered(RenderOptions o, const Grid& g) {
-  if (!o.clip) return o;
-  Clip& c = *o.clip;
-  double around = 1, eye_z = std::abs(o.camera.position[2] - g.origin[2]) / g.spacing[2];
-  for (std::size_t a = 0; a < 2; ++a)
-    around += (std::abs(o.camera.position[a] - c.axis[a]) + std::abs(c.axis[a] - g.origin[a])) / c.radius;
-  c.radius *= std::sqrt(1 - 0x1p-18 * around);
-  c.low[2] += 0x1p-20 * (2 * eye_z + static_cast<double>(g.cells[2])) * g.spacing[2];
-  return o;
-}
-
 struct Tally {
   std::int64_t pictures = 0, rays = 0, values = 0, outside = 0;
   double worst = 0, rounding = 0;
@@ -116,7 +103,7 @@ struct Tally {
 void attack(const MixedVolume& v, const std::vector<float>& bounds, const RenderOptions& o,
             const PixelBounds& b, std::mt19937& random, Tally& tally) {
   std::uniform_real_distribution<double> unit(0, 1);
-  const RenderOptions entered = as_entered(o, v.grid);
+  const RenderOptions entered = support::as_entered(o, v.grid);
   tally.rounding = support::path_rounding(o, v.grid);
   for (std::int64_t y = 0; y < o.height; y += 3)
     for (std::int64_t x = 0; x < o.width; x += 3) {

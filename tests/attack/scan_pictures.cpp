@@ -85,20 +85,6 @@ RenderOptions random_options(const VdvrFile& file, std::mt19937& random, int num
   return o;
 }
 
-/// The part of a ray that fp32 enters and leaves by: as the clip's definition says
-/// (include/vdvr/raycast.hpp).
-RenderOptions as_entered(RenderOptions o, const Grid& g) {
-  Clip& c = *o.clip;
-  double around = 1, eye_z = std::abs(o.camera.position[2] - g.origin[2]) / g.spacing[2];
-  for (std::size_t a = 0; a < 2; ++a)
-    around += (std::abs(o.camera.position[a] - c.axis[a]) + std::abs(c.axis[a] - g.origin[a])) / c.radius;
-  c.radius *= std::sqrt(1 - 0x1p-18 * around);
-  const double inward = 0x1p-20 * (2 * eye_z + static_cast<double>(g.cells[2])) * g.spacing[2];
-  c.low[2] += inward;
-  c.high[2] -= inward;
-  return o;
-}
-
 Line line_of(const ExactField& exact, const reference::IdealRay& ray, double unit) {
   Line line;
   line.ray = ray;
@@ -212,7 +198,7 @@ int main(int argc, char** argv) {
     for (std::size_t i = 0; i < first.parts.size(); ++i)
       if (first.parts[i] > 0) shown.push_back(i);
     std::vector<Line> lines;
-    const RenderOptions entered = as_entered(o, g);
+    const RenderOptions entered = support::as_entered(o, g);
     for (int k = 0; k < wanted; ++k) {
       pixels.push_back(k % 4 == 3 || shown.empty() ? random() % first.parts.size()
                                                    : shown[random() % shown.size()]);

@@ -8,7 +8,7 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "host/certify/close_boundaries.hpp"
+#include "host/closing/close_boundaries.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE close_boundaries
-#include "host/certify/close_boundaries.hpp"
+#include "host/closing/close_boundaries.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -10,95 +10,20 @@
 #include "host/volume/seams.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/reference/mixed_field.hpp"
+#include "tests/support/open_bricks.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;
+using support::anisotropic;
+using support::Case;
+using support::id_of;
+using support::isotropic;
+using support::largest_sample;
+using support::random_bricks;
+using support::store_as;
 
 namespace {
-
-struct Case {
-  Index3 cells;
-  int granularity;
-  int rate;
-  std::vector<LevelTriple> triples;
-  double involved = 1;  ///< share of the bricks
-  unsigned seed = 1;
-  double offset_of_levels = 0;  ///< samples of level l lie this much times l beside gold, as fitted ones do
-  LevelTriple coarsening{};
-  bool tolerances = false;  ///< bricks have tolerances of their own
-};
-
-const std::vector<LevelTriple> isotropic{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
-const std::vector<LevelTriple> anisotropic{{0, 0, 0}, {1, 1, 1}, {0, 2, 1}, {2, 0, 0},
-                                           {0, 1, 0}, {1, 0, 2}, {2, 2, 2}};
-
-std::int64_t id_of(const Index3& bricks, const Index3& p) {
-  return (p[2] * bricks[1] + p[1]) * bricks[0] + p[0];
-}
-
-// Smooth, with noise on every gold node: a function of the node alone.
-float gold_at(const Index3& node, int rate) {
-  const auto hash =
-      static_cast<std::uint32_t>(node[0] * 73856093 ^ node[1] * 19349663 ^ node[2] * 83492791) * 2654435761u;
-  const double x = static_cast<double>(node[0]) / rate, y = static_cast<double>(node[1]) / rate,
-               z = static_cast<double>(node[2]) / rate;
-  return static_cast<float>(std::sin(0.7 * x + 0.3 * y) + std::cos(0.5 * z - 0.2 * x) +
-                            static_cast<double>(hash) * 0x1p-34);
-}
-
-// Random levels; every brick's gold differs by a tiny amount of its own, as gold computed in different blocks
-// does.
-OpenBricks random_bricks(const Case& c) {
-  OpenBricks b;
-  b.grid.cells = c.cells;
-  b.granularity = c.granularity;
-  b.rate = c.rate;
-  b.coarsening = c.coarsening;
-  const MixedVolume shape = b.shape();
-  const Index3 n = shape.base_samples();
-  const Index3 apart{c.rate << c.coarsening[2], c.rate << c.coarsening[1], c.rate << c.coarsening[0]};
-  for (std::int64_t z = 0; z < n[2]; ++z)
-    for (std::int64_t y = 0; y < n[1]; ++y)
-      for (std::int64_t x = 0; x < n[0]; ++x)
-        b.base.push_back(gold_at({x * apart[0], y * apart[1], z * apart[2]}, c.rate));
-  const Index3 bricks = shape.bricks();
-  std::mt19937 random(c.seed);
-  std::uniform_real_distribution<double> unit(0, 1);
-  std::uniform_int_distribution<std::size_t> pick(0, c.triples.size() - 1);
-  for (std::int64_t i = 0; i < shape.brick_count(); ++i) {
-    const bool involved = unit(random) < c.involved;
-    const LevelTriple l = involved ? c.triples[pick(random)] : LevelTriple{0, 0, 0};
-    b.involved.push_back(involved ? 1 : 0);
-    b.level.push_back(l);
-    b.samples.resize(b.level.size());
-    if (l == LevelTriple{0, 0, 0}) continue;
-    const Index3 p{i % bricks[0], i / bricks[0] % bricks[1], i / bricks[0] / bricks[1]};
-    const auto side = shape.tile_shape(l);
-    const float own = 1 + 0x1p-20f * static_cast<float>(unit(random));
-    const auto beside = static_cast<float>(c.offset_of_levels * (l[0] + l[1] + l[2]));
-    const auto node = [&](std::size_t a, std::int64_t s) {
-      return std::min(p[a] * c.granularity * c.rate + s * (apart[a] >> l[2 - a]), c.cells[a] * c.rate);
-    };
-    std::vector<float> tile;
-    for (std::int64_t z = 0; z < side[0]; ++z)
-      for (std::int64_t y = 0; y < side[1]; ++y)
-        for (std::int64_t x = 0; x < side[2]; ++x)
-          tile.push_back(own * gold_at({node(0, x), node(1, y), node(2, z)}, c.rate) + beside);
-    b.samples.put(b.level.size() - 1, tile);
-  }
-  for (std::size_t i = 0; c.tolerances && i < b.level.size(); ++i)
-    b.tolerance.push_back(std::exp2(-6 * static_cast<float>(unit(random))));
-  return b;
-}
-
-double largest_sample(const MixedVolume& v) {
-  float largest = 0;
-  for (const float s : decoded(v.base, v.step)) largest = std::max(largest, std::abs(s));
-  for (const auto& [triple, block] : v.tiles)
-    for (const float s : decoded(block, v.step)) largest = std::max(largest, std::abs(s));
-  return static_cast<double>(largest);
-}
 
 // Two bricks and the closed box they share, in fine nodes (rate per cell).
 struct Shared {
@@ -174,11 +99,6 @@ struct Setting {
   Closing closing = Closing::coarse;
   StorageChoice storage = StorageChoice::f32;
 };
-
-void store_as(OpenBricks& b, StorageChoice storage) {
-  b.lattice = choose_lattice(b.base, storage, 0.01);
-  round_base(b.base, b.lattice);
-}
 
 void check_closed(const Case& c, const Setting& setting = {}) {
   OpenBricks open = random_bricks(c);
@@ -392,119 +312,6 @@ BOOST_AUTO_TEST_CASE(integers_are_within_half_a_step_of_what_float32_stores) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(the_paper_feeds_the_low_side_with_gold_on_shared_parts_and_interpolates_inside) {
-  OpenBricks open = random_bricks({{6, 2, 2}, 2, 4, {{2, 2, 2}}, 1.0, 9});
-  for (const std::size_t low : {0u, 1u}) {  // levels 0, 0, 2 along x
-    open.level[low] = {0, 0, 0};
-    open.samples.drop(low);
-  }
-  const MixedVolume v = close_boundaries(open, Closing::paper);
-  BOOST_TEST((v.level == std::vector<LevelTriple>{{0, 0, 0}, {2, 2, 2}, {2, 2, 2}}));
-  const BrickSamples low(v, {1, 0, 0}), high(v, {2, 0, 0});
-  for (std::int64_t z = 0; z <= 8; ++z)
-    for (std::int64_t y = 0; y <= 8; ++y) {
-      const float gold = open.samples[2][static_cast<std::size_t>((z * 9 + y) * 9)];
-      if (y % 4 != 0 || z % 4 != 0) {
-        BOOST_TEST(low(8, y, z) == gold);
-        BOOST_TEST(high(0, y, z) == gold);
-      }
-      // Half way inside the cell beside the border: between the interpolated column and the fed one.
-      const double between = (static_cast<double>(low(4, y, z)) + static_cast<double>(low(8, y, z))) / 2;
-      if (y % 4 == 0 && z % 4 == 0)
-        BOOST_TEST(std::abs(static_cast<double>(low(6, y, z)) - between) <=
-                   tolerance::fp32_sum(8, largest_sample(v)));
-    }
-}
-
-BOOST_AUTO_TEST_CASE(the_paper_closing_refuses_what_it_is_not_defined_for) {
-  OpenBricks open = random_bricks({{4, 4, 4}, 2, 4, anisotropic, 1.0, 9});
-  BOOST_CHECK_THROW(close_boundaries(open, Closing::paper), InputError);
-  OpenBricks fitted = random_bricks({{4, 4, 4}, 2, 4, isotropic, 1.0, 9});
-  fitted.sampled = false;
-  BOOST_CHECK_THROW(close_boundaries(fitted, Closing::paper), InputError);
-}
-
-BOOST_AUTO_TEST_CASE(without_closing_bricks_keep_their_own_samples) {
-  const OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, isotropic, 1.0, 4});
-  const MixedVolume v = close_boundaries(open, Closing::none);
-  for (std::size_t i = 0; i < open.level.size(); ++i) {
-    if (open.samples[i].empty()) continue;
-    const SampleBlock& tiles = v.tiles.at(v.level[i]);
-    const auto first = tiles.f32.begin() + static_cast<std::ptrdiff_t>(v.tile[i] * open.samples[i].size());
-    BOOST_TEST(std::equal(open.samples[i].begin(), open.samples[i].end(), first));
-  }
-}
-
-BOOST_AUTO_TEST_CASE(bricks_that_change_are_found) {
-  OpenBricks open = random_bricks({{8, 8, 8}, 2, 4, isotropic, 1.0, 4});
-  const MixedVolume before = close_boundaries(open);
-  BOOST_TEST((changed_bricks(before, before) == std::vector<std::uint8_t>(64, 0)));
-  const auto i = static_cast<std::size_t>(
-      std::find(open.level.begin(), open.level.end(), LevelTriple{2, 2, 2}) - open.level.begin());
-  open.samples[i][open.samples[i].size() / 2] += 1;  // inside: nobody else stores it
-  const auto changed = changed_bricks(before, close_boundaries(open));
-  BOOST_TEST(changed[i] == 1);
-  BOOST_TEST(std::count(changed.begin(), changed.end(), 1) == 1);
-}
-
-namespace {
-
-bool same(const SampleBlock& a, const SampleBlock& b) {
-  return a.type == b.type && a.f32 == b.f32 && a.u16 == b.u16 && a.u8 == b.u8 && a.offset == b.offset &&
-         a.shift == b.shift;
-}
-
-bool same(const MixedVolume& a, const MixedVolume& b) {
-  return a.level == b.level && a.tile == b.tile && same(a.base, b.base) &&
-         std::equal(
-             a.tiles.begin(), a.tiles.end(), b.tiles.begin(), b.tiles.end(),
-             [](const auto& x, const auto& y) { return x.first == y.first && same(x.second, y.second); });
-}
-
-// The bricks of `from` at every third place of the others, as when they rise; which those are.
-std::vector<std::uint8_t> take_some(OpenBricks& open, const OpenBricks& from, std::size_t place) {
-  std::vector<std::uint8_t> moved(open.level.size(), 0);
-  for (std::size_t i = place; i < moved.size(); i += 17) {
-    if (!open.involved[i] || from.level[i] == LevelTriple{0, 0, 0}) continue;
-    open.level[i] = from.level[i];
-    open.samples.put(i, from.samples[i]);
-    moved[i] = 1;
-  }
-  return moved;
-}
-
-}  // namespace
-
-BOOST_AUTO_TEST_CASE(closing_again_is_closing_anew) {
-  for (const Closing closing : {Closing::coarse, Closing::paper, Closing::none})
-    for (const StorageChoice storage : {StorageChoice::f32, StorageChoice::u16, StorageChoice::u8}) {
-      const auto& triples = closing == Closing::paper ? isotropic : anisotropic;
-      OpenBricks open = random_bricks({{14, 13, 12}, 2, 4, triples, 0.8, 3});
-      store_as(open, storage);
-      // Steep, so that tiles need steps and types of their own.
-      for (std::size_t i = 0; i < open.samples.size(); i += 5)
-        for (float& s : open.samples[i]) s *= 1.0f + 0.3f * static_cast<float>(i % 7);
-      CloseBoundaries close(open, closing);
-      MixedVolume before = close.first();
-      BOOST_TEST(same(before, close_boundaries(open, closing)));
-      std::int64_t kept = 0;
-      for (unsigned round = 0; round < 6; ++round) {
-        const OpenBricks other = random_bricks({{14, 13, 12}, 2, 4, triples, 1.0, 10 + round, 0.01});
-        const std::vector<std::uint8_t> moved = take_some(open, other, 3 * round);
-        MixedVolume again = close.again(before, moved);
-        BOOST_TEST(same(again, close_boundaries(open, closing)));
-        // No brick that takes part changes but those that were made.
-        const auto changed = changed_bricks(before, again);
-        for (std::size_t i = 0; i < changed.size(); ++i) {
-          BOOST_REQUIRE((!open.involved[i] || !changed[i] || close.made()[i]));
-          kept += open.level[i] != LevelTriple{0, 0, 0} && !close.made()[i] ? 1 : 0;
-        }
-        before = std::move(again);
-      }
-      BOOST_TEST(kept > 0);
-    }
-}
-
 BOOST_AUTO_TEST_CASE(samples_inside_a_brick_stay_gold_and_planes_beyond_the_grid_repeat) {
   const OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, 1.0, 4});
   const MixedVolume v = close_boundaries(open);
@@ -536,49 +343,6 @@ BOOST_AUTO_TEST_CASE(samples_inside_a_brick_stay_gold_and_planes_beyond_the_grid
                 open.samples[static_cast<std::size_t>(i)][static_cast<std::size_t>(index(x, y, z))]);
         }
   }
-}
-
-BOOST_AUTO_TEST_CASE(tiles_keep_their_samples_wherever_they_lie) {
-  const auto scratch = std::make_shared<Scratch>(".", 1 << 16);
-  // Parts of 2^16 samples and more: the second begins within these tiles, the third takes one alone.
-  for (const std::uint64_t in_memory : {std::uint64_t{0}, std::uint64_t{1} << 19, UINT64_MAX}) {
-    TileStore store(Room{scratch, in_memory});
-    std::vector<std::vector<float>> expected(40);
-    store.resize(expected.size());
-    std::mt19937 random(7);
-    for (int round = 0; round < 3; ++round)
-      for (std::size_t i = 0; i < expected.size(); ++i) {
-        if (random() % 4 == 0) continue;
-        expected[i].resize(i == 17 ? 300000 : random() % 5000);
-        for (float& s : expected[i]) s = static_cast<float>(random());
-        store.put(i, expected[i]);
-      }
-    store.drop(3);
-    expected[3].clear();
-    const TileStore copy = store;
-    for (std::size_t i = 0; i < expected.size(); ++i) {
-      BOOST_TEST(std::ranges::equal(std::as_const(store)[i], expected[i]));
-      BOOST_TEST(std::ranges::equal(copy[i], expected[i]));
-    }
-    BOOST_TEST((store.memory_bytes() > 0) == (in_memory > 0));
-    BOOST_TEST(store.memory_bytes() <= std::max(in_memory, std::uint64_t{0}));
-    store.clear();
-    BOOST_TEST(store.memory_bytes() == 0u);
-    BOOST_TEST(store[17].empty());
-  }
-}
-
-BOOST_AUTO_TEST_CASE(bricks_close_alike_wherever_their_tiles_lie) {
-  OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, .9, 4});
-  const MixedVolume in_memory = close_boundaries(open);
-  const Room room{std::make_shared<Scratch>(".", 1 << 16), 0};
-  TileStore store(room);
-  store.resize(open.samples.size());
-  for (std::size_t i = 0; i < store.size(); ++i) store.put(i, std::as_const(open).samples[i]);
-  open.samples = std::move(store);
-  const MixedVolume in_scratch = CloseBoundaries(open, Closing::coarse, room).first();
-  BOOST_TEST(same(in_scratch, in_memory));
-  BOOST_TEST((in_scratch.tiles.begin()->second.f32.scratch() == room.scratch));
 }
 
 BOOST_AUTO_TEST_CASE(neighbours_that_take_no_part_lower_nothing) {

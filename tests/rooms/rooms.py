@@ -12,7 +12,7 @@ import tempfile
 
 # A room includes the public headers and rooms above it.
 ROOMS = ["system", "opencl", "hdf5", "io", "geometry", "center", "prepare", "scan", "simulate", "fbp", "fdk", "volume", "sampler", "bounds", "kept", "gold", "crew",
-         "certify", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
+         "closing", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
 MOST_FILES = 25
 # What kernels include: `shared` is compiled by the host too, `device` is not.
 KERNEL_HEADERS = {"shared", "device"}

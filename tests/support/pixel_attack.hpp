@@ -11,6 +11,22 @@
 
 namespace vdvr::support {
 
+/// Where rays enter and leave in fp32: the clip as much smaller as its definition says
+/// (include/vdvr/raycast.hpp, kernels/device/raycast_dvr.h), since the ideal picture is of what is left.
+inline RenderOptions as_entered(RenderOptions o, const Grid& g) {
+  if (!o.clip) return o;
+  Clip& c = *o.clip;
+  double around = 1;
+  for (std::size_t a = 0; a < 2; ++a)
+    around += (std::abs(o.camera.position[a] - c.axis[a]) + std::abs(c.axis[a] - g.origin[a])) / c.radius;
+  c.radius *= std::sqrt(1 - 0x1p-18 * around);
+  const double eye_z = std::abs(o.camera.position[2] - g.origin[2]) / g.spacing[2];
+  const double inward = 0x1p-20 * (2 * eye_z + static_cast<double>(g.cells[2])) * g.spacing[2];
+  c.low[2] += inward;
+  c.high[2] -= inward;
+  return o;
+}
+
 /// Steps of a ray within one cell of the base, and what f may be on them.
 struct AttackStep {
   double length = 0;  ///< base cells

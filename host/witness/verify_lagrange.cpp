@@ -1,5 +1,5 @@
 // Weights by Lagrange's formula in double precision, norms by adding them up.
-#include "host/verify/verify_lagrange.hpp"
+#include "host/witness/verify_lagrange.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // Closes the bricks and packs them: finds the type and the step of every tile with which the closed samples
 // fit, then stores them. Called by build.cpp. Calls close_coarse.cpp and close_paper.cpp.
-#include "host/certify/close_boundaries.hpp"
+#include "host/closing/close_boundaries.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,5 +1,5 @@
 // Sups by sampling and Bernstein's inequality, and the bounds they give.
-#include "host/verify/verify_bounds.hpp"
+#include "host/witness/verify_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "host/verify/verify_cosines.hpp"
-#include "host/verify/verify_lagrange.hpp"
+#include "host/witness/verify_cosines.hpp"
+#include "host/witness/verify_lagrange.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,7 +1,7 @@
 // F~ for `verify`: back-projected at nodes a quarter of a pixel apart across z and at the detector's rows (or
 // at heights, where these are fewer), and interpolated to gold from there (docs/error-bounds.md, "What verify
 // does", step 1). Shares nothing with build. Called by verify_field.cpp. Launches
-// kernels/verify/verify_nodes.cl.
+// kernels/witness/verify_nodes.cl.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "host/opencl/array.hpp"
-#include "host/verify/verify_bounds.hpp"
-#include "host/verify/verify_cone_nodes.hpp"
+#include "host/witness/verify_bounds.hpp"
+#include "host/witness/verify_cone_nodes.hpp"
 #include "shared/verify_nodes.h"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/grid.hpp"

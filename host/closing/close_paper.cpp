@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "host/certify/close_boundaries.hpp"
+#include "host/closing/close_boundaries.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/brick_layout.hpp"
 

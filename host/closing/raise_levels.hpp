@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/certify/open_bricks.hpp"
+#include "host/closing/open_bricks.hpp"
 #include "host/gold/search_triples.hpp"
 
 namespace vdvr {

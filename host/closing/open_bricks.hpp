@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/certify/tile_store.hpp"
+#include "host/closing/tile_store.hpp"
 #include "host/volume/quantise.hpp"
 #include "vdvr/mixed_volume.hpp"
 

@@ -1,5 +1,5 @@
 // The rules by which repair raises levels.
-#include "host/certify/raise_levels.hpp"
+#include "host/closing/raise_levels.hpp"
 
 #include <algorithm>
 

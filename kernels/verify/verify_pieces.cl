@@ -6,7 +6,7 @@
 // Layouts: float field[block][y + 2][x + 2][z_padded] with node z at z + 2, two nodes of halo on every side;
 // float error[item][y][x][error_padded], one item per tested piece; int4 items[item] = piece x, y, z and its
 // block; int4 first[block] = the block's first piece; uchar tested[block][cell y][cell x]: columns of gold
-// cells that can hold a covered point. Called by host/verify/verify_field.cpp.
+// cells that can hold a covered point. Called by host/verify/verify_pieces.cpp.
 #include "device/largest.h"
 #include "shared/mixed_sampler.h"
 #include "shared/verify_pieces.h"

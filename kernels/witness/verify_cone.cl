@@ -1,11 +1,11 @@
 // How `verify` back-projects nodes of cone beam, apart from everything that build uses: lambda^-2 q(u, v) by
 // eight points of Lagrange both ways (docs/error-bounds.md, "What verify does", "Cone beam").
 // Layouts: float table[view][column][row]; View numbers[tile][block][view]; int2 tiles[tile] = first node x,
-// y; float nodes[y][x][all_heights]. Called by host/verify/verify_cone_nodes.cpp.
+// y; float nodes[y][x][all_heights]. Called by host/witness/verify_cone_nodes.cpp.
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 
-// About the middle of a block, as host/verify/verify_cone_nodes.cpp fills it. xyz of a float4: by how much
+// About the middle of a block, as host/witness/verify_cone_nodes.cpp fills it. xyz of a float4: by how much
 // the numerator, or lambda, changes from node to node; w: what it is in the middle. A place counts from the
 // column and the row in `whole`, so chosen that it is positive in all of the block.
 typedef struct {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/open_bricks.hpp"
+#include "host/closing/open_bricks.hpp"
 #include "vdvr/build.hpp"
 
 namespace vdvr {

@@ -1,6 +1,6 @@
 // Double precision on the host up to the table of fine columns and the matrix along z, fp32 on the device
 // from there on.
-#include "host/verify/verify_nodes.hpp"
+#include "host/witness/verify_nodes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "host/verify/verify_cosines.hpp"
-#include "host/verify/verify_lagrange.hpp"
+#include "host/witness/verify_cosines.hpp"
+#include "host/witness/verify_lagrange.hpp"
 
 namespace vdvr {
 
@@ -192,7 +192,7 @@ void VerifyNodes::make_cone_nodes(const Part& part) {
 void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
   const std::int64_t K = field_.geometry().views();
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
-      state_, "verify/verify_nodes", "verify_nodes");
+      state_, "witness/verify_nodes", "verify_nodes");
   for (std::int64_t first = 0; first < K; first += table.views) {
     fill(table, first_row, first);
     const VdvrVerifyRows rows{.accumulate = first > 0 ? 1 : 0,
@@ -272,7 +272,7 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
   const opencl::DeviceArray<cl_int4> bands(state_, std::span<const cl_int4>(h.bands), "heights to verify");
   const opencl::DeviceArray<float> weights(state_, std::span<const float>(h.weights), "product along z");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights> along(
-      state_, "verify/verify_nodes", "verify_heights");
+      state_, "witness/verify_nodes", "verify_heights");
   const VdvrVerifyHeights shape{.blocks = to_int(blocks),
                                 .nx = to_int(n),
                                 .ny = to_int(n),
@@ -294,8 +294,8 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
         shape);
   const LagrangeFilter filter = lagrange_filter(to_int(factor));
   const opencl::DeviceArray<float> taps(state_, std::span<const float>(filter.weights), "Lagrange's weights");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(state_, "verify/verify_nodes",
-                                                                                "verify_between");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(
+      state_, "witness/verify_nodes", "verify_between");
   // Blocks begin two places before a node.
   const auto pass = [&](const auto& out, const auto& in, std::int64_t outer, std::int64_t inner,
                         std::uint64_t together) {

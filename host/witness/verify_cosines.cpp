@@ -1,5 +1,5 @@
 // Sums of cosines in double precision.
-#include "host/verify/verify_cosines.hpp"
+#include "host/witness/verify_cosines.hpp"
 
 #include <cmath>
 #include <numbers>

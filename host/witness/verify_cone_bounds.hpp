@@ -5,8 +5,8 @@
 
 #include <span>
 
-#include "host/verify/verify_bounds.hpp"
-#include "host/verify/verify_cone_nodes.hpp"
+#include "host/witness/verify_bounds.hpp"
+#include "host/witness/verify_cone_nodes.hpp"
 #include "vdvr/cone_geometry.hpp"
 
 namespace vdvr {

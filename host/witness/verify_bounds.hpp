@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "host/verify/verify_lagrange.hpp"
+#include "host/witness/verify_lagrange.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"

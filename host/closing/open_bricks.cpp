@@ -1,5 +1,5 @@
 // Geometry of bricks and what they share.
-#include "host/certify/open_bricks.hpp"
+#include "host/closing/open_bricks.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,5 +1,5 @@
 // Double precision on the host up to the tables and the numbers of blocks, fp32 on the device from there on.
-#include "host/verify/verify_cone_nodes.hpp"
+#include "host/witness/verify_cone_nodes.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "host/opencl/kernel.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "host/verify/verify_cosines.hpp"
+#include "host/witness/verify_cosines.hpp"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 #include "vdvr/cone_geometry.hpp"
@@ -33,7 +33,7 @@ constexpr std::uint64_t most_numbers = std::uint64_t{16} << 20;  // bytes of a l
 // Half of a block, in nodes.
 constexpr Vec3 half{0.5 * (tile - 1), 0.5 * (tile - 1), 0.5 * (block - 1)};
 
-/// As kernels/verify/verify_cone.cl reads it.
+/// As kernels/witness/verify_cone.cl reads it.
 struct ViewNumbers {
   cl_float4 u, v, lambda;
   cl_int4 whole;
@@ -270,7 +270,7 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                      together = std::max<std::int64_t>(
                          1, static_cast<std::int64_t>(most_numbers / sizeof(ViewNumbers)) / of_tile);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyCone> kernel(
-      state_, "verify/verify_cone", "verify_cone", {{"VDVR_UPRIGHT", upright_ ? "1" : "0"}});
+      state_, "witness/verify_cone", "verify_cone", {{"VDVR_UPRIGHT", upright_ ? "1" : "0"}});
   std::mutex lock;
   for (std::int64_t first = 0; first < all; first += together) {
     const std::int64_t n = std::min(together, all - first);

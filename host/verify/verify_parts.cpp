@@ -1,0 +1,163 @@
+// How the bricks that are asked for are cut: by the nodes that memory holds, and into slabs of blocks. Called
+// by verify_field.cpp.
+#include "host/verify/verify_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vdvr {
+namespace {
+
+// Of cone beam, heights of nodes that are back-projected together, but for those around them.
+constexpr std::int64_t most_heights = 128;
+
+/// Only the selected bricks in layers [first, end) along an axis.
+std::vector<std::uint8_t> layers_of(const std::vector<std::uint8_t>& selected, const Index3& n,
+                                    std::size_t axis, std::int64_t first, std::int64_t end) {
+  std::vector<std::uint8_t> some(selected.size(), 0);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    const Index3 p{i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
+    some[at(i)] = p[axis] >= first && p[axis] < end ? selected[at(i)] : std::uint8_t{0};
+  }
+  return some;
+}
+
+}  // namespace
+
+// A brick whose middle lies further outside than half its diagonal and a cell's has no tested cell, nor has
+// one above or below what is covered.
+std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> selected) const {
+  const Index3 n = volume_.bricks();
+  const Grid& grid = volume_.grid;
+  const double g = volume_.granularity, diagonal = std::hypot(grid.spacing[0], grid.spacing[1]);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    const double x = grid.origin[0] + (static_cast<double>(i % n[0]) + 0.5) * g * grid.spacing[0],
+                 y = grid.origin[1] + (static_cast<double>(i / n[0] % n[1]) + 0.5) * g * grid.spacing[1];
+    if (coverage_.margin(x, y) < -(0.5 * g + 1) * diagonal) selected[at(i)] = 0;
+    const double z = grid.origin[2] + (static_cast<double>(i / n[0] / n[1]) + 0.5) * g * grid.spacing[2];
+    if (coverage_.margin_z(z) < -(0.5 * g + 1) * grid.spacing[2]) selected[at(i)] = 0;
+  }
+  return selected;
+}
+
+VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+                                        bool rows) const {
+  const Index3 n = volume_.bricks();
+  const BoxOfBricks box(n, selected);
+  VerifyNodes::Part p;
+  p.across = std::min(rates.front(), across_);
+  const std::int64_t side = std::int64_t{volume_.granularity} * p.across,
+                     around = rates.back() > p.across ? VerifyNodes::reach : verify_halo;
+  p.first_x = box.first[0] * side - around;
+  p.first_y = box.first[1] * side - around;
+  p.nx = (box.end[0] - box.first[0]) * side + 1 + 2 * around;
+  p.ny = (box.end[1] - box.first[1]) * side + 1 + 2 * around;
+  p.rows = rows;
+  if (!rows) {
+    p.along = 1;
+    const auto dense = [&](int along) {
+      return field_.views().empty() ? volume_.grid.spacing[2] / along <= 0.25 * field_.geometry().pitch_v
+                                    : along >= rates_of_cone_.along;
+    };
+    while (p.along < rates.back() && !dense(p.along)) p.along *= 2;
+    const std::int64_t tall = std::int64_t{volume_.granularity} * p.along;
+    // Steps of the coarsest rate, and a polynomial's nodes.
+    const std::int64_t beyond = verify_halo * std::max<std::int64_t>(1, p.along / rates.front()) +
+                                (rates.back() > p.along ? VerifyNodes::reach : 0);
+    p.first_z = box.first[2] * tall - beyond;
+    p.nz = (box.end[2] - box.first[2]) * tall + 1 + 2 * beyond;
+  }
+  const std::int64_t across = VerifyNodes::tiles_across(p.nx);
+  p.tiles.assign(at(across * VerifyNodes::tiles_across(p.ny)), 0);
+  for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
+    if (!selected[at(i)]) continue;
+    const std::int64_t x = (i % n[0] - box.first[0]) * side, y = (i / n[0] % n[1] - box.first[1]) * side;
+    for (std::int64_t ty = y / VDVR_VERIFY_TILE; ty <= (y + side + 2 * around) / VDVR_VERIFY_TILE; ++ty)
+      for (std::int64_t tx = x / VDVR_VERIFY_TILE; tx <= (x + side + 2 * around) / VDVR_VERIFY_TILE; ++tx)
+        p.tiles[at(ty * across + tx)] = 1;
+  }
+  return p;
+}
+
+// Of cone beam: neighbouring layers of bricks together, whose heights around them are then the same.
+std::vector<std::vector<std::uint8_t>> VerifyField::joined(std::vector<std::vector<std::uint8_t>> layers,
+                                                           const std::vector<std::uint8_t>& selected) const {
+  const Index3 n = volume_.bricks();
+  const auto together =
+      std::max<std::int64_t>(1, most_heights / (std::int64_t{volume_.granularity} * rates_of_cone_.along));
+  std::vector<std::vector<std::uint8_t>> out;
+  std::int64_t first = -1, last = -1;
+  for (const std::vector<std::uint8_t>& layer : layers) {
+    const std::int64_t z = BoxOfBricks(n, layer).first[2];
+    if (!out.empty() && z == last + 1 && z < first + together) {
+      out.back() = layers_of(selected, n, 2, first, z + 1);
+    } else {
+      out.push_back(layer);
+      first = z;
+    }
+    last = z;
+  }
+  return out;
+}
+
+// The detector's rows serve all heights; where fewer heights are asked for, they are made themselves, layer
+// by layer of bricks. Both in bands of bricks whose nodes fit the memory.
+std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint8_t>& selected,
+                                                     std::span<const int> rates) const {
+  const Index3 n = volume_.bricks();
+  std::vector<std::vector<std::uint8_t>> runs;
+  std::int64_t heights = 0;
+  for (std::int64_t z = 0; z < n[2]; ++z) {
+    std::vector<std::uint8_t> layer = layers_of(selected, n, 2, z, z + 1);
+    if (std::find(layer.begin(), layer.end(), 1) == layer.end()) continue;
+    heights += nodes_of(layer, rates, false).nz;
+    runs.push_back(std::move(layer));
+  }
+  // Of cone beam no two nodes see the same rows.
+  const bool rows = field_.views().empty() && field_.geometry().rows <= heights;
+  if (rows) runs.assign(1, selected);
+  if (!field_.views().empty()) runs = joined(std::move(runs), selected);
+  const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
+  std::vector<Part> parts;
+  for (const std::vector<std::uint8_t>& run : runs) {
+    const BoxOfBricks box(n, run);
+    for (std::int64_t y = box.first[1]; y < box.end[1];) {
+      std::int64_t end = box.end[1];
+      Part part;
+      for (;; end = y + (end - y + 1) / 2) {
+        part.selected = layers_of(run, n, 1, y, end);
+        if (BoxOfBricks(n, part.selected).bricks == 0) break;
+        part.nodes = nodes_of(part.selected, rates, rows);
+        if (end == y + 1 || nodes_.bytes_of(part.nodes) <= budget) break;
+      }
+      y = end;
+      if (BoxOfBricks(n, part.selected).bricks > 0) parts.push_back(std::move(part));
+    }
+  }
+  return parts;
+}
+
+std::vector<VerifyField::Slab> VerifyField::slabs_of(const Shape& s,
+                                                     const std::vector<std::uint8_t>& selected) const {
+  const Index3 n = volume_.bricks();
+  const BoxOfBricks box(n, selected);
+  const auto end = [&](std::size_t a) { return std::min(s.pieces[a], box.end[a] * s.per_brick); };
+  std::vector<Slab> slabs;
+  for (std::int64_t z = box.first[2] * s.per_brick; z < end(2); z += s.height) {
+    Slab slab{z, {}};
+    for (std::int64_t y = box.first[1] * s.per_brick; y < end(1); y += s.width)
+      for (std::int64_t x = box.first[0] * s.per_brick; x < end(0); x += s.width) {
+        bool any = false;
+        for (std::int64_t bz = z; bz < std::min(end(2), z + s.height); ++bz)
+          for (std::int64_t by = y; by < std::min(end(1), y + s.width); ++by)
+            for (std::int64_t bx = x; bx < std::min(end(0), x + s.width); ++bx)
+              any = any || selected[s.brick(n, bx, by, bz)] != 0;
+        if (any) slab.blocks.push_back({x, y});
+      }
+    if (!slab.blocks.empty()) slabs.push_back(std::move(slab));
+  }
+  return slabs;
+}
+
+}  // namespace vdvr
