@@ -14,6 +14,7 @@ namespace {
 
 std::vector<std::string> filter_names() {
   std::vector<std::string> names;
+  names.reserve(ramp_windows.size());
   for (const auto& [window, name] : ramp_windows) names.emplace_back(name);
   return names;
 }
@@ -97,7 +98,7 @@ const std::vector<std::string> preparation_names{"outliers", "phase",    "stripe
 // `count` numbers, or the first alone where `fewest` is 1.
 std::vector<double> list_of(const Arguments& args, const std::string& name, std::size_t fewest,
                             std::size_t most) {
-  const std::vector<double> values = args.numbers(name, 0).value();
+  std::vector<double> values = args.numbers(name, 0).value();
   if (values.size() != fewest && values.size() != most)
     throw InputError(fmt::format("--{}: {} numbers, expected {}{}", name, values.size(),
                                  fewest == most ? "" : fmt::format("{} or ", fewest), most));
@@ -267,7 +268,7 @@ void add_limited(Arguments& args, const std::string& name, const std::vector<std
 
 std::string limited_choice(const Arguments& args, const std::string& name,
                            const std::vector<std::string>& all, const std::vector<std::string>& supported) {
-  const std::string given = args.choice(name, all, supported.front());
+  std::string given = args.choice(name, all, supported.front());
   if (std::find(supported.begin(), supported.end(), given) == supported.end())
     throw InputError(
         fmt::format("--{} {}: this version supports only: {}", name, given, fmt::join(supported, ", ")));
@@ -336,6 +337,7 @@ namespace {
 template <class T>
 T choice_of(const Arguments& args, const std::string& name, const std::vector<T>& values, T fallback) {
   std::vector<std::string> names;
+  names.reserve(values.size());
   for (const T value : values) names.emplace_back(text_of(value));
   const std::string given = args.choice(name, names, text_of(fallback));
   return values[static_cast<std::size_t>(std::find(names.begin(), names.end(), given) - names.begin())];

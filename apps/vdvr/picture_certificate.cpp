@@ -361,15 +361,15 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.lit = picture.options.mode == RenderMode::dvr && picture.options.shading &&
                   j.at("light").get<std::string>() == text_of(CertifiedLight::lit);
     if (picture.options.mode == RenderMode::iso)
-      return {std::move(picture), {j.at("statement").get<std::string>(), "", 0, 0, {}, 0, j.at("iso")}};
-    return {std::move(picture),
-            {j.at("statement").get<std::string>(),
-             j.at("light").get<std::string>(),
-             j.at("levels").at("mean").get<double>(),
-             j.at("levels").at("max").get<double>(),
-             j.at("within").get<std::map<std::string, double>>(),
-             count_of(j.at("pixels"), "certified", path),
-             {}}};
+      return {std::move(picture),
+              PictureClaims{j.at("statement").get<std::string>(), "", 0, 0, {}, 0, j.at("iso")}};
+    return {std::move(picture), PictureClaims{j.at("statement").get<std::string>(),
+                                              j.at("light").get<std::string>(),
+                                              j.at("levels").at("mean").get<double>(),
+                                              j.at("levels").at("max").get<double>(),
+                                              j.at("within").get<std::map<std::string, double>>(),
+                                              count_of(j.at("pixels"), "certified", path),
+                                              {}}};
   } catch (const Json::exception& e) {
     throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));
   }

@@ -143,7 +143,8 @@ std::vector<fs::path> ray_certificate_paths(const fs::path& output, RenderMode m
 }
 
 RayCertificate write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
-                                     RenderResult drawn, const fs::path& output, const Progress& progress) {
+                                     const RenderResult& drawn, const fs::path& output,
+                                     const Progress& progress) {
   const Scene& scene = source.scene();
   CertifiedPicture picture = described(source, options, drawn, output);
   const CertifiedRays rays(scene.volume, *scene.certificate, false, box_of(options.clip));

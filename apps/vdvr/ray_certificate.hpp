@@ -35,7 +35,7 @@ struct RayCertificate {
 /// The certificate of a picture of the source. `drawn` with `options`: is marked and written, or what --show
 /// asks for. All of it appears together.
 RayCertificate write_ray_certificate(const Arguments& args, Source& source, const RenderOptions& options,
-                                     RenderResult drawn, const std::filesystem::path& output,
+                                     const RenderResult& drawn, const std::filesystem::path& output,
                                      const Progress& progress);
 /// Levels of what is shown, and how well the value of F behind it is known: `member` of the JSON.
 void print_known(const Json& json, const std::string& shown, const char* member, const char* what);

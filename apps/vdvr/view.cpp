@@ -134,6 +134,7 @@ constexpr std::array<std::pair<const char*, GradientKind>, 4> kGradients{
 
 GradientKind gradient_option(const Arguments& args) {
   std::vector<std::string> names;
+  names.reserve(kGradients.size());
   for (const auto& [name, kind] : kGradients) names.emplace_back(name);
   const std::string asked = args.choice("gradient", names, "auto");
   return std::find_if(kGradients.begin(), kGradients.end(), [&](const auto& g) { return asked == g.first; })

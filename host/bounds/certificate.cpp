@@ -59,7 +59,7 @@ Json numbers(const char* member, const Numbers& values) {
 }
 
 Json options(const std::string& text) {
-  const Json parsed = Json::parse(text, nullptr, false);
+  Json parsed = Json::parse(text, nullptr, false);
   if (!parsed.is_object())
     throw InputError(fmt::format("certificate: options are not a JSON object: '{}'", text));
   return parsed;

@@ -174,7 +174,7 @@ void ClassifyBricks::take_slack(const BrickMeasure& m) {
 }
 
 std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
-  const auto bricks = in.get_vector<std::int64_t>();
+  auto bricks = in.get_vector<std::int64_t>();
   const auto levels = in.get_vector<LevelTriple>();
   const auto samples = in.get_vector<float>();
   const float* next = samples.data();

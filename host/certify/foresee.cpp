@@ -174,8 +174,8 @@ std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGe
     return 2 * static_cast<double>(block[a] * settings.granularity) + 2 * kept_around;
   };
   const double of_column = side(0) * side(1) * static_cast<double>(geometry.rows * geometry.views());
-  const double columns = static_cast<double>((n[0] + block[0] - 1) / block[0]) *
-                         static_cast<double>((n[1] + block[1] - 1) / block[1]);
+  const auto blocks = [&](std::size_t a) { return (n[a] + block[a] - 1) / block[a]; };
+  const auto columns = static_cast<double>(blocks(0) * blocks(1));
   const auto wanted = static_cast<std::int64_t>(std::max(fewest_columns, most_back_projected / of_column));
   if (static_cast<double>(wanted) >= 0.5 * columns) return near;
   std::vector<std::uint8_t> chosen(at(n[0] * n[1]), 0);

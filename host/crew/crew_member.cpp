@@ -1,5 +1,6 @@
 #include "host/crew/crew_member.hpp"
 
+#include <stdexcept>
 #include <utility>
 
 namespace vdvr {
@@ -58,7 +59,9 @@ GoldStream& CrewMember::stream() {
     return *fitting_;
   }
   GoldRates& both = rates(pass_->lattice);
-  return pass_->fine ? both.fine() : *both.coarse();
+  if (pass_->fine) return both.fine();
+  if (!both.coarse()) throw std::logic_error("CrewMember: a pass of coarse gold, where there is none");
+  return *both.coarse();
 }
 
 double CrewMember::arithmetic() { return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic(); }
