@@ -190,12 +190,16 @@ void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPic
   o.clip = clip_of(j.at("clip"));
 }
 
-/// Files without the member are older than chord steps.
-bool is_chord(const std::string& step, const std::filesystem::path& path) {
-  if (step != "box" && step != "chord")
-    throw FileError(fmt::format("{}: is no certificate of a picture: its step is '{}', neither box nor chord",
+/// Light of F has box steps alone, and the one pass has them too.
+const char* text_of_step(const CertifiedPicture& picture) {
+  return picture.certify.box || picture.certify.fast || picture.lit ? "box" : "joint";
+}
+/// Files without the member are older than joint steps.
+bool is_box(const std::string& step, const std::filesystem::path& path) {
+  if (step != "box" && step != "joint")
+    throw FileError(fmt::format("{}: is no certificate of a picture: its step is '{}', neither box nor joint",
                                 path.string(), step));
-  return step == "chord";
+  return step == "box";
 }
 
 }  // namespace
@@ -312,7 +316,7 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
           {"kappa", picture.certify.kappa},
           {"theta", picture.certify.theta},
           {"fast", picture.certify.fast},
-          {"step", picture.certify.chord ? "chord" : "box"},
+          {"step", text_of_step(picture)},
           {"device", picture.device},
           {"driver", picture.driver},
           {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
@@ -348,7 +352,7 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.certify.kappa = j.at("kappa").get<double>();
     picture.certify.theta = j.at("theta").get<double>();
     picture.certify.fast = j.at("fast").get<bool>();
-    picture.certify.chord = is_chord(j.value("step", "box"), path);
+    picture.certify.box = is_box(j.value("step", "box"), path);
     picture.covered.radius = j.at("covered").at("radius").get<double>();
     const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
     picture.covered.z = {z[0], z[1]};

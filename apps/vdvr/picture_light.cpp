@@ -32,10 +32,8 @@ void check_picture_light(const Arguments& args, const RenderOptions& o) {
   if (!o.shading) refuse(args, {"certify-light"}, "is of pictures with light: leave --no-shading out");
   if (!asks_lit(args)) return;
   const std::string form = args.has("certify") ? args.text_or("certify", "exact") : "exact";
-  if (form == "fast" || form == "chord")
-    throw InputError(fmt::format(
-        "--certify {} does not go with --certify-light lit, which has the exact form alone: --certify",
-        form));
+  if (form == "fast")
+    throw InputError("--certify fast does not go with --certify-light lit, which has two passes: --certify");
   if (o.gradient != GradientKind::automatic && o.gradient != GradientKind::central)
     throw InputError(
         "--certify-light lit: light of F is that of its differences over one base cell: take --gradient "

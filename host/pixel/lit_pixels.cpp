@@ -25,7 +25,7 @@ void check(const MixedVolume& volume, const std::vector<float>& bounds, const Re
   if (!o.shading) throw InputError("a picture without light has none to certify");
   if (o.gradient != GradientKind::central)
     throw InputError("light is certified of `gradient` central alone: differences of F over one base cell");
-  if (c.fast || c.chord) throw InputError("light is certified by box steps alone, not by `fast` or `chord`");
+  if (c.fast) throw InputError("light is certified by two passes alone, not by `fast`");
   if (c.window)
     throw InputError(
         "light is not certified where the certificate has a window: F's differences across it are "

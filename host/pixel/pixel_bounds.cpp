@@ -27,7 +27,7 @@ namespace {
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
 
-static_assert(sizeof(VdvrCertify) == 96);
+static_assert(sizeof(VdvrCertify) == 120);
 
 constexpr double kUnit = 0x1p-24;
 // Of the list of pieces; what a picture needs beyond is made by smaller launches.
@@ -54,8 +54,6 @@ void check(const Subject& v, const std::vector<float>& bounds, const RenderOptio
     throw InputError(fmt::format("{} bounds for {} bricks", bounds.size(), v.field.ranges.size()));
   if (!(c.kappa >= 0x1p-10 && c.kappa <= 1024))
     throw InputError(fmt::format("`certify_parts` kappa {} must lie between 1/1024 and 1024", c.kappa));
-  if (c.chord && c.fast)
-    throw InputError("chord steps need what lies behind a part, which the one pass of `fast` does not know");
   if (!(c.theta > 0 && c.theta < 1))
     throw InputError(fmt::format("termination {} of a certified picture must lie in (0, 1)", c.theta));
   if (c.window && !is_clear_outside(o.transfer, *c.window))
@@ -110,8 +108,13 @@ VdvrCertify make_certify(const Subject& v, const RenderOptions& o, const Certify
   // Of theorem 6 too. The background is interpolated: 5 u of a quotient, and four roundings.
   q.first_error = static_cast<float>(10 * kUnit * most);
   q.sum_error = static_cast<float>(kUnit / 2 * std::exp2(std::ceil(std::log2(most))));
-  const int of_share = c.fast ? VDVR_FAST_ROUNDING : c.chord ? VDVR_CHORD_ROUNDING : VDVR_BOX_ROUNDING;
-  q.share_error = static_cast<float>(of_share * kUnit * most);
+  q.share_error = static_cast<float>((c.fast ? VDVR_FAST_ROUNDING : VDVR_STEP_ROUNDING) * kUnit * most);
+  q.joint_rounding = static_cast<float>(VDVR_JOINT_ROUNDING * kUnit * most);
+  q.extinction_error = table.extinction_error;
+  q.joint_error = 5 * static_cast<float>(most) * table.extinction_error;
+  q.first_edge = table.first_edge;
+  q.first_bend = table.first_bend;
+  q.or_clear = c.window ? 1 : 0;
   return q;
 }
 
@@ -134,7 +137,7 @@ opencl::Defines with_kernel(opencl::Defines defines, const CertifyPictureOptions
   for (auto& [name, value] : defines)
     if (name == "VDVR_KERNEL") value = c.fast ? "VDVR_KERNEL_CERTIFY_FAST" : "VDVR_KERNEL_CERTIFY";
   defines.push_back({"VDVR_LIGHT", light ? "1" : "0"});
-  defines.push_back({"VDVR_CHORD", c.chord ? "1" : "0"});
+  defines.push_back({"VDVR_JOINT", c.box || c.fast ? "0" : "1"});
   return defines;
 }
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "shared/certify_params.h"
 
@@ -81,6 +82,67 @@ Row row_between(const std::vector<TransferPoint>& points, double from, double to
   return row;
 }
 
+/// Of the straight piece that begins at a value or holds it.
+TransferPoint above(const std::vector<TransferPoint>& points, double value) {
+  std::size_t next = 0;
+  while (next < points.size() && points[next].value <= value) ++next;
+  if (next == 0) return points.front();
+  return next == points.size() ? points.back() : between(points[next - 1], points[next], value);
+}
+
+/// Edges and bends, in rows behind those of ranges.
+class Stretches {
+ public:
+  Stretches(const std::vector<TransferPoint>& points, RangeTable& table) : points_(points), t_(table) {}
+
+  template <class Edge>
+  void add(const Edge& edge) {
+    t_.first_edge = static_cast<int>(t_.rows.size());
+    put(points_.front());
+    for (int i = 1; i < t_.bins; ++i) put(above(points_, edge(i)));
+    put(points_.back());
+    t_.first_bend = static_cast<int>(t_.rows.size());
+    std::vector<cl_int> bends(static_cast<std::size_t>(t_.bins) + 1, 0);
+    for (std::size_t i = 0; i < points_.size();) {
+      std::size_t end = i + 1;
+      while (end < points_.size() && points_[end].value == points_[i].value) ++end;
+      put(points_[i]);
+      put(points_[end - 1]);
+      ++bends[static_cast<std::size_t>(bin_of(points_[i].value, edge)) + 1];
+      i = end;
+    }
+    std::partial_sum(bends.begin(), bends.end(), bends.begin());
+    t_.next_shown.insert(t_.next_shown.end(), bends.begin(), bends.end());
+  }
+
+ private:
+  /// A bend at the edge of two bins is in the lower one, and the edge above it.
+  template <class Edge>
+  [[nodiscard]] int bin_of(double value, const Edge& edge) const {
+    int low = 0, high = t_.bins - 1;
+    while (low < high) {
+      const int middle = (low + high) / 2;
+      if (value <= edge(middle + 1)) high = middle;
+      else low = middle + 1;
+    }
+    return low;
+  }
+  void put(const TransferPoint& p) {
+    const double t = std::min(static_cast<double>(kOpaque), halvings(p.opacity));
+    t_.rows.push_back({{static_cast<float>(t), static_cast<float>(p.rgb[0]), static_cast<float>(p.rgb[1]),
+                        static_cast<float>(p.rgb[2])}});
+    // An opacity between two points is rounded, by 2^-50 at most.
+    if (p.opacity > 0 && p.opacity < 1) {
+      const double most =
+          std::min(static_cast<double>(kOpaque), halvings(std::min(1.0, p.opacity + 0x1p-50)));
+      t_.extinction_error = std::max(t_.extinction_error, up((most - t) * (1 + 0x1p-20)));
+    }
+  }
+
+  const std::vector<TransferPoint>& points_;
+  RangeTable& t_;
+};
+
 }  // namespace
 
 RangeTable make_range_table(const TransferFunction& transfer, double bound, bool or_clear) {
@@ -123,6 +185,7 @@ RangeTable make_range_table(const TransferFunction& transfer, double bound, bool
       twice[i] = joined(rows[i], rows[std::min(i + static_cast<std::size_t>(run), rows.size() - 1)]);
     rows = std::move(twice);
   }
+  Stretches(points, t).add(edge);
   return t;
 }
 

@@ -30,8 +30,9 @@ struct CertifyPictureOptions {
   double theta = 0x1p-10;
   /// One pass over the ray and nothing kept: for intervals 1.4 to 3 times as wide, while one turns a view.
   bool fast = false;
-  /// Chord steps in place of box steps: some per cent narrower and slower. Not with `fast`.
-  bool chord = false;
+  /// Steps that take opacity and colour apart, as those of `fast` do: wider, but what they give for wider
+  /// bounds on the same parts is never narrower.
+  bool box = false;
   /// The certificate's: beside what its bound says, F may lie anywhere outside of this at any point, and it
   /// does so throughout a brick without a bound. The transfer function must be clear there.
   std::optional<std::pair<double, double>> window{};

@@ -53,11 +53,13 @@ RAY_INLINE I is_clear(RANGES, const VdvrCertify* q, V from, V to) {
 typedef struct {
   I first, second;
 } Rows;
-RAY_INLINE Rows rows_of(const VdvrCertify* q, V from, V to) {
-  const I first = bin_of(q, from, -VDVR_BIN_MARGIN), last = bin_of(q, to, VDVR_BIN_MARGIN);
+RAY_INLINE Rows rows_of_bins(const VdvrCertify* q, I first, I last) {
   const I k = 31 - AS_I(clz(AS_U(last - first + 1)));
   const Rows r = {k * q->bins + first, k * q->bins + last - ((I)(1) << k) + 1};
   return r;
+}
+RAY_INLINE Rows rows_of(const VdvrCertify* q, V from, V to) {
+  return rows_of_bins(q, bin_of(q, from, -VDVR_BIN_MARGIN), bin_of(q, to, VDVR_BIN_MARGIN));
 }
 // The least extinction of [from, to], in halvings a length.
 RAY_INLINE V least_extinction(RANGES, const VdvrCertify* q, V from, V to) {
@@ -66,9 +68,8 @@ RAY_INLINE V least_extinction(RANGES, const VdvrCertify* q, V from, V to) {
   const V a = GATHER(V, negative, 8 * r.first), b = GATHER(V, negative, 8 * r.second);
   return -MOST(a, b);
 }
-// Extinctions and visible colours over [from, to].
-RAY_INLINE Shown shown_between(RANGES, const VdvrCertify* q, V from, V to) {
-  const Rows r = rows_of(q, from, to);
+// Extinctions and visible colours of two rows together.
+RAY_INLINE Shown shown_of(RANGES, Rows r) {
 #define FIRST_LOW(n) ranges[2 * LANE(r.first, n)]
 #define FIRST_HIGH(n) ranges[2 * LANE(r.first, n) + 1]
 #define SECOND_LOW(n) ranges[2 * LANE(r.second, n)]
@@ -296,38 +297,79 @@ RAY_INLINE Joint pick_joint(I m, Joint a, Joint b) {
   return j;
 }
 
+// A colour under the light of a piece, and the negative of one.
+RAY_INLINE V3 lit3(V3 c, V lit, V highlight) {
+  return v3(c.x * lit + highlight, c.y * lit + highlight, c.z * lit + highlight);
+}
+RAY_INLINE Shown light_shown(Shown s, const Piece* piece) {
 #if VDVR_LIGHT
-RAY_INLINE void light_shown(Shown* s, V lit, V highlight) {
-#define LIT(axis)                            \
-  s->c1.axis = s->c1.axis * lit + highlight; \
-  s->minus_c0.axis = s->minus_c0.axis * lit - highlight;
-  LIT(x)
-  LIT(y)
-  LIT(z)
-#undef LIT
+  s.c1 = lit3(s.c1, piece->lit, piece->highlight);
+  s.minus_c0 = lit3(s.minus_c0, piece->lit, -piece->highlight);
+#endif
+  return s;
+}
+
+#if VDVR_JOINT
+// The transfer function where it is kept: at edges of bins, and on either side of its bends.
+RAY_INLINE ValueShown value_shown(RANGES, const Piece* piece, I row) {
+#define AT_VALUE(n) ranges[LANE(row, n)]
+  const V4 at = TURN(AT_VALUE);
+#undef AT_VALUE
+  ValueShown s = {at.x, v3(at.y, at.z, at.w)};
+#if VDVR_LIGHT
+  s.c = lit3(s.c, piece->lit, piece->highlight);
+#endif
+  return s;
+}
+// Takes in bins in four runs that overlap, each as a box: of bins with too many bends.
+RAY_INLINE void add_runs(RANGES, const VdvrCertify* q, const Piece* piece, Part* part, I first, I last,
+                         I here, V3 behind, V3 minus_behind) {
+  const I count = last - first + 1, k = MOST(30 - AS_I(clz(AS_U(count))), (I)(0)), run = (I)(1) << k;
+  const I free = count - run;
+  for (int j = 0; j < 4; ++j) {
+    const I at = k * q->bins + first + (j * free) / 3;
+    const Rows r = {at, at};
+    Shown s = light_shown(shown_of(THE_RANGES, r), piece);
+    s.t1 = PICK(here, s.t1, (V)(0.0f));
+    add_box(q, part, &s, behind, minus_behind);
+  }
+}
+// Takes in all values of bins, stretch by stretch.
+RAY_INLINE void add_bins(RANGES, const VdvrCertify* q, const Piece* piece, Part* part, I first, I last,
+                         V3 behind, V3 minus_behind) {
+  __global const int* bends_before = next_shown + q->bins;
+  I bend = GATHER(I, bends_before, first), left = GATHER(I, bends_before, last + 1) - bend;
+  const I many = left > VDVR_MOST_BENDS;
+  ValueShown from = value_shown(THE_RANGES, piece, q->first_edge + first);
+  const ValueShown to = value_shown(THE_RANGES, piece, q->first_edge + last + 1);
+  if (ANY(many)) add_runs(THE_RANGES, q, piece, part, first, last, many, behind, minus_behind);
+  left = PICK(many, (I)(0), left);
+  while (ANY(left > 0)) {
+    const I here = left > 0;
+    const I row = q->first_bend + 2 * PICK(here, bend, (I)(0));
+    add_stretch(q, part, from, pick_value(here, value_shown(THE_RANGES, piece, row), to), behind,
+                minus_behind);
+    from = pick_value(here, value_shown(THE_RANGES, piece, row + 1), from);
+    ++bend;
+    --left;
+  }
+  add_stretch(q, part, from, to, behind, minus_behind);
 }
 #endif
 
-// The part between two joints, of lanes that are `active`.
+// The part between two joints, of lanes that are `active`, before colours that are `behind` and minus
+// `minus_behind`.
 RAY_INLINE Part part_between(RANGES, const VdvrCertify* q, const Piece* whole, const Cut* cut, Joint front,
-                             Joint behind, I active) {
-  const Piece s = piece_between(front, behind);
-  const V from = least_of(&s), to = most_of(&s);
+                             Joint joint, I active, V3 behind, V3 minus_behind) {
+  const Piece s = piece_between(front, joint);
+  const V from = least_of(&s) - cut->e, to = most_of(&s) + cut->e;
   Part part = new_part(cut->length, active);
-#if VDVR_CHORD
-  const V middle = 0.5f * (from + to);
-  part.halves[0] = shown_between(THE_RANGES, q, from - cut->e, middle);
-  part.halves[1] = shown_between(THE_RANGES, q, middle, to + cut->e);
-#if VDVR_LIGHT
-  light_shown(&part.halves[0], whole->lit, whole->highlight);
-  light_shown(&part.halves[1], whole->lit, whole->highlight);
-#endif
-  part.all = shown_of_both(&part.halves[0], &part.halves[1]);
+#if VDVR_JOINT
+  clear_part(&part, (I)(q->or_clear) != 0);
+  add_bins(THE_RANGES, q, whole, &part, bin_of(q, from, -VDVR_BIN_MARGIN), bin_of(q, to, VDVR_BIN_MARGIN),
+           behind, minus_behind);
 #else
-  part.all = shown_between(THE_RANGES, q, from - cut->e, to + cut->e);
-#if VDVR_LIGHT
-  light_shown(&part.all, whole->lit, whole->highlight);
-#endif
+  part.all = light_shown(shown_of(THE_RANGES, rows_of(q, from, to)), whole);
 #endif
   find_shares(&part);
   return part;

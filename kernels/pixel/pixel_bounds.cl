@@ -122,7 +122,7 @@ __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict 
     for (int j = most_lane(n); j > 0; --j) {
       const I active = j <= n;
       const Joint front = joint_at(&cut, j - 1);
-      const Part part = part_between(THE_RANGES, &q, &s, &cut, front, joint, active);
+      const Part part = part_between(THE_RANGES, &q, &s, &cut, front, joint, active, hi, minus_lo);
       hi = above_part(&part, hi);
       minus_lo = minus_below_part(&part, minus_lo);
       error = error_in_front(&q, &part, error);
@@ -212,7 +212,8 @@ __kernel VDVR_HINT void certify_fast(CERTIFY_ARGUMENTS) {
     const int count = most_lane(n);
     for (int j = 1; j <= count; ++j) {
       const Joint behind_part = joint_at(&cut, j);
-      const Part part = part_between(THE_RANGES, &q, &s, &cut, joint, behind_part, j <= n);
+      const Part part =
+          part_between(THE_RANGES, &q, &s, &cut, joint, behind_part, j <= n, behind, minus_behind);
       pass_part(&above, &part, part.all.c1, &up);
       pass_part(&minus_below, &part, part.all.minus_c0, &down);
       // Both knots of a bound are as far off as the further one, and no part makes that less.

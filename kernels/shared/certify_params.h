@@ -14,10 +14,13 @@
 // What cutting a piece makes of a part's coefficients, of the largest step between two of the piece's: 144 u.
 #define VDVR_CUT_ROUNDING (144 * VDVR_UNIT)
 // What fp32 makes of a step, in u of the share that its part takes of a colour (docs/pixel-bounds.md, theorem
-// 6): of the box step, of the chord step, and of the two knots of the fast form.
-#define VDVR_BOX_ROUNDING 20
-#define VDVR_CHORD_ROUNDING 28
+// 6): of box steps and joint steps, and of the two knots of the fast form.
+#define VDVR_STEP_ROUNDING 20
 #define VDVR_FAST_ROUNDING 44
+// What fp32 makes of H0, in u of the part's largest extinction times a colour: with it H0 is a bound.
+#define VDVR_JOINT_ROUNDING 32
+// Stretches of the transfer function that a joint step looks at one by one, less one.
+#define VDVR_MOST_BENDS 3
 // Vectors of numbers that the list of pieces holds for each: b0 to b3, length, e; with light its two.
 #define VDVR_PIECE_NUMBERS 6
 #define VDVR_LIT_PIECE_NUMBERS 8
@@ -25,10 +28,14 @@
 #define VDVR_PIXEL_UNTESTED 1
 #define VDVR_PIXEL_ENDED 2
 
-// Scalars only. 96 bytes.
+// Scalars only. 120 bytes.
 typedef struct {
   float range_lo, range_scale;  // bin = (value - lo) * scale
   int bins;
+  int or_clear;                // beside the values of a part there may be others, which show nothing
+  int first_edge, first_bend;  // rows of the table of ranges (host/pixel/range_table.hpp)
+  // By what extinctions there are off; H0 then, and for each unit of extinction of the part's largest.
+  float extinction_error, joint_error, joint_rounding;
   float parts_per_spread;  // 3 / (2 kappa): parts = this times the largest step of coefficients over e
   float deep;              // log2(1 / theta)
   float theta;

@@ -143,15 +143,15 @@ BOOST_AUTO_TEST_CASE(no_field_within_the_bounds_shows_a_colour_outside_the_inter
     CertifyPictureOptions certify;
     certify.kappa = std::array{0.125, 0.5, 2.0}[random() % 3];
     certify.fast = random() % 4 == 0;
-    certify.chord = !certify.fast && random() % 2 == 0;
+    certify.box = !certify.fast && random() % 3 == 0;
     const PixelBounds b = certify_pixels(device(), resident, bounds, o, certify);
     const std::int64_t before = tally.outside;
     attack(v, bounds, o, b, random, tally);
     ++tally.pictures;
     BOOST_TEST_INFO("picture " << i
-                               << (certify.fast    ? ", fast"
-                                   : certify.chord ? ", chord"
-                                                   : "")
+                               << (certify.fast  ? ", fast"
+                                   : certify.box ? ", box"
+                                                 : "")
                                << ", the worst so far by " << tally.worst << ", rounding of the path "
                                << tally.rounding);
     BOOST_TEST(tally.outside == before);

@@ -147,11 +147,11 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
   s.options.transfer = transfer;
   CertifyPictureOptions half, eighth;
   eighth.kappa = 0.125;
-  const auto certified = [&](CertifyPictureOptions c, bool chord) {
-    c.chord = chord;
+  const auto certified = [&](CertifyPictureOptions c, bool by_box) {
+    c.box = by_box;
     return certify_pixels(device, resident, s.bounds, s.options, c);
   };
-  const PixelBounds b = certified(half, false), chord = certified(half, true);
+  const PixelBounds b = certified(half, false), box = certified(half, true);
   Column truth, bound = bounds_of(s, transfer, b);
   double parts = 0;
   for (const std::size_t i : s.hit) {
@@ -165,10 +165,9 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
   std::vector<double> known;
   std::array<double, 4> share{};
   if (every > 0)
-    share = {reached(s, transfer, b, every, known),
-             reached(s, transfer, certified(eighth, false), every, known),
-             reached(s, transfer, chord, every, known),
-             reached(s, transfer, certified(eighth, true), every, known)};
+    share = {
+        reached(s, transfer, b, every, known), reached(s, transfer, certified(eighth, false), every, known),
+        reached(s, transfer, box, every, known), reached(s, transfer, certified(eighth, true), every, known)};
   for (double& x : share) x *= 100;
   std::printf(
       "| %s | %.2f, %.1f | %.2f, %.1f, %.1f | %.1f | %.1f | %.0f, %.0f, %.0f, %.0f | %.0f | %.0f, %.0f | "
@@ -176,7 +175,7 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
       transfer.name.c_str(), truth.mean(), truth.at(1), bound.mean(), bound.at(0.99), bound.at(1),
       bound.mean() / truth.mean(), bound.at(1) / truth.at(1), bound.within(1), bound.within(2),
       bound.within(4), bound.within(8), parts / static_cast<double>(s.hit.size()), share[0], share[1],
-      bounds_of(s, transfer, chord).mean(), share[2], share[3]);
+      bounds_of(s, transfer, box).mean(), share[2], share[3]);
   std::fflush(stdout);
 }
 

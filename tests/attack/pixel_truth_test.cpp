@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(every_pixel_of_the_ideal_picture_is_in_its_interval) {
       s.options.transfer = transfer;
       CertifyPictureOptions certify;
       certify.fast = pictures % 5 == 4;
-      certify.chord = pictures % 5 % 2 == 1;
+      certify.box = pictures % 5 % 2 == 1;
       certify.kappa = pictures % 3 == 0 ? 0.125 : 0.5;
       const PixelBounds b = certify_pixels(device(), resident, bounds, s.options, certify);
       const double rounding = support::path_rounding(s.options, s.volume.grid);
@@ -128,9 +128,9 @@ BOOST_AUTO_TEST_CASE(every_pixel_of_the_ideal_picture_is_in_its_interval) {
       }
       ++pictures;
       BOOST_TEST_INFO("field " << number << ", " << s.field.name << ", transfer function " << transfer.name
-                               << (certify.fast    ? ", fast"
-                                   : certify.chord ? ", chord"
-                                                   : ""));
+                               << (certify.fast  ? ", fast"
+                                   : certify.box ? ", box"
+                                                 : ""));
       BOOST_TEST(outside == 0);
     }
   }

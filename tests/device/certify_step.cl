@@ -5,6 +5,7 @@
 // ends[number][chain].
 
 #define NUMBERS_OF_PART 17
+#define NUMBERS_OF_STRETCHES 13
 #define NUMBERS_OF_ENDS 7
 
 RAY_INLINE V number_at(__global const float* numbers, int at) {
@@ -49,7 +50,19 @@ __kernel VDVR_HINT void cut_pieces(__global const float* restrict b, int pieces,
   }
 }
 
-// Back to front from colours of all chains that are `behind`.
+RAY_INLINE void put_ends(const VdvrCertify* q, __global float* ends, int first, int chains, int steps, V3 hi,
+                         V3 minus_lo, V error) {
+  put_number(ends, first, hi.x);
+  put_number(ends, chains + first, hi.y);
+  put_number(ends, 2 * chains + first, hi.z);
+  put_number(ends, 3 * chains + first, minus_lo.x);
+  put_number(ends, 4 * chains + first, minus_lo.y);
+  put_number(ends, 5 * chains + first, minus_lo.z);
+  put_number(ends, 6 * chains + first, error_of_ray(q, error, (I)(steps)));
+}
+
+// Back to front from colours of all chains that are `behind`. A part's values are two halves of which the
+// extremes are known.
 __kernel VDVR_HINT void step_chains(VdvrCertify q, __global const float* restrict parts, int chains,
                                     int steps, float behind, __global float* restrict ends) {
   const int first = (int)get_global_id(0) * VDVR_LANES;
@@ -67,23 +80,50 @@ __kernel VDVR_HINT void step_chains(VdvrCertify q, __global const float* restric
       halves[k].c1 = v3(NUMBER(at + 2), NUMBER(at + 3), NUMBER(at + 4));
       halves[k].minus_c0 = v3(NUMBER(at + 5), NUMBER(at + 6), NUMBER(at + 7));
     }
-#if VDVR_CHORD
-    part.halves[0] = halves[0];
-    part.halves[1] = halves[1];
+#if VDVR_JOINT
+    clear_part(&part, (I)(0));
+    add_box(&q, &part, &halves[0], hi, minus_lo);
+    add_box(&q, &part, &halves[1], hi, minus_lo);
+#else
+    part.all.t1 = MOST(halves[0].t1, halves[1].t1);
+    part.all.minus_t0 = MOST(halves[0].minus_t0, halves[1].minus_t0);
+    part.all.c1 = most3(halves[0].c1, halves[1].c1);
+    part.all.minus_c0 = most3(halves[0].minus_c0, halves[1].minus_c0);
 #endif
-    part.all = shown_of_both(&halves[0], &halves[1]);
     find_shares(&part);
     hi = above_part(&part, hi);
     minus_lo = minus_below_part(&part, minus_lo);
     error = error_in_front(&q, &part, error);
   }
 #undef NUMBER
-  error = error_of_ray(&q, error, (I)(steps));
-  put_number(ends, first, hi.x);
-  put_number(ends, chains + first, hi.y);
-  put_number(ends, 2 * chains + first, hi.z);
-  put_number(ends, 3 * chains + first, minus_lo.x);
-  put_number(ends, 4 * chains + first, minus_lo.y);
-  put_number(ends, 5 * chains + first, minus_lo.z);
-  put_number(ends, 6 * chains + first, error);
+  put_ends(&q, ends, first, chains, steps, hi, minus_lo, error);
 }
+
+#if VDVR_JOINT
+// The same of parts whose values are two straight stretches: extinctions and colours at three values.
+__kernel VDVR_HINT void step_stretches(VdvrCertify q, __global const float* restrict parts, int chains,
+                                       int steps, float behind, __global float* restrict ends) {
+  const int first = (int)get_global_id(0) * VDVR_LANES;
+  if (first >= chains) return;
+  V3 hi = v3((V)(behind), (V)(behind), (V)(behind)), minus_lo = negative3(hi);
+  V error = (V)(0.0f);
+#define NUMBER(n) number_at(parts, (step * NUMBERS_OF_STRETCHES + (n)) * chains + first)
+  for (int step = steps - 1; step >= 0; --step) {
+    Part part = new_part(NUMBER(0), (I)(1) == (I)(1));
+    ValueShown at[3];
+    for (int k = 0; k < 3; ++k) {
+      at[k].t = NUMBER(1 + 4 * k);
+      at[k].c = v3(NUMBER(2 + 4 * k), NUMBER(3 + 4 * k), NUMBER(4 + 4 * k));
+    }
+    clear_part(&part, (I)(0));
+    add_stretch(&q, &part, at[0], at[1], hi, minus_lo);
+    add_stretch(&q, &part, at[1], at[2], hi, minus_lo);
+    find_shares(&part);
+    hi = above_part(&part, hi);
+    minus_lo = minus_below_part(&part, minus_lo);
+    error = error_in_front(&q, &part, error);
+  }
+#undef NUMBER
+  put_ends(&q, ends, first, chains, steps, hi, minus_lo, error);
+}
+#endif

@@ -54,7 +54,7 @@ std::vector<Asked> pictures(const MixedVolume& v) {
     change(all.back());
   };
   add("unlit", [](Asked&) {});
-  add("chord", [](Asked& a) { a.certify.chord = true; });
+  add("box", [](Asked& a) { a.certify.box = true; });
   add("fast", [](Asked& a) { a.certify.fast = true; });
   // Parallel to faces of bricks, of which one lies .25 cells beside the middle of the picture, where it is
   // cut, and with pixels of .3 cells: light of the rays there, .15 cells from the middle, is of samples
@@ -103,7 +103,7 @@ BOOST_AUTO_TEST_CASE(intervals_by_bricks_are_those_of_the_whole_volume_to_the_bi
     std::uint64_t n = 0;
     for (const Asked& a : pictures(c.volume)) {
       // Compilers take longer than pictures: what does not depend on types is certified of floats alone.
-      if (!first && (a.certify.chord || a.certify.fast || a.picture.gradient == GradientKind::analytic))
+      if (!first && (a.certify.box || a.certify.fast || a.picture.gradient == GradientKind::analytic))
         continue;
       BOOST_TEST_CONTEXT(c.name << ", " << a.name) {
         const PixelBounds expected = certify_pixels(support::device(), whole, bounds, a.picture, a.certify);

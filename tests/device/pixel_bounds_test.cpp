@@ -97,6 +97,7 @@ BOOST_AUTO_TEST_CASE(wider_bounds_hold_narrower_ones_on_the_same_parts) {
   for (const TransferFunction& f : {kSoft, kJump}) {
     const RenderOptions o = unlit(v.grid, f);
     CertifyPictureOptions c;
+    c.box = true;  // joint steps are not monotone
     c.theta = 0x1p-40;
     c.kappa = 1024;  // one part a piece, whatever e
     PixelBounds inner = certify_pixels(device(), resident, all(v, 0.01f), o, c);
@@ -114,6 +115,7 @@ BOOST_AUTO_TEST_CASE(termination_and_one_pass_give_no_narrower_intervals) {
   const ResidentVolume resident(device(), v);
   const RenderOptions o = unlit(v.grid, kJump);
   CertifyPictureOptions whole, ended, fast;
+  whole.box = ended.box = true;
   whole.theta = 0x1p-40;
   fast.fast = true;
   const auto bounds = all(v, 0.03f);
@@ -125,20 +127,25 @@ BOOST_AUTO_TEST_CASE(termination_and_one_pass_give_no_narrower_intervals) {
   BOOST_TEST(outside(a, c) <= a_part * 500 + once);
 }
 
-BOOST_AUTO_TEST_CASE(chord_steps_give_narrower_intervals_and_none_that_are_wider) {
+BOOST_AUTO_TEST_CASE(joint_steps_give_narrower_intervals_and_none_that_are_wider) {
   const MixedVolume v = waves();
   const ResidentVolume resident(device(), v);
   const auto bounds = all(v, 0.03f);
-  CertifyPictureOptions box, chord;
-  box.theta = chord.theta = 0x1p-40;
-  chord.chord = true;
-  for (const TransferFunction& f : {kSoft, kJump, transfer_preset("default", 0, 1)}) {
+  CertifyPictureOptions box, joint;
+  box.theta = joint.theta = 0x1p-40;
+  box.box = true;
+  // So many bends that a part has more than are looked at one by one.
+  TransferFunction bent{"bent", {}};
+  for (int i = 0; i <= 100; ++i) {
+    const double value = 0.01 * i;
+    bent.points.push_back({value, {value, 1 - value, 0.5}, 0.3 * value * value});
+  }
+  for (const TransferFunction& f : {kSoft, kJump, transfer_preset("default", 0, 1), bent}) {
     const RenderOptions o = unlit(v.grid, f);
     const PixelBounds a = certify_pixels(device(), resident, bounds, o, box),
-                      b = certify_pixels(device(), resident, bounds, o, chord);
+                      b = certify_pixels(device(), resident, bounds, o, joint);
     const std::uint32_t most = *std::max_element(a.parts.begin(), a.parts.end());
-    // A chord step errs by 28 u of its share.
-    const double rounding = (a_part + 28.5 * support::u) * static_cast<double>(most) + 2 * once;
+    const double rounding = 2 * (a_part * static_cast<double>(most) + once);
     BOOST_TEST(outside(b, a) <= rounding);
     double narrower = 0, width = 0;
     for (std::size_t i = 0; i < a.lo.values.size(); ++i) {
@@ -146,14 +153,49 @@ BOOST_AUTO_TEST_CASE(chord_steps_give_narrower_intervals_and_none_that_are_wider
       narrower += of_box - static_cast<double>(b.hi.values[i] - b.lo.values[i]);
       width += of_box;
     }
-    BOOST_TEST_MESSAGE(f.name << ": chord steps are narrower by " << 100 * narrower / width << " %");
-    // At a jump a value is on either side whatever its colour: tau and c apart lose nothing. Else more than
+    BOOST_TEST_MESSAGE(f.name << ": joint steps are narrower by " << 100 * narrower / width << " %");
+    // At a jump a value is on either side whatever its colour: tau and c apart lose little. Else more than
     // rounding could make of either end of every interval.
     if (f.name != "jump") BOOST_TEST(narrower > 2 * rounding * static_cast<double>(a.lo.values.size()));
   }
-  chord.fast = true;
-  BOOST_CHECK_THROW((void)certify_pixels(device(), resident, bounds, unlit(v.grid, kSoft), chord),
-                    InputError);
+}
+
+// A part's values meet no bend of the transfer function, some, or more than are looked at one by one. What
+// shows most lies between two that show less.
+BOOST_AUTO_TEST_CASE(a_part_with_many_bends_holds_what_they_show) {
+  const MixedVolume v = waves();
+  const ResidentVolume resident(device(), v);
+  const auto bounds = all(v, 0.06f);
+  for (const int bends : {4, 12, 25, 100}) {
+    TransferFunction f{"zigzag", {}};
+    std::mt19937 random(static_cast<unsigned>(bends));
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int i = 0; i <= bends; ++i)
+      f.points.push_back({static_cast<double>(i) / bends,
+                          {unit(random), unit(random), unit(random)},
+                          i % 3 == 0 ? 0 : 0.4 * unit(random)});
+    const RenderOptions o = unlit(v.grid, f);
+    const PixelBounds b = certify_pixels(device(), resident, bounds, o);
+    const double rounding = support::path_rounding(o, v.grid);
+    double reached = 0, width = 0;
+    for (std::int64_t y = 2; y < 24; y += 3)
+      for (std::int64_t x = 2; x < 24; x += 3) {
+        const auto steps = support::steps_of(v, bounds, o, x, y, 32);
+        const auto behind = reference::background_of(o, y);
+        const auto i = 3 * static_cast<std::size_t>(y * 24 + x);
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double up = support::adversary(steps, f.points, behind, c, true)[c],
+                       down = support::adversary(steps, f.points, behind, c, false)[c],
+                       hi = static_cast<double>(b.hi.values[i + c]),
+                       lo = static_cast<double>(b.lo.values[i + c]);
+          BOOST_TEST(up <= hi + rounding);
+          BOOST_TEST(down >= lo - rounding);
+          reached += up - down;
+          width += hi - lo;
+        }
+      }
+    BOOST_TEST_MESSAGE(bends << " bends: an adversary reaches " << 100 * reached / width << " %");
+  }
 }
 
 BOOST_AUTO_TEST_CASE(rays_end_later_where_bounds_are_small) {
@@ -175,6 +217,7 @@ BOOST_AUTO_TEST_CASE(fewer_parts_give_no_narrower_intervals) {
       fields::uniform(grid, [&](double, double, double) { return static_cast<double>(random() % 2); }));
   const ResidentVolume resident(device(), v);
   CertifyPictureOptions fine, coarse;
+  fine.box = coarse.box = true;
   fine.kappa = 0.5;
   coarse.kappa = 1024;
   // What the cut to parts rounds by is in e.

@@ -65,6 +65,13 @@ BOOST_AUTO_TEST_CASE(the_certificate_says_that_light_is_that_of_f_and_holds_less
   BOOST_TEST(lit.at("statement").get<std::string>().find("light of F's own differences") !=
              std::string::npos);
   BOOST_TEST(lit.at("pixels").at("untested") == 0);
+  // Box steps alone, by either name.
+  BOOST_TEST(lit.at("step") == "box");
+  const Ended box = run({"render", small_volume(), "--certify=box", "--certify-light", "lit", "--size",
+                         "40x40", "-o", at("box.png"), "--json"});
+  BOOST_REQUIRE_MESSAGE(box.code == 0, box.err);
+  BOOST_TEST(Json::parse(box.out).at("step") == "box");
+  BOOST_TEST(Json::parse(box.out).at("levels") == lit.at("levels"));
   const Ended r = run({"render", small_volume(), "--certify", "--certify-light=as-drawn", "--size", "40x40",
                        "-o", at("drawn.png"), "--json"});
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
@@ -143,7 +150,6 @@ BOOST_AUTO_TEST_CASE(options_that_do_not_fit_are_refused_before_anything_is_writ
   refused({"--certify-light", "lit"}, "--certify");
   refused({"--certify", "--certify-light", "bright"}, "--certify-light");
   refused({"--certify=fast", "--certify-light", "lit"}, "--certify fast");
-  refused({"--certify=chord", "--certify-light", "lit"}, "--certify chord");
   refused({"--certify", "--certify-light", "lit", "--no-shading"}, "--no-shading");
   refused({"--certify", "--certify-light", "lit", "--gradient", "analytic"}, "--gradient central");
   refused({"--certify", "--certify-light", "lit", "--gradient", "stored"}, "--gradient");
