@@ -1,5 +1,5 @@
-// Pieces that `verify` tests together, and the layouts of what is computed for them (verify_pieces.cl). Passed
-// by value from host/verify/verify_pieces.cpp.
+// Pieces that `verify` tests together, and the layouts of what is computed for them (verify_pieces.cl).
+// Passed by value from host/verify/verify_pieces.cpp.
 #ifndef VDVR_VERIFY_PIECES_H
 #define VDVR_VERIFY_PIECES_H
 

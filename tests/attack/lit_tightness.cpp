@@ -12,6 +12,7 @@
 
 #include "host/system/parallel.hpp"
 #include "tests/support/lit_pictures.hpp"
+#include "tests/support/levels.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/device.hpp"
 
@@ -78,16 +79,6 @@ Scene scene_of(const std::string& name, std::int64_t cells, std::uint8_t level) 
   return s;
 }
 
-struct Column {
-  std::vector<double> levels;
-  [[nodiscard]] double mean() const {
-    double sum = 0;
-    for (const double x : levels) sum += x / static_cast<double>(levels.size());
-    return sum;
-  }
-  [[nodiscard]] double most() const { return *std::max_element(levels.begin(), levels.end()); }
-};
-
 /// Of the middle pixels of squares of 8 x 8, how much of the interval an adversary takes, all channels.
 double reached(const Scene& s, double full, const PixelBounds& b) {
   double sum = 0, width = 0;
@@ -122,7 +113,7 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
   const double full = static_cast<double>((range.second - range.first) / 32);
   const PixelBounds lit = certify_lit_pixels(s.volume, s.bounds, Clip{}, range, o),
                     drawn = certify_pixels(device, resident, s.bounds, o);
-  Column truth, bound, as_drawn;
+  support::Levels truth, bound, as_drawn;
   for (const std::size_t i : s.hit) {
     const auto at = static_cast<std::int64_t>(i);
     const Vec3 view = reference::ideal_ray(o, s.volume.grid, at % side, at / side).direction;
@@ -136,9 +127,9 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
       most = std::max({most, shown(lit.hi.values[3 * i + c]) - seen, seen - shown(lit.lo.values[3 * i + c])});
       half = std::max(half, (shown(drawn.hi.values[3 * i + c]) - shown(drawn.lo.values[3 * i + c])) / 2);
     }
-    truth.levels.push_back(255 * off);
-    bound.levels.push_back(255 * most);
-    as_drawn.levels.push_back(255 * half);
+    truth.values.push_back(255 * off);
+    bound.values.push_back(255 * most);
+    as_drawn.values.push_back(255 * half);
   }
   std::printf("| %s | %.2f, %.1f | %.2f, %.1f | %.2f, %.1f | %.0f | %.2f |\n", transfer.name.c_str(),
               truth.mean(), truth.most(), bound.mean(), bound.most(), as_drawn.mean(), as_drawn.most(),

@@ -4,7 +4,6 @@
 #define BOOST_TEST_MODULE lit_truth
 #include <boost/test/unit_test.hpp>
 
-#include <cstdlib>
 #include <iostream>
 #include <numeric>
 
@@ -24,10 +23,7 @@ constexpr std::int64_t side = 64;
 // Steps of the truth, in base cells.
 constexpr double step = 1.0 / 64;
 
-int wanted_fields() {
-  const char* text = std::getenv("VDVR_TRUTH_FIELDS");
-  return text ? std::atoi(text) : 3;
-}
+int wanted_fields() { return support::wanted_fields(3); }
 
 struct Scene {
   support::AnalyticField field;

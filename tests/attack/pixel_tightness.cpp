@@ -12,6 +12,7 @@
 
 #include "host/system/parallel.hpp"
 #include "tests/support/analytic_pictures.hpp"
+#include "tests/support/levels.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/device.hpp"
 
@@ -81,35 +82,16 @@ Scene scene_of(const std::string& name, std::int64_t cells, std::uint8_t level) 
   return s;
 }
 
-struct Column {
-  std::vector<double> levels;
-  [[nodiscard]] double mean() const {
-    double sum = 0;
-    for (const double x : levels) sum += x / static_cast<double>(levels.size());
-    return sum;
-  }
-  [[nodiscard]] double at(double share) {
-    std::sort(levels.begin(), levels.end());
-    return levels[static_cast<std::size_t>(share * static_cast<double>(levels.size() - 1))];
-  }
-  [[nodiscard]] double within(double most) const {
-    return 100.0 *
-           static_cast<double>(
-               std::count_if(levels.begin(), levels.end(), [&](double x) { return x <= most; })) /
-           static_cast<double>(levels.size());
-  }
-};
-
 // By pixel the worst channel's bound of V's own picture, levels.
-Column bounds_of(const Scene& s, const TransferFunction& transfer, const PixelBounds& b) {
-  Column bound;
+support::Levels bounds_of(const Scene& s, const TransferFunction& transfer, const PixelBounds& b) {
+  support::Levels bound;
   for (const std::size_t i : s.hit) {
     const reference::Rgb3 v = support::colour_of(s.v[i], transfer.points, background);
     double most = 0;
     for (std::size_t c = 0; c < 3; ++c)
       most = std::max({most, static_cast<double>(b.hi.values[3 * i + c]) - v[c],
                        v[c] - static_cast<double>(b.lo.values[3 * i + c])});
-    bound.levels.push_back(255 * most);
+    bound.values.push_back(255 * most);
   }
   return bound;
 }
@@ -152,14 +134,14 @@ void row(Device& device, const ResidentVolume& resident, Scene& s, const Transfe
     return certify_pixels(device, resident, s.bounds, s.options, c);
   };
   const PixelBounds b = certified(half, false), box = certified(half, true);
-  Column truth, bound = bounds_of(s, transfer, b);
+  support::Levels truth, bound = bounds_of(s, transfer, b);
   double parts = 0;
   for (const std::size_t i : s.hit) {
     const reference::Rgb3 f = support::colour_of(s.f[i], transfer.points, background),
                           v = support::colour_of(s.v[i], transfer.points, background);
     double off = 0;
     for (std::size_t c = 0; c < 3; ++c) off = std::max(off, std::abs(f[c] - v[c]));
-    truth.levels.push_back(255 * off);
+    truth.values.push_back(255 * off);
     parts += b.parts[i];
   }
   std::vector<double> known;

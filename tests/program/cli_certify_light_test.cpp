@@ -3,7 +3,6 @@
 #define BOOST_TEST_MODULE cli_certify_light
 #include <boost/test/unit_test.hpp>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -181,14 +180,7 @@ BOOST_AUTO_TEST_CASE(a_picture_beyond_the_tolerance_ends_with_1) {
 }
 
 BOOST_AUTO_TEST_CASE(an_interrupted_picture_leaves_nothing) {
-  const std::string out = at("stopped.png");
-  const pid_t child = start({"render", small_volume(), "--certify", "--certify-light", "lit",
-                             "--certify-parts", "0.002", "--size", "1600x1600", "-o", out});
-  wait_for("certify");
-  ::kill(child, SIGINT);
-  const Ended r = finish(child);
-  BOOST_TEST(r.code == 130, r.err);
-  for (const char* ending : {"stopped.png", "stopped.bound.png", "stopped.certificate.json"})
-    BOOST_TEST(!std::filesystem::exists(at(ending)), ending << " was left behind");
-  check_no_temporary_file_is_left();
+  check_interrupted({"render", small_volume(), "--certify", "--certify-light", "lit", "--certify-parts",
+                     "0.002", "--size", "1600x1600", "-o", at("stopped.png")},
+                    "certify", with_certificate("stopped"));
 }

@@ -2,7 +2,6 @@
 #define BOOST_TEST_MODULE cli_certify
 #include <boost/test/unit_test.hpp>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -341,14 +340,7 @@ BOOST_AUTO_TEST_CASE(a_cone_beam_volume_is_certified_where_it_is_covered) {
 }
 
 BOOST_AUTO_TEST_CASE(an_interrupted_picture_leaves_nothing) {
-  const std::string out = at("stopped.png");
-  const pid_t child = start(
-      {"render", small_volume(), "--certify", "--certify-parts", "0.002", "--size", "1600x1600", "-o", out});
-  wait_for("certify");
-  ::kill(child, SIGINT);
-  const Ended r = finish(child);
-  BOOST_TEST(r.code == 130, r.err);
-  for (const char* ending : {"stopped.png", "stopped.bound.png", "stopped.certificate.json"})
-    BOOST_TEST(!std::filesystem::exists(at(ending)), ending << " was left behind");
-  check_no_temporary_file_is_left();
+  check_interrupted({"render", small_volume(), "--certify", "--certify-parts", "0.002", "--size", "1600x1600",
+                     "-o", at("stopped.png")},
+                    "certify", with_certificate("stopped"));
 }

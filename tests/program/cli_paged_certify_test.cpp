@@ -3,7 +3,6 @@
 #define BOOST_TEST_MODULE cli_paged_certify
 #include <boost/test/unit_test.hpp>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -97,13 +96,7 @@ BOOST_AUTO_TEST_CASE(a_limit_that_is_too_small_is_refused_with_one_that_is_not) 
 }
 
 BOOST_AUTO_TEST_CASE(an_interrupted_picture_by_bricks_leaves_nothing) {
-  const pid_t child = start({"render", large_volume(), "--certify", "--certify-parts", "0.002", "--size",
-                             "400x400", "--max-memory", "16M", "-o", at("stopped.png")});
-  wait_for("certify");
-  ::kill(child, SIGINT);
-  const Ended r = finish(child);
-  BOOST_TEST(r.code == 130, r.err);
-  for (const char* ending : {"stopped.png", "stopped.bound.png", "stopped.certificate.json"})
-    BOOST_TEST(!std::filesystem::exists(at(ending)), ending << " was left behind");
-  check_no_temporary_file_is_left();
+  check_interrupted({"render", large_volume(), "--certify", "--certify-parts", "0.002", "--size", "400x400",
+                     "--max-memory", "16M", "-o", at("stopped.png")},
+                    "certify", with_certificate("stopped"));
 }

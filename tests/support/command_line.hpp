@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -68,6 +69,23 @@ inline void check_refused(const std::vector<std::string>& words, const std::stri
 inline void check_no_temporary_file_is_left() {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder().path()))
     BOOST_TEST(entry.path().filename().string()[0] != '.', "temporary file left: " << entry.path());
+}
+
+/// Ctrl-C once the program says `stage`: code 130, and none of these files of the test's folder is there.
+inline void check_interrupted(const std::vector<std::string>& words, const std::string& stage,
+                              const std::vector<std::string>& files) {
+  const pid_t child = start(words);
+  wait_for(stage);
+  ::kill(child, SIGINT);
+  const Ended r = finish(child);
+  BOOST_TEST(r.code == 130, r.err);
+  for (const std::string& file : files)
+    BOOST_TEST(!std::filesystem::exists(at(file)), file << " was left behind");
+  check_no_temporary_file_is_left();
+}
+/// What a certified picture X.png has beside it.
+inline std::vector<std::string> with_certificate(const std::string& x) {
+  return {x + ".png", x + ".bound.png", x + ".certificate.json"};
 }
 
 /// A small scan of a sphere, made once.

@@ -2,6 +2,7 @@
 // end and chosen against each channel, whose pictures must lie in the intervals.
 #pragma once
 
+#include <cstdlib>
 #include <random>
 
 #include "tests/reference/ideal_picture.hpp"
@@ -144,6 +145,12 @@ inline TransferFunction random_transfer(std::mt19937& random) {
   std::stable_sort(f.points.begin(), f.points.end(),
                    [](const auto& a, const auto& b) { return a.value < b.value; });
   return f;
+}
+
+/// Fields of a test of truth: a few, or as many as VDVR_TRUTH_FIELDS says.
+inline int wanted_fields(int few) {
+  const char* text = std::getenv("VDVR_TRUTH_FIELDS");
+  return text ? std::atoi(text) : few;
 }
 
 /// What fp32 makes of where a ray begins and ends, in base cells, times the largest extinction: eye and grid
