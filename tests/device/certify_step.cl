@@ -61,14 +61,30 @@ RAY_INLINE void put_ends(const VdvrCertify* q, __global float* ends, int first, 
   put_number(ends, 6 * chains + first, error_of_ray(q, error, (I)(steps)));
 }
 
+// A chain's ends, carried from the back to the front.
+typedef struct {
+  V3 hi, minus_lo;
+  V error;
+} ChainEnds;
+RAY_INLINE ChainEnds ends_before(float behind) {
+  const V3 hi = v3((V)(behind), (V)(behind), (V)(behind));
+  const ChainEnds ends = {hi, negative3(hi), (V)(0.0f)};
+  return ends;
+}
+RAY_INLINE void pass_part(const VdvrCertify* q, Part* part, ChainEnds* ends) {
+  find_shares(part);
+  ends->hi = above_part(part, ends->hi);
+  ends->minus_lo = minus_below_part(part, ends->minus_lo);
+  ends->error = error_in_front(q, part, ends->error);
+}
+
 // Back to front from colours of all chains that are `behind`. A part's values are two halves of which the
 // extremes are known.
 __kernel VDVR_HINT void step_chains(VdvrCertify q, __global const float* restrict parts, int chains,
                                     int steps, float behind, __global float* restrict ends) {
   const int first = (int)get_global_id(0) * VDVR_LANES;
   if (first >= chains) return;
-  V3 hi = v3((V)(behind), (V)(behind), (V)(behind)), minus_lo = negative3(hi);
-  V error = (V)(0.0f);
+  ChainEnds at_front = ends_before(behind);
 #define NUMBER(n) number_at(parts, (step * NUMBERS_OF_PART + (n)) * chains + first)
   for (int step = steps - 1; step >= 0; --step) {
     Part part = new_part(NUMBER(0), (I)(1) == (I)(1));
@@ -82,21 +98,18 @@ __kernel VDVR_HINT void step_chains(VdvrCertify q, __global const float* restric
     }
 #if VDVR_JOINT
     clear_part(&part, (I)(0));
-    add_box(&q, &part, &halves[0], hi, minus_lo);
-    add_box(&q, &part, &halves[1], hi, minus_lo);
+    add_box(&q, &part, &halves[0], at_front.hi, at_front.minus_lo);
+    add_box(&q, &part, &halves[1], at_front.hi, at_front.minus_lo);
 #else
     part.all.t1 = MOST(halves[0].t1, halves[1].t1);
     part.all.minus_t0 = MOST(halves[0].minus_t0, halves[1].minus_t0);
     part.all.c1 = most3(halves[0].c1, halves[1].c1);
     part.all.minus_c0 = most3(halves[0].minus_c0, halves[1].minus_c0);
 #endif
-    find_shares(&part);
-    hi = above_part(&part, hi);
-    minus_lo = minus_below_part(&part, minus_lo);
-    error = error_in_front(&q, &part, error);
+    pass_part(&q, &part, &at_front);
   }
 #undef NUMBER
-  put_ends(&q, ends, first, chains, steps, hi, minus_lo, error);
+  put_ends(&q, ends, first, chains, steps, at_front.hi, at_front.minus_lo, at_front.error);
 }
 
 #if VDVR_JOINT
@@ -105,8 +118,7 @@ __kernel VDVR_HINT void step_stretches(VdvrCertify q, __global const float* rest
                                        int steps, float behind, __global float* restrict ends) {
   const int first = (int)get_global_id(0) * VDVR_LANES;
   if (first >= chains) return;
-  V3 hi = v3((V)(behind), (V)(behind), (V)(behind)), minus_lo = negative3(hi);
-  V error = (V)(0.0f);
+  ChainEnds at_front = ends_before(behind);
 #define NUMBER(n) number_at(parts, (step * NUMBERS_OF_STRETCHES + (n)) * chains + first)
   for (int step = steps - 1; step >= 0; --step) {
     Part part = new_part(NUMBER(0), (I)(1) == (I)(1));
@@ -116,14 +128,11 @@ __kernel VDVR_HINT void step_stretches(VdvrCertify q, __global const float* rest
       at[k].c = v3(NUMBER(2 + 4 * k), NUMBER(3 + 4 * k), NUMBER(4 + 4 * k));
     }
     clear_part(&part, (I)(0));
-    add_stretch(&q, &part, at[0], at[1], hi, minus_lo);
-    add_stretch(&q, &part, at[1], at[2], hi, minus_lo);
-    find_shares(&part);
-    hi = above_part(&part, hi);
-    minus_lo = minus_below_part(&part, minus_lo);
-    error = error_in_front(&q, &part, error);
+    add_stretch(&q, &part, at[0], at[1], at_front.hi, at_front.minus_lo);
+    add_stretch(&q, &part, at[1], at[2], at_front.hi, at_front.minus_lo);
+    pass_part(&q, &part, &at_front);
   }
 #undef NUMBER
-  put_ends(&q, ends, first, chains, steps, hi, minus_lo, error);
+  put_ends(&q, ends, first, chains, steps, at_front.hi, at_front.minus_lo, at_front.error);
 }
 #endif
