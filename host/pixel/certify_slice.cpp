@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "host/system/outward.hpp"
 #include "shared/raycast_params.h"
 #include "vdvr/certified_points.hpp"
 #include "vdvr/certify_picture.hpp"
@@ -16,12 +17,6 @@ namespace {
 
 // Of the picture at a time: so many points lie in memory.
 constexpr std::int64_t kRows = 64;
-
-float down(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
-}
-float up(double x) { return -down(-x); }
 
 /// Grey by value.
 struct Window {

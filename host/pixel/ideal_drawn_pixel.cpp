@@ -13,8 +13,6 @@ namespace {
 
 constexpr double unit_roundoff = 0x1p-24;
 
-double length_unit(const Grid& g) { return *std::min_element(g.spacing.begin(), g.spacing.end()); }
-
 /// V's differences over one base cell at a point, as far as fp32 tells.
 class DrawnGradient {
  public:

@@ -27,8 +27,6 @@ std::array<double, 3> seen(const std::vector<double>& values, const std::vector<
   return colour;
 }
 
-double length_unit(const Grid& g) { return *std::min_element(g.spacing.begin(), g.spacing.end()); }
-
 IdealPixel summed(const RaySteps& s, const std::vector<double>& values, const std::vector<Light>& lights,
                   const RenderOptions& o, const Grid& g, std::int64_t y) {
   IdealPixel pixel;

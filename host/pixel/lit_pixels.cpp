@@ -10,6 +10,7 @@
 #include "host/pixel/pixel_ray.hpp"
 #include "host/rays/lit_emission.hpp"
 #include "host/render/check_render_options.hpp"
+#include "host/system/outward.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/error.hpp"
@@ -40,13 +41,6 @@ void check(const MixedVolume& volume, const std::vector<float>& bounds, const Re
 
 // Of a base cell: far above what clipped rays are rounded by (ray_walk.cpp).
 constexpr double hair = 0x1p-24;
-
-/// The next float outward.
-float down(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
-}
-float up(double x) { return -down(-x); }
 
 }  // namespace
 

@@ -1,7 +1,8 @@
 // The ray of a pixel in double precision, and what lies behind all. Called by ideal_pixel.cpp,
-// explain_pixel.cpp.
+// ideal_drawn_pixel.cpp, explain_pixel.cpp, lit_pixels.cpp.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "vdvr/grid.hpp"
@@ -18,6 +19,8 @@ struct PixelRay {
   }
 };
 PixelRay pixel_ray(const RenderOptions& options, const Grid& grid, std::int64_t x, std::int64_t y);
+/// Of a base cell: what opacities are per.
+inline double length_unit(const Grid& g) { return *std::min_element(g.spacing.begin(), g.spacing.end()); }
 std::array<double, 3> background_of_pixel(const RenderOptions& options, std::int64_t y);
 
 }  // namespace vdvr

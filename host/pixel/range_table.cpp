@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "host/system/outward.hpp"
 #include "shared/certify_params.h"
 
 namespace vdvr {
@@ -15,12 +16,6 @@ constexpr float kNone = -std::numeric_limits<float>::infinity();
 // Stands for an extinction without end: exp2 of minus its product with any length that fp32 tells from 0 is
 // 0.
 constexpr float kOpaque = 1e30f;
-
-float up(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
-}
-float down(double x) { return -up(-x); }
 
 double halvings(double opacity) { return -std::log1p(-opacity) / std::log(2.0); }
 

@@ -8,6 +8,7 @@
 #include "host/rays/crossings.hpp"
 #include "host/rays/emission.hpp"
 #include "host/rays/line_integral.hpp"
+#include "host/system/outward.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
@@ -21,12 +22,6 @@ FloatImage empty(std::int64_t width, std::int64_t height, std::int64_t channels,
   return {width, height, std::vector<float>(static_cast<std::size_t>(width * height * channels), value),
           channels};
 }
-float down(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
-}
-float up(double x) { return -down(-x); }
-
 ProjectionSet geometry_of(const Certificate& certificate) {
   auto scan = noted_geometry(certificate);
   if (!scan)

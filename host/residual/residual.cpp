@@ -10,6 +10,7 @@
 #include "host/residual/bounds_along.hpp"
 #include "host/residual/primitives.hpp"
 #include "host/residual/row_integrals.hpp"
+#include "host/system/outward.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -51,12 +52,6 @@ ProjectionSet row_of(const ProjectionSet& scan, std::int64_t row) {
   out.data.assign(samples.begin(), samples.end());
   return out;
 }
-
-float down(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
-}
-float up(double x) { return -down(-x); }
 
 // What the antiderivatives of a row may take.
 std::uint64_t table_bytes(const ProjectionSet& scan, std::uint64_t results, std::uint64_t limit) {
