@@ -159,7 +159,7 @@ RAY_INLINE I next_piece(FIELD, BRICKS, VdvrGrid grid, __global const uchar* rest
     const CellBox cell = cell_box(grid, &w->brick, &sampled, w->c);
     low = cell.low;
     scale = cell.scale;
-    box = box_between(ray, low, far_corner(low, scale));
+    box = box_between(ray, low, v3(low.x + 1.0f / scale.x, low.y + 1.0f / scale.y, low.z + 1.0f / scale.z));
   }
   if (ANY(leap)) {
     const Box around = box_around(ray, w->brick.at, w->away);
@@ -194,7 +194,9 @@ RAY_INLINE I next_piece(FIELD, BRICKS, VdvrGrid grid, __global const uchar* rest
     V least, most;
     octet_range(&f, &least, &most);
     // The box of the piece may be as thin as its position is uncertain: the cell's own faces tell the slope.
-    const Octet whole = octet_between(THE_FIELD, &w->brick, grid, low, far_corner(low, scale));
+    const Octet whole =
+        octet_between(THE_FIELD, &w->brick, grid, low,
+                      v3(low.x + 1.0f / scale.x, low.y + 1.0f / scale.y, low.z + 1.0f / scale.z));
     octet_range(&whole, &least, &most);
     e += q->slack + (most - least) * (q->reach[0] * scale.x + q->reach[1] * scale.y + q->reach[2] * scale.z);
 #endif

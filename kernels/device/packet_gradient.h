@@ -12,7 +12,7 @@ typedef struct {
 #if defined(VDVR_SAMPLER_IMAGE3D)
 RAY_INLINE float cell_low(float c, int b, uint level, int cells, int coarse) {
   const VdvrLocal l = vdvr_local(c, b, level, VDVR_GRANULARITY, cells, coarse);
-  return (float)(b * VDVR_GRANULARITY) + (float)l.index * vdvr_power_of_two(coarse - (int)level);
+  return (float)(b * VDVR_GRANULARITY) + (float)l.index / vdvr_per_cell(level, coarse);
 }
 #endif
 RAY_INLINE CellBox cell_box(VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c) {
@@ -31,9 +31,8 @@ RAY_INLINE CellBox cell_box(VdvrGrid grid, const OpenBrick* b, const Sampled* k,
 #else
   const I3 i = k->cell.index;
   box.scale = b->scale;
-  box.low =
-      v3(b->low.x + TO_V(i.x) * inverse_power(b->scale.x), b->low.y + TO_V(i.y) * inverse_power(b->scale.y),
-         b->low.z + TO_V(i.z) * inverse_power(b->scale.z));
+  box.low = v3(b->low.x + TO_V(i.x) / b->scale.x, b->low.y + TO_V(i.y) / b->scale.y,
+               b->low.z + TO_V(i.z) / b->scale.z);
 #endif
   return box;
 }
@@ -76,7 +75,7 @@ RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, cons
 #ifdef VDVR_SAMPLER_IMAGE3D
   // Along an axis the cell is linear: its two faces tell.
   const V3 lo = box.low;
-  const V3 hi = far_corner(lo, box.scale);
+  const V3 hi = v3(lo.x + 1.0f / box.scale.x, lo.y + 1.0f / box.scale.y, lo.z + 1.0f / box.scale.z);
 #define AT(X, Y, Z) sample_open(THE_FIELD, b, grid, v3(X, Y, Z)).value
   const V3 d = v3(AT(hi.x, c.y, c.z) - AT(lo.x, c.y, c.z), AT(c.x, hi.y, c.z) - AT(c.x, lo.y, c.z),
                   AT(c.x, c.y, hi.z) - AT(c.x, c.y, lo.z));

@@ -47,13 +47,6 @@
 
 #define GRADIENT_REACH 0.5f
 
-// 1 / p of powers of two, exact: 2^e has the bits (127 + e) << 23.
-RAY_INLINE V inverse_power(V p) { return PACKET(as_float)(0x7f000000 - PACKET(as_int)(p)); }
-// Of cells of samples whose lowest corners are `low`, with `scale` of them to a cell of the grid.
-RAY_INLINE V3 far_corner(V3 low, V3 scale) {
-  return v3(low.x + inverse_power(scale.x), low.y + inverse_power(scale.y), low.z + inverse_power(scale.z));
-}
-
 // The bricks that the lanes are in; a cell coordinate c belongs to one iff low <= c < high.
 typedef struct {
   I3 at;
@@ -81,7 +74,7 @@ typedef struct {
 RAY_INLINE void open_axis(OpenBrick* b, I level, I low, int cells, int coarse, V* scale, I* reach, I* top,
                           I* first, I* last) {
   const I width = LEAST(cells - low, (I)(VDVR_GRANULARITY));
-  *scale = TO_V((I)(1) << level) * vdvr_power_of_two(-coarse);
+  *scale = TO_V((I)(1) << level) * (1.0f / (float)(1 << coarse));
   *reach = ((I)(1) << level) >> (1 + coarse);
   *top = ((width << level) >> coarse) - 1;
   *first = PICK(b->base_around, -(low >> coarse), (I)(0));
@@ -147,8 +140,8 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
             nz = grid.cells_z >> VDVR_COARSE_Z;
   OpenBrick b = no_brick();
   b.low = v3(zero, zero, zero);
-  b.scale = v3((V)(vdvr_power_of_two(-VDVR_COARSE_X)), (V)(vdvr_power_of_two(-VDVR_COARSE_Y)),
-               (V)(vdvr_power_of_two(-VDVR_COARSE_Z)));
+  b.scale = v3((V)(1.0f / (float)(1 << VDVR_COARSE_X)), (V)(1.0f / (float)(1 << VDVR_COARSE_Y)),
+               (V)(1.0f / (float)(1 << VDVR_COARSE_Z)));
   b.reach.x = b.reach.y = b.reach.z = none;
   b.top.x = (I)(nx - 1);
   b.top.y = (I)(ny - 1);
@@ -347,9 +340,9 @@ RAY_INLINE Cell base_cell_at(VdvrGrid grid, V3 c) {
   const int nx = grid.cells_x >> VDVR_COARSE_X, ny = grid.cells_y >> VDVR_COARSE_Y,
             nz = grid.cells_z >> VDVR_COARSE_Z;
   Cell cell;
-  cell.index.x = local_from_zero(c.x, vdvr_power_of_two(-VDVR_COARSE_X), nx - 1, &cell.fraction.x);
-  cell.index.y = local_from_zero(c.y, vdvr_power_of_two(-VDVR_COARSE_Y), ny - 1, &cell.fraction.y);
-  cell.index.z = local_from_zero(c.z, vdvr_power_of_two(-VDVR_COARSE_Z), nz - 1, &cell.fraction.z);
+  cell.index.x = local_from_zero(c.x, 1.0f / (float)(1 << VDVR_COARSE_X), nx - 1, &cell.fraction.x);
+  cell.index.y = local_from_zero(c.y, 1.0f / (float)(1 << VDVR_COARSE_Y), ny - 1, &cell.fraction.y);
+  cell.index.z = local_from_zero(c.z, 1.0f / (float)(1 << VDVR_COARSE_Z), nz - 1, &cell.fraction.z);
   cell.x = place((Offset)(0), 1);
   cell.y = place((Offset)(0), nx + 1);
   cell.z = place((Offset)(0), (nx + 1) * (ny + 1));

@@ -20,7 +20,8 @@ RAY_INLINE Box mean_of_piece(FIELD, VdvrGrid grid, const Ray* ray, const OpenBri
 #endif
   const CellBox cell = cell_box(grid, brick, &sampled, c);
   const V3 low = cell.low;
-  const Box box = box_between(ray, low, far_corner(low, cell.scale));
+  const Box box = box_between(
+      ray, low, v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z));
   const V far = leaves_box(&box), cut = LEAST(far, ray->length);
   *out = MOST(cut, in);
   const V3 a = position_at(ray, grid, in), b = position_at(ray, grid, *out);

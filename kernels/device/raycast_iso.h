@@ -143,7 +143,8 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
                           Seen* seen BOUNDS) {
   const CellBox cell = cell_box(grid, brick, sampled, c);
   const V3 low = cell.low;
-  const Box box = box_between(ray, low, far_corner(low, cell.scale));
+  const Box box = box_between(
+      ray, low, v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z));
   Octet octet;
 #ifdef VDVR_SAMPLER_IMAGE3D
   const I worth = active;

@@ -58,9 +58,7 @@
 __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict list,
                                         __global uint* restrict fullest) {
   PIXELS_OF_THE_LAUNCH;
-  // Within this piece of the launch: those that follow use the list again.
-  const ulong item = (get_global_id(1) - get_global_offset(1)) * get_global_size(0) + get_global_id(0) -
-                     get_global_offset(0);
+  const ulong item = get_global_id(1) * get_global_size(0) + get_global_id(0);
 #if VDVR_LANES == 1
   const ulong items = get_global_size(0) * get_global_size(1);
 #endif

@@ -79,9 +79,9 @@ RAY_INLINE V plain_samples(FIELD, VdvrGrid grid, const VdvrLitBlock* b, int firs
   const ulong back = y > 0 ? at - across : at, ahead = y < b->size_y - 1 ? at + across : at;
   const ulong below = z > 0 ? at - plane : at, above = z < b->size_z - 1 ? at + plane : at;
   const V here = base_row(field, b, at);
-  const float half_x = GRADIENT_REACH * vdvr_power_of_two(-VDVR_COARSE_X),
-              half_y = GRADIENT_REACH * vdvr_power_of_two(-VDVR_COARSE_Y),
-              half_z = GRADIENT_REACH * vdvr_power_of_two(-VDVR_COARSE_Z);
+  const float half_x = GRADIENT_REACH / (float)(1 << VDVR_COARSE_X),
+              half_y = GRADIENT_REACH / (float)(1 << VDVR_COARSE_Y),
+              half_z = GRADIENT_REACH / (float)(1 << VDVR_COARSE_Z);
   const V dx = central(base_row(field, b, at - 1), here, base_row(field, b, at + 1), half_x, 1.0f);
   const V dy = central(base_row(field, b, back), here, base_row(field, b, ahead), half_y,
                        width_at((float)(y << VDVR_COARSE_Y), grid.cells_y));
@@ -111,9 +111,9 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
   }
   // Tiles go on beyond the grid, where nothing reads them.
   const V3 c = clamp_to_grid(
-      v3(TO_V(own.x * VDVR_GRANULARITY) + TO_V(x) * vdvr_power_of_two(VDVR_COARSE_X - block.level_x),
-         TO_V(own.y * VDVR_GRANULARITY) + (float)y * vdvr_power_of_two(VDVR_COARSE_Y - block.level_y),
-         TO_V(own.z * VDVR_GRANULARITY) + (float)z * vdvr_power_of_two(VDVR_COARSE_Z - block.level_z)),
+      v3(TO_V(own.x * VDVR_GRANULARITY) + TO_V(x) / vdvr_per_cell(block.level_x, VDVR_COARSE_X),
+         TO_V(own.y * VDVR_GRANULARITY) + (float)y / vdvr_per_cell(block.level_y, VDVR_COARSE_Y),
+         TO_V(own.z * VDVR_GRANULARITY) + (float)z / vdvr_per_cell(block.level_z, VDVR_COARSE_Z)),
       grid);
   const float3 cells_per_length =
       (float3)(block.cells_per_length_x, block.cells_per_length_y, block.cells_per_length_z);
