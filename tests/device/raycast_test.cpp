@@ -275,10 +275,22 @@ BOOST_AUTO_TEST_CASE(samplers_agree_in_every_way_of_stepping_and_shading) {
         most = std::max(most, std::abs(int{by_buffer.rgb[i]} - int{by_image.rgb[i]}));
       return most;
     };
+    const double charged = support::charged_between_samplers(field);
+    const auto slice_by = [&](SamplerKind sampler) {
+      RenderOptions o = options_for(v.grid(), RenderMode::slice);
+      o.sampler = sampler;
+      return raycast_float(device(), v, o).pixels;
+    };
+    const auto by_buffer = slice_by(SamplerKind::buffer), by_image = slice_by(SamplerKind::image3d);
+    for (std::size_t i = 0; i < by_buffer.size(); ++i) {
+      const auto a = static_cast<double>(by_buffer[i].s[3]), b = static_cast<double>(by_image[i].s[3]);
+      BOOST_REQUIRE(std::isnan(a) == std::isnan(b));
+      BOOST_REQUIRE(!(std::abs(a - b) > charged));
+    }
     // Softly, so that the bound says something, and without light, whose gradients are quotients of what the
     // filter errs and half a cell.
     const TransferFunction soft{"soft", {{0, {0, 0, 0}, 0}, {1, {1, 0.5, 0.25}, 0.1}}};
-    const double levels = 1 + picture_change(soft, field.grid, support::charged_between_samplers(field));
+    const double levels = 1 + picture_change(soft, field.grid, charged);
     BOOST_TEST(levels < 32);
     const auto differs_softly = [&](auto&& change) {
       return differs([&](RenderOptions& o) {
