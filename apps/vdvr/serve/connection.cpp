@@ -74,13 +74,16 @@ void Connections::mark_known(Place place) {
   place->known = true;
 }
 
-void Connections::turn_one_away() {
+void Connections::make_way(std::ptrdiff_t wanted) {
   const std::scoped_lock lock(mutex_);
-  const auto stranger =
-      std::find_if(entries_.begin(), entries_.end(), [](const Entry& e) { return !e.known && !e.leaving; });
-  if (stranger == entries_.end()) return;
-  stranger->leaving = true;
-  ::shutdown(stranger->socket, SHUT_RDWR);
+  wanted -= std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.leaving; });
+  for (Entry& e : entries_) {
+    if (wanted <= 0) return;
+    if (e.known || e.leaving) continue;
+    e.leaving = true;
+    ::shutdown(e.socket, SHUT_RDWR);
+    --wanted;
+  }
 }
 
 // --- one ---

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -25,8 +26,9 @@ class Connections {
   Place add(int socket);
   void remove(Place place);
   void mark_known(Place place);
-  /// Closes the oldest stranger's connection, if there is one: its thread ends soon.
-  void turn_one_away();
+  /// Sees to it that so many connections are about to end, as far as there are strangers' ones: the oldest
+  /// first.
+  void make_way(std::ptrdiff_t wanted);
 
  private:
   std::mutex mutex_;

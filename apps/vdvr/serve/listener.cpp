@@ -17,6 +17,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
+// Connections that the system keeps until they are accepted.
+constexpr int kWaiting = 128;
+
 void set_option(int socket, int level, int option, int value) {
   ::setsockopt(socket, level, option, &value, sizeof value);
 }
@@ -67,7 +70,7 @@ Listener::Listener(const std::string& address, int port) {
   set_option(socket_, SOL_SOCKET, SO_REUSEADDR, 1);
   // "::" is IPv4's addresses too.
   if (is_v6(address)) set_option(socket_, IPPROTO_IPV6, IPV6_V6ONLY, 0);
-  if (socket_ < 0 || ::bind(socket_, &place.any, size) != 0 || ::listen(socket_, SOMAXCONN) != 0 ||
+  if (socket_ < 0 || ::bind(socket_, &place.any, size) != 0 || ::listen(socket_, kWaiting) != 0 ||
       ::getsockname(socket_, &place.any, &size) != 0) {
     const int error = errno;
     if (socket_ >= 0) ::close(socket_);

@@ -1,7 +1,6 @@
 #include "apps/vdvr/serve/server.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -194,12 +193,10 @@ void Server::run() {
   Pool pool(kThreads, [&s](int socket) { s.serve(socket); });
   try {
     while (stop_requested() == 0) {
-      const auto socket = s.listener.next(20ms);
-      if (!socket) continue;
-      const int open = pool.open();
-      if (open >= kThreads) s.connections.turn_one_away();
-      if (open < kMostOpen) pool.add(*socket);
-      else ::close(*socket);
+      s.connections.make_way(pool.open() - kThreads);
+      // Who finds no place waits with the system, and is not refused for strangers who are about to go.
+      if (pool.open() >= kMostOpen) std::this_thread::sleep_for(2ms);
+      else if (const auto socket = s.listener.next(20ms)) pool.add(*socket);
     }
   } catch (...) {
     s.end();
