@@ -119,6 +119,7 @@ void add_render_options(Arguments& args) {
   add_certify(args);
   add_clip(args);
   add_scan(args);
+  add_volume_input(args);
   add_projection_options(args);
   args.group("Camera");
   add_orbit(args, kRenderOrbit, "what is shown");

@@ -237,6 +237,7 @@ int bench_render(Arguments& args) {
   args.value("gradient", "auto|central|stored|analytic", "as `render` takes it (default auto)")
       .flag("no-shading", "colours of the transfer function alone, without light");
   add_scan(args);
+  add_volume_input(args);
   add_projection_options(args);
   add_common(args);
   if (!args.parse()) return 0;

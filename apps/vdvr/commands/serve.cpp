@@ -86,6 +86,7 @@ int serve_command(Arguments& args) {
               "a name by which browsers may call this machine, beside addresses and localhost; may be given "
               "several times")
       .flag("unverified", "show although content and certificate do not match");
+  add_volume_input(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
