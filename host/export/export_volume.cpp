@@ -150,7 +150,7 @@ std::int64_t slab_planes(const MixedVolume& v, const Grid& grid, const ExportOpt
     room = std::min(room, options.max_memory_bytes - held);
   }
   // Whole bricks, where there is room for them.
-  const auto most = static_cast<std::int64_t>(room / bytes);
+  const auto planes = static_cast<std::int64_t>(room / bytes);
   const std::int64_t brick = std::int64_t{v.granularity} * options.oversampling;
   const std::int64_t step = std::lcm(brick, together);
   if (planes >= step) return std::min(planes / step * step, (n[2] + step - 1) / step * step);

@@ -93,7 +93,7 @@ def make(folder):
         t.write(v[0], photometric='minisblack', metadata=None)
         t.write(v[1, 1:], photometric='minisblack', metadata=None)
     with h5py.File(folder / 'scaled.h5', 'w') as h:
-        h['v'] = ((v - 40) // 2).astype('i4') * 2  # whole, so that nothing is rounded
+        h['v'] = v - 40
         h['v'].attrs.update(scale=1., offset=40.)
     (folder / 'link.tif').symlink_to('half.tif')
 
@@ -121,7 +121,7 @@ def check(program):
     program.expect(found == -5, f'the hole: {found}; -5 is right')
     program.refused('info', 'hole.mha', names=('2 of 7680 samples', 'column 0, row 0, slice 0', '--nan-as 0'))
     program.refused('info', 'oblique.nrrd', names=('oblique', 'resample'))
-    program.refused('info', 'tilted.nrrd', names=('oblique', 'resample', '0.023'))
+    program.refused('info', 'tilted.nrrd', names=('oblique', 'resample', '0.019'))
     program.refused('info', 'far.nhdr', names=('line skip',))
     program.refused('info', 'cut.tif', names=('truncated',))
     program.refused('info', 'colour.tif', names=('3 samples per pixel', 'greyscale'))
