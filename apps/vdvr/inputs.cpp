@@ -87,16 +87,6 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
                       progress));
 }
 
-void add_volume_input(Arguments& args) {
-  args.value("nan-as", "V", "of a uniform volume: read samples that are no finite numbers as V");
-}
-
-Volume load_volume(const fs::path& path, const Arguments& args) {
-  std::optional<double> nan_as;
-  if (args.has("nan-as")) nan_as = args.number_or("nan-as", 0);
-  return read_volume(path, common_options(args).max_memory, nan_as);
-}
-
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {
   const CommonOptions common = common_options(args);
   const std::uint64_t memory = common.max_memory / static_cast<std::uint64_t>(processes_here());

@@ -31,11 +31,6 @@ ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& 
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
 
-/// --nan-as, for commands that read uniform volumes.
-void add_volume_input(Arguments& args);
-/// read_volume, as the options say.
-Volume load_volume(const std::filesystem::path& path, const Arguments& args);
-
 /// A certified volume, by vdvr::read_certified; says on stderr that a file is unsealed. `unverified`: nothing
 /// is compared.
 VdvrFile open_certified(const std::filesystem::path& path, const Arguments& args, bool unverified = false);

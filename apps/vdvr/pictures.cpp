@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -15,6 +15,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/measure_tightness.hpp"
