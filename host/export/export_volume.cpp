@@ -330,7 +330,7 @@ struct UniformWriter::State {
   std::int64_t planes = 0;  ///< put so far
 };
 
-UniformWriter::UniformWriter(const fs::path& path, const Grid& grid, const ExportOptions& options) {
+void check_uniform_output(const fs::path& path, const ExportOptions& options) {
   if (options.format == ExportFormat::vtm)
     throw InputError(fmt::format(
         "{}: vtm holds bricks of several resolutions, which a uniform volume has none of", path.string()));
@@ -340,8 +340,12 @@ UniformWriter::UniformWriter(const fs::path& path, const Grid& grid, const Expor
     throw InputError(
         "`samples` u16 and u8 need a `range` that they span: the values are not known before they are "
         "written");
-  static_cast<void>(io::checked_bytes(grid.samples(), sizeof(float), path.string()));
   if (is_folder(path, options.format)) require_replaceable(without_slash(path), options.format);
+}
+
+UniformWriter::UniformWriter(const fs::path& path, const Grid& grid, const ExportOptions& options) {
+  check_uniform_output(path, options);
+  static_cast<void>(io::checked_bytes(grid.samples(), sizeof(float), path.string()));
   ExportNote note = note_of(grid);
   set_scale(note, options);
   state_ = std::make_unique<State>(path, note, options);

@@ -148,39 +148,10 @@ void set_spacing(const Header& header, RasterHeader& out, const std::vector<doub
   }
 }
 
-/// `directions`: by axis of the file, in the world, from one sample to the next.
-void set_axes(const Header& header, const std::string& key,
-              const std::array<std::array<double, 3>, 3>& directions, RasterHeader& out) {
-  std::array<bool, 3> taken{};
-  for (std::size_t f = 0; f < 3; ++f) {
-    const auto& d = directions[f];
-    std::size_t most = 0;
-    for (std::size_t a = 1; a < 3; ++a)
-      if (std::abs(d[a]) > std::abs(d[most])) most = a;
-    if (d[most] == 0) header.fail(fmt::format("'{}' gives axis {} no direction", key, f));
-    if (taken[most]) header.fail(fmt::format("'{}' is oblique; resample the file along x, y and z", key));
-    taken[most] = true;
-    out.axes.along[f] = most;
-    out.axes.reversed[f] = d[most] < 0;
-  }
-  for (std::size_t a = 0; a < 3; ++a) {
-    // How far the farthest sample lies beside where straight axes put it.
-    double beside = 0, spacing = 0;
-    for (std::size_t f = 0; f < 3; ++f) {
-      const double reach = static_cast<double>(out.samples[f] - 1);
-      if (out.axes.along[f] == a) spacing = out.spacing[f];
-      const double straight =
-          out.axes.along[f] != a ? 0 : (out.axes.reversed[f] ? -out.spacing[f] : out.spacing[f]);
-      beside += std::abs(directions[f][a] - straight) * reach;
-    }
-    constexpr double of_spacing = 1e-3;
-    if (!(beside <= of_spacing * spacing))
-      header.fail(
-          fmt::format("'{}' is oblique: along {} samples would be off by up to {:.3g}, the spacing is "
-                      "{:.6g}; resample the "
-                      "file along x, y and z",
-                      key, "xyz"[a], beside, spacing));
-  }
+void set_axes(const Header& header, const std::string& key, const AxisDirections& directions,
+              RasterHeader& out) {
+  if (const std::string wrong = straight_axes(directions, out.samples, out.spacing, out.axes); !wrong.empty())
+    header.fail(fmt::format("'{}' {}", key, wrong));
 }
 
 // --- MetaImage ---
@@ -213,7 +184,7 @@ void set_met_geometry(const Header& header, RasterHeader& out) {
     if (!header.find(key)) continue;
     // Three numbers an axis of the file: its direction, of length 1.
     const auto m = header.numbers(key, 9);
-    std::array<std::array<double, 3>, 3> directions{};
+    AxisDirections directions{};
     for (std::size_t i = 0; i < 9; ++i) directions[i / 3][i % 3] = m[i] * out.spacing[i / 3];
     set_axes(header, key, directions, out);
   }
@@ -299,7 +270,7 @@ void set_nrrd_geometry(const Header& header, RasterHeader& out) {
   if (header.find("spacings")) set_spacing(header, out, header.numbers("spacings", 3, true));
   if (header.find("space directions")) {
     const auto m = header.numbers("space directions", 9);
-    std::array<std::array<double, 3>, 3> directions{};
+    AxisDirections directions{};
     for (std::size_t i = 0; i < 9; ++i) directions[i / 3][i % 3] = m[i];
     for (std::size_t f = 0; f < 3; ++f)
       out.spacing[f] = std::max({std::abs(m[3 * f]), std::abs(m[3 * f + 1]), std::abs(m[3 * f + 2])});

@@ -9,18 +9,11 @@
 #include <memory>
 #include <string>
 
+#include "host/io/raster_axes.hpp"
+
 namespace vdvr::io {
 
 enum class ScalarKind { unsigned_integer, signed_integer, floating };
-
-/// How the axes of a file run in the world, whose x, y and z are 0, 1 and 2.
-struct RasterAxes {
-  std::array<std::size_t, 3> along{0, 1, 2};
-  std::array<bool, 3> reversed{false, false, false};
-  [[nodiscard]] bool are_plain() const {
-    return along == std::array<std::size_t, 3>{0, 1, 2} && reversed == std::array<bool, 3>{};
-  }
-};
 
 struct RasterHeader {
   std::filesystem::path file;                    ///< the header

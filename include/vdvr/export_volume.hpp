@@ -67,11 +67,14 @@ VDVR_API std::vector<std::filesystem::path> export_outputs(const std::filesystem
 VDVR_API ExportResult export_volume(const VdvrFile& file, const std::filesystem::path& path,
                                     const ExportOptions& options, const Progress& progress = {});
 
+/// What UniformWriter refuses for its options or for what lies in the way, before anything is computed.
+VDVR_API void check_uniform_output(const std::filesystem::path& path, const ExportOptions& options);
+
 /// A uniform volume whose planes come one after the other, in any of these formats but vtm, by the same code.
 /// Of OME-Zarr there is one level. Memory: up to 64 MiB, or one plane.
 class VDVR_API UniformWriter {
  public:
-  /// `oversampling` is 1; integers need a `range`. Throws as export_volume.
+  /// `oversampling` is 1; integers need a `range`. Throws as check_uniform_output and export_volume.
   UniformWriter(const std::filesystem::path& path, const Grid& grid, const ExportOptions& options);
   ~UniformWriter();
   UniformWriter(const UniformWriter&) = delete;

@@ -102,7 +102,7 @@ BOOST_AUTO_TEST_CASE(an_outlier_does_not_hide_the_rest) {
     if (s == 0) s = static_cast<float>(0.1 * noise());
   hot.base.f32[0] = 1e9f;
   const Brightness b = brightness_of(hot);
-  BOOST_TEST(b.threshold > 0.1);
+  BOOST_TEST(b.threshold > 0.05);  // above most of what lies around
   BOOST_TEST(b.threshold < 1);
   BOOST_TEST(b.hi < 2);
   BOOST_TEST(opacity(hot, 1.05) > 0);

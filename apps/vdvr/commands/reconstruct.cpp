@@ -39,12 +39,8 @@ int reconstruct_command(Arguments& args) {
   options.interpolation = rates.interpolation.value_or(options.interpolation);
   const auto output = args.path("output");
   const ExportFormat format = output_format(args, output);
-  if (format == ExportFormat::vtm)
-    throw InputError(
-        fmt::format("{}: vtm holds bricks of several resolutions; write a uniform volume as .mha or .nrrd, "
-                    "which ParaView opens",
-                    output.string()));
   const ExportOptions writes = volume_output_options(args, common, format);
+  check_uniform_output(output, writes);
   check_volume_output(output, format, common.force, {args.path("IN")});
 
   Device device = open_device(common);

@@ -195,15 +195,10 @@ std::vector<std::string> notes_on(const Arguments& args, const RenderOptions& o,
   const Grid& g = source.scene().volume.grid;
   for (std::size_t a = 0; a < 3; ++a) {
     const double low = g.origin[a], high = low + static_cast<double>(g.cells[a]) * g.spacing[a];
-    const auto beside = [&](const char* what) {
+    if (args.has("clip") && o.clip && !(o.clip->low[a] < high && o.clip->high[a] > low))
       notes.push_back(
-          fmt::format("{} lies outside of the volume along {}, {:.6g} to {:.6g}: nothing is there", what,
+          fmt::format("--clip lies outside of the volume along {}, {:.6g} to {:.6g}: nothing is there",
                       "xyz"[a], low, high));
-    };
-    if (args.has("clip") && o.clip && !(o.clip->low[a] < high && o.clip->high[a] > low)) beside("--clip");
-    if (o.mode == RenderMode::slice && o.slice_position && a == static_cast<std::size_t>(o.slice_axis) &&
-        !(*o.slice_position >= low && *o.slice_position <= high))
-      beside("--slice-position");
   }
   return notes;
 }

@@ -1,5 +1,5 @@
-"""What lies beside the volume shows nothing: an iso value that no sample reaches, a box and a slice outside. Right: the picture,
-exit code 0, and a note that says where the volume is."""
+"""What lies beside the volume shows nothing: an iso value that no sample reaches, a box outside. Right: the picture, exit code 0,
+and a note that says where the volume is; a slice outside is refused."""
 import json
 
 import numpy as np
@@ -23,7 +23,7 @@ def check(program):
     expect(('--mode', 'iso', '--iso', '99'), '--iso 99', '0 to 2')
     expect(('--mode', 'iso', '--iso', '1,-3'), '--iso -3', '0 to 2')
     expect(('--clip', '100,0,0,110,9,9'), '--clip', 'along x, 0 to 23')
-    expect(('--mode', 'slice', '--slice-position', '-4'), '--slice-position', 'along z, 0 to 23')
+    program.refused('render', 'ball.mha', '-o', 'Y.png', '--mode', 'slice', '--slice-position', '-4', names=('--slice-position -4', '0 to 23 along z'))
     for words in ((), ('--mode', 'iso', '--iso', '1'), ('--clip', '5,5,5,15,15,15'), ('--mode', 'slice', '--slice-position', '23')):
         program.expect(notes(*words) == '', f'{words}: a note on what is there: {notes(*words)}')
     program.expect('note' in program.ok('render', 'ball.mha', '-o', 'Y.png', '--mode', 'iso', '--iso', '99', '--size', '64x64'), 'no note for people')
