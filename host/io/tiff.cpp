@@ -242,6 +242,9 @@ class TiffFile::Reader {
       fail("has no image size");
     if (const int samples = tag(TIFFTAG_SAMPLESPERPIXEL, 1); samples != 1)
       fail(fmt::format("has {} samples per pixel (colour, or alpha); save it as greyscale", samples));
+    std::uint32_t depth = 1;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDEPTH, &depth) == 1 && depth > 1)
+      fail(fmt::format("is an image of depth {}; save it as a stack of images", depth));
     if (tag(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_PALETTE)
       fail("has a colour palette; save it as greyscale");
     if (tag(TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT) != ORIENTATION_TOPLEFT)
