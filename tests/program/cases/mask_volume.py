@@ -77,8 +77,8 @@ def check(program):
         for mode in MODES:
             picture = program.folder / f'{name}_{mode}.png'
             program.ok('render', f'{name}.mha', '-o', picture, '--mode', mode, '--size', '96x96')
-            if name == 'below' and mode == 'mip':
-                continue  # the largest along every ray is what lies around
+            if (name, mode) in (('below', 'mip'), ('hot', 'integral')):
+                continue  # the largest along every ray is what lies around; the window is that of all integrals
             rgb = read_png(picture)[..., :3].sum(axis=2)
             apart = abs(rgb[44:52, 44:52].mean() - rgb[:4, :4].mean())
             program.expect(apart > 60, f'{name}, {mode}: the middle and the corner of the picture are {apart} of 765 apart')
