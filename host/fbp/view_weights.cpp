@@ -52,6 +52,8 @@ ViewWeights view_weights(const std::vector<double>& theta_rad, double period, Ar
   if (arc == Arc::open && !wedges.empty()) wedges.erase(wedges.begin());
   result.wedges = static_cast<int>(wedges.size());
   result.one_direction = gaps.one_direction;
+  result.seen_rad = period;
+  for (const double wedge : gaps.wedges_rad()) result.seen_rad -= wedge;
   const auto width = [&](const Direction& direction) {
     return direction.wedge_after ? std::min(direction.gap_after_rad, most_usual_gaps * gaps.usual_rad)
                                  : direction.gap_after_rad;
@@ -69,11 +71,18 @@ ViewWeights view_weights(const std::vector<double>& theta_rad, double period, Ar
 }
 
 void require_directions(const ViewWeights& weights) {
-  if (!weights.one_direction) return;
-  throw InputError(
-      fmt::format("all {} views see one direction: their angles are alike, or opposite; a volume from one "
-                  "direction is worthless: give each view its own angle",
-                  weights.weight.size()));
+  if (weights.one_direction)
+    throw InputError(
+        fmt::format("all {} views see one direction: their angles are alike, or opposite; a volume from one "
+                    "direction is worthless: give each view its own angle",
+                    weights.weight.size()));
+  // A whole turn in radians, read as degrees.
+  constexpr double longest_turn_deg = 2 * std::numbers::pi;
+  if (degrees(weights.seen_rad) <= 1.01 * longest_turn_deg)
+    throw InputError(fmt::format(
+        "all {} views lie within {:.2f} degrees: a volume from so short an arc is worthless. If these angles "
+        "are radians, say so (the attribute units = \"rad\" of an HDF5 file's angles), or give degrees",
+        weights.weight.size(), degrees(weights.seen_rad)));
 }
 
 }  // namespace vdvr

@@ -13,6 +13,7 @@ struct ViewWeights {
   int wedges = 0;                  ///< capped; of an open arc without that of its opening
   int grouped_views = 0;           ///< views that share their weight with one that nearly coincides
   bool one_direction = false;      ///< all views see the same
+  double seen_rad = 0;             ///< the period without its wedges
   std::vector<std::string> notes;  ///< for the user: wedges, what may be one, grouped views
 };
 
@@ -25,7 +26,8 @@ enum class Arc { closed, open };
 ViewWeights view_weights(const std::vector<double>& theta_rad, double period = std::numbers::pi,
                          Arc arc = Arc::closed);
 
-/// Throws InputError where all views see one direction: F would be worthless.
+/// Throws InputError where all views see one direction, or an arc so short that its angles must be radians
+/// that were read as degrees: F would be worthless.
 void require_directions(const ViewWeights& weights);
 
 }  // namespace vdvr

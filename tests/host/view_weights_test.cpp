@@ -14,6 +14,7 @@
 #include <random>
 
 #include "host/fdk/fdk_weights.hpp"
+#include "host/geometry/cone_views.hpp"
 #include "tests/support/angle_scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
@@ -248,6 +249,29 @@ BOOST_AUTO_TEST_CASE(views_of_one_direction_weigh_alike_and_are_refused) {
   // Opposite sources are two directions of cone beam.
   BOOST_CHECK_NO_THROW(require_directions(view_weights(radians({0, 180, 360}), 2 * pi)));
   BOOST_CHECK_THROW(FdkWeights(cone_of(radians({7, 7, 7})), 65, 5), InputError);
+}
+
+BOOST_AUTO_TEST_CASE(radians_taken_for_degrees_are_refused) {
+  Angles half_turn, turn, short_arc;
+  for (int k = 0; k < 180; ++k)
+    half_turn.push_back(pi * k / 180), turn.push_back(2 * pi * k / 180), short_arc.push_back(0.1 * k);
+  BOOST_CHECK_THROW(require_directions(view_weights(radians(half_turn))), InputError);
+  BOOST_CHECK_THROW(require_directions(view_weights(radians(turn))), InputError);
+  BOOST_CHECK_NO_THROW(require_directions(view_weights(radians(short_arc))));
+}
+
+// Of formats that have radians.
+BOOST_AUTO_TEST_CASE(degrees_taken_for_radians_are_refused) {
+  const auto check = [](double step, int views) {
+    std::vector<double> angles;
+    for (int k = 0; k < views; ++k) angles.push_back(step * k);
+    io::require_radians("g.json", "ProjectionAngles", angles);
+  };
+  BOOST_CHECK_THROW(check(2, 180), FileError);
+  BOOST_CHECK_THROW(check(0.5, 361), FileError);
+  BOOST_CHECK_NO_THROW(check(2 * pi / 180, 180));
+  // The golden angle over many turns.
+  BOOST_CHECK_NO_THROW(check(pi * (std::sqrt(5.0) - 1) / 2, 400));
 }
 
 BOOST_AUTO_TEST_CASE(views_that_nearly_coincide_share_the_weight_of_their_direction) {
