@@ -49,7 +49,9 @@ struct Planned {
 Json pictures_json(const Planned& planned);
 void print_pictures(const Planned& planned);
 /// Reads IN and plans.
-Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
+/// `seen` is called between the two.
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
+                      const std::function<void(const ProjectionSet&)>& seen = {});
 /// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.
 /// Throws InputError where that is less than what a brick may be asked for.
 PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/crew.hpp"
 #include "vdvr/certify.hpp"
@@ -32,6 +33,12 @@ InputKind kind_of(const fs::path& path, const Arguments& args) {
 
 namespace {
 
+// Warnings go to the terminal whatever is printed there beside them.
+void say_warnings(const ProjectionSet& scan, const Arguments& args) {
+  for (const std::string& warning : scan.report.warnings)
+    say(fmt::format("{}: WARNING: {}\n", args.who(), with_options(warning)));
+}
+
 ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
                    std::optional<Beam> beam, const Progress& progress) {
   switch (kind_of(path, args)) {
@@ -52,11 +59,14 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
+  options.input = input_statement(args, field.input);
   options.follow_links = args.has("follow-links");
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
-  return read_scan(path, options, progress);
+  ProjectionSet scan = read_scan(path, options, progress);
+  if (!common.quiet) say_warnings(scan, args);
+  return scan;
 }
 
 ProjectionSet checked(ProjectionSet scan) {

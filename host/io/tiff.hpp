@@ -1,6 +1,6 @@
 // Greyscale TIFF files as arrays of double, one image or a stack of them. Strips and tiles, uint8/16/32,
 // int8/16/32, float32/64, any compression the installed libtiff decodes. libtiff's messages become FileError;
-// nothing is printed. Called by host/scan/scan_folder.cpp and host/io/volume_stack.cpp.
+// nothing is printed. Called by host/raw/scan_folder.cpp and host/io/volume_stack.cpp.
 #pragma once
 
 #include <cstdint>

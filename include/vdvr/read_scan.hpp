@@ -19,10 +19,11 @@ VDVR_API const char* text_of(Beam beam);
 VDVR_API std::optional<Beam> beam_of(const std::string& text);
 
 struct ScanOptions {
-  std::optional<std::filesystem::path> angles_file;  ///< for MHA/NRRD stacks; degrees, one per view
+  std::optional<std::filesystem::path> angles_file;  ///< for stacks and HDF5 files; degrees, one per view
   /// Overrides the file's; in columns of the projections as they are prepared, binned ones where they are.
   std::optional<double> center;
   Preparation preparation;  ///< what is done to the projections
+  InputStatement input;     ///< wins over what the files say
   /// Cone: by the distances of an NXtomo file, which is read as parallel beam otherwise. Refused where there
   /// are none, and beside another description of the geometry.
   std::optional<Beam> beam;

@@ -160,6 +160,19 @@ void add_geometry(nb::module_& m) {
 }
 
 void add_projections(nb::module_& m) {
+  nb::enum_<SampleValues>(m, "SampleValues")
+      .value("counts", SampleValues::counts)
+      .value("transmission", SampleValues::transmission)
+      .value("line integrals", SampleValues::line_integrals);
+  nb::class_<InputStatement>(m, "InputStatement")
+      .def(nb::init<>())
+      .def_rw("entry", &InputStatement::entry)
+      .def_rw("views", &InputStatement::views)
+      .def_rw("dark", &InputStatement::dark)
+      .def_rw("flat", &InputStatement::flat)
+      .def_rw("values", &InputStatement::values)
+      .def("__str__", [](const InputStatement& s) { return text_of(s); });
+  m.def("view_ranges_of", &view_ranges_of, "text"_a);
   nb::enum_<Beam>(m, "Beam").value("parallel", Beam::parallel).value("cone", Beam::cone);
   nb::class_<ScanOptions>(m, "ScanOptions")
       .def(nb::init<>())
@@ -167,6 +180,7 @@ void add_projections(nb::module_& m) {
       .def_rw("center", &ScanOptions::center)
       .def_rw("preparation", &ScanOptions::preparation)
       .def_rw("beam", &ScanOptions::beam)
+      .def_rw("input", &ScanOptions::input)
       .def_rw("max_memory_bytes", &ScanOptions::max_memory_bytes)
       .def_rw("follow_links", &ScanOptions::follow_links);
   nb::class_<ArrayScan>(m, "ArrayScan")
@@ -193,6 +207,8 @@ void add_projections(nb::module_& m) {
       .def_prop_ro("sha256", [](const ProjectionSet& s) { return s.report.sha256; })
       .def_prop_ro("center_source", [](const ProjectionSet& s) { return s.report.center_source; })
       .def_prop_ro("notes", [](const ProjectionSet& s) { return s.report.notes; })
+      .def_prop_ro("warnings", [](const ProjectionSet& s) { return s.report.warnings; })
+      .def_prop_ro("stated", [](const ProjectionSet& s) { return text_of(s.report.stated); })
       .def_prop_ro("preparation", [](const ProjectionSet& s) { return s.report.preparation; });
   m.def("data_of", &data_of, "scan"_a);
   m.def("scan_of", &scan_of, "array"_a.noconvert(), "described"_a);

@@ -3,7 +3,7 @@
 #include <boost/test/data/test_case.hpp>
 
 #include "host/io/natural_order.hpp"
-#include "host/scan/scan_folder.hpp"
+#include "host/raw/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 

@@ -81,6 +81,7 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   Json json = {{"file", path.string()},
                {"kind", "projections"},
                {"geometry", geometry_json(scan.geometry)},
+               {"understood", understood_json(scan)},
                {"report", report_json(scan.report)},
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
