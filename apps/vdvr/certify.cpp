@@ -89,10 +89,10 @@ Wanted wanted_to_certify(const Arguments& args) {
 }
 
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
-                      const std::function<void(const ProjectionSet&)>& seen) {
+                      const std::function<void(const Planned&)>& seen) {
   Planned planned;
-  planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress);
-  if (seen) seen(planned.scan);
+  planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
+  if (seen) seen(planned);
   if (!wanted.pictures) {
     planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
     return planned;
@@ -128,9 +128,9 @@ double everywhere_of(const Planned& planned, const Wanted& wanted) {
 }
 
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
-  if (!planned.pictures)
-    return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
   CertifyOptions options = wanted.options;
+  options.input = planned.understood.stated;
+  if (!planned.pictures) return certify(device, planned.scan, std::move(planned.plan), options, progress);
   options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
   BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
   planned.pictures->note(result.certificate);

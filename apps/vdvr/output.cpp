@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "apps/common/messages.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;
@@ -52,7 +53,6 @@ Json report_json(const InputReport& r) {
           {"transmission_floor", r.transmission_floor},
           {"center_source", r.center_source},
           {"air_background", r.air_background},
-          {"warnings", r.warnings},
           {"notes", r.notes}};
 }
 
@@ -178,7 +178,8 @@ void print_certificate(const Certificate& c) {
              c.rates.gold);
   fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", text_of(c.field.filter), c.field.cutoff,
              c.field.center ? fmt::format(", centre {:.4f}", *c.field.center) : "");
-  if (!c.field.input.none()) fmt::print("  stated       {} (of the input)\n", text_of(c.field.input));
+  if (const InputStatement stated = noted_input(c); !stated.none())
+    fmt::print("  stated       of the input: {}\n", text_of(stated));
   if (!c.field.preparation.none())
     fmt::print("  prepared     {}; F is that of the prepared projections\n", text_of(c.field.preparation));
   fmt::print("  not covered  {} samples ({:.2f} %)\n", c.not_covered_count, 100 * c.not_covered_fraction);

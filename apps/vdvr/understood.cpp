@@ -64,7 +64,7 @@ std::string reference_text(std::int64_t count, const char* what) {
   return count > 0 ? fmt::format("{} {}", count, what) : fmt::format("a level for {}", what);
 }
 
-std::string values_text(const InputReport& r) {
+std::string values_text(const Understood& r) {
   std::string text = text_of(r.values);
   if (r.values == SampleValues::counts)
     text += fmt::format(", by {} and {}", reference_text(r.flats, "flats"), reference_text(r.darks, "darks"));
@@ -73,8 +73,8 @@ std::string values_text(const InputReport& r) {
   return text;
 }
 
-std::vector<Assumption> assumed(const ProjectionSet& scan) {
-  std::vector<Assumption> all = scan.report.assumed;
+std::vector<Assumption> assumed(const ProjectionSet& scan, const Understood& r) {
+  std::vector<Assumption> all = r.assumed;
   if (!scan.cone)
     all.push_back({"angles grow from x to y, rows along the axis",
                    "no format says it; a wrong one gives a mirror image", "negated 'angles'"});
@@ -83,8 +83,7 @@ std::vector<Assumption> assumed(const ProjectionSet& scan) {
 
 }  // namespace
 
-Json understood_json(const ProjectionSet& scan) {
-  const InputReport& r = scan.report;
+Json understood_json(const ProjectionSet& scan, const Understood& r) {
   const Turn t = turn_of(scan.geometry.theta_rad);
   Json frames = Json::array(), assumptions = Json::array();
   for (const NamedView& f : r.frames)
@@ -92,7 +91,7 @@ Json understood_json(const ProjectionSet& scan) {
                       {"projection", f.projection},
                       {"name", f.name},
                       {"angle_deg", scan.geometry.theta_rad.at(static_cast<std::size_t>(f.view)) * degrees}});
-  for (const Assumption& a : assumed(scan))
+  for (const Assumption& a : assumed(scan, r))
     assumptions.push_back({{"what", a.what}, {"why", a.why}, {"otherwise", with_options(a.otherwise)}});
   return {{"values", text_of(r.values)},
           {"values_source", with_options(r.values_source)},
@@ -112,15 +111,13 @@ Json understood_json(const ProjectionSet& scan) {
           {"warnings", r.warnings}};
 }
 
-void print_scan(const ProjectionSet& scan) {
+namespace {
+
+void print_understood(const ProjectionSet& scan, const Understood& r) {
   const ParallelGeometry& g = scan.geometry;
-  const InputReport& r = scan.report;
-  fmt::print("scan           {} ({}), {} views of {} x {} pixels, {}\n", r.name, r.format, g.views(),
-             g.columns, g.rows, scan.cone ? "cone beam" : "parallel beam");
   for (const std::string& warning : r.warnings) fmt::print("  WARNING      {}\n", with_options(warning));
   fmt::print("  values       {}\n", values_text(r));
   if (!r.stated.none()) fmt::print("  stated       {}\n", text_of(r.stated));
-  fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
   fmt::print("  arc          {}\n", arc_text(turn_of(g.theta_rad)));
   for (const NamedView& f : r.frames)
     fmt::print("  {:<12} {:.6g} degrees: {}\n",
@@ -128,17 +125,30 @@ void print_scan(const ProjectionSet& scan) {
                : f.view == 1 && g.views() > 2 ? "second view"
                                               : "last view",
                g.theta_rad[static_cast<std::size_t>(f.view)] * degrees, f.name);
+  for (const Assumption& a : assumed(scan, r))
+    fmt::print("  assumed      {}: {}; {} say otherwise\n", a.what, a.why, with_options(a.otherwise));
+}
+
+}  // namespace
+
+void print_scan(const ProjectionSet& scan, const Understood* understood) {
+  const ParallelGeometry& g = scan.geometry;
+  const InputReport& r = scan.report;
+  fmt::print("scan           {} ({}), {} views of {} x {} pixels, {}\n", r.name, r.format, g.views(),
+             g.columns, g.rows, scan.cone ? "cone beam" : "parallel beam");
+  if (understood) print_understood(scan, *understood);
+  fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
   fmt::print("  centre       column {:.4f} ({})\n", g.center, r.center_source);
   if (scan.cone) print_cone(scan);
   if (r.dead_pixels != 0) fmt::print("  dead pixels  {} replaced\n", r.dead_pixels);
   if (r.air_background) fmt::print("  background   linear air background taken off\n");
-  for (const Assumption& a : assumed(scan))
-    fmt::print("  assumed      {}: {}; {} say otherwise\n", a.what, a.why, with_options(a.otherwise));
   fmt::print("  sha256       {}\n", r.sha256);
   std::vector<std::string> notes = r.notes;
-  std::erase_if(notes, [&](const std::string& note) {
-    return std::find(r.warnings.begin(), r.warnings.end(), note) != r.warnings.end();
-  });
+  if (understood)
+    std::erase_if(notes, [&](const std::string& note) {
+      return std::find(understood->warnings.begin(), understood->warnings.end(), note) !=
+             understood->warnings.end();
+    });
   print_notes(notes);
 }
 

@@ -4,11 +4,12 @@
 
 #include "apps/common/common_options.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 
 namespace vdvr::cli {
 
-/// The same as JSON.
-Json understood_json(const ProjectionSet& scan);
-void print_scan(const ProjectionSet& scan);
+Json understood_json(const ProjectionSet& scan, const Understood& understood);
+/// With `understood`, what was understood too.
+void print_scan(const ProjectionSet& scan, const Understood* understood = nullptr);
 
 }  // namespace vdvr::cli

@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "host/prepare/preparation_json.hpp"
-#include "host/scan/input_statement_json.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -210,11 +209,6 @@ void read_method(const Member& m, Certificate& c) {
     } catch (const InputError& e) {
       throw FileError(fmt::format("certificate: member 'field.preparation': {}", e.what()));
     }
-  if (field.has("input")) try {
-      c.field.input = input_statement_of(field.at("input").object());
-    } catch (const InputError& e) {
-      throw FileError(fmt::format("certificate: member 'field.input': {}", e.what()));
-    }
   c.padding = field.at("padding").integer();
 }
 
@@ -308,7 +302,6 @@ std::string to_json(const Certificate& c) {
   j["field"]["center"] = c.field.center ? Json(finite("field.center", *c.field.center)) : Json(nullptr);
   j["field"]["padding"] = c.padding;
   if (!c.field.preparation.none()) j["field"]["preparation"] = json_of(c.field.preparation);
-  if (!c.field.input.none()) j["field"]["input"] = json_of(c.field.input);
   j["window"] = c.window ? numbers("window", std::array{c.window->first, c.window->second}) : Json(nullptr);
   j["roi"] = c.roi ? numbers("roi", *c.roi) : Json(nullptr);
   if (c.covered)

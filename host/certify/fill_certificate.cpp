@@ -87,7 +87,6 @@ Certificate fill_certificate(const Inputs& in, const Device& device, const Proje
   c.field = plan.field;
   c.field.center = plan.field.center.value_or(scan.geometry.center);
   c.field.preparation = scan.report.preparation;
-  c.field.input = scan.report.stated;
   c.padding = filtered.fft_length;
   c.window = options.window;
   c.roi = options.roi;

@@ -12,8 +12,7 @@
 #include <vector>
 
 #include "host/geometry/cone_views.hpp"
-#include "vdvr/input_statement.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 
 namespace vdvr::io {
 

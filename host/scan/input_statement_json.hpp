@@ -1,5 +1,5 @@
-// An InputStatement as it stands in the certificate's `field` (docs/file-format.md). Called by
-// certificate.cpp.
+// An InputStatement as it stands in the certificate's `options` (docs/file-format.md). Called by
+// certify.cpp.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -121,7 +121,8 @@ void require_finite(std::span<const double> view, const io::RawScan& raw, std::i
 }
 
 void read_samples(const io::RawScan& raw, const ScanOptions& options, const ViewPreparation& preparation,
-                  ProjectionSet& scan, io::ValueTotals& totals, const Progress& progress) {
+                  ProjectionSet& scan, io::ValueTotals& totals, Understood& understood,
+                  const Progress& progress) {
   const std::int64_t size = raw.rows * raw.columns, step = block_views(raw, options.max_memory_bytes);
   FlatField field;
   if (raw.counts) {
@@ -175,7 +176,7 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, const View
     report(progress, "read", static_cast<double>(first + n) / static_cast<double>(raw.projections.count));
   }
   if (!blank.empty()) refuse_blank(raw, blank, field.floor);
-  note_saturated(field, full, totals, raw.flats.count * size, scan.report);
+  note_saturated(field, full, totals, raw.flats.count * size, understood);
   scan.report.air_background = !raw.air_columns.empty();
   if (options.preparation.outliers)
     scan.report.notes.push_back(fmt::format("{} of {} samples were outliers and got the median of {} x {}",
@@ -276,13 +277,16 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
       frames->read(first, std::min(step, frames->count - first), block.data());
 }
 
-ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
+                         Understood& understood) {
   if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
   scan.report.name = name_of(path, folder);
-  describe(raw, options, scan.report);
+  scan.report.format = raw.format;
+  scan.report.notes = raw.notes;
+  describe(raw, options, understood);
   scan.geometry = geometry_of(raw, path.string());
   const ViewPreparation preparation(options.preparation, scan.geometry, raw.cone.has_value());
   if (raw.cone) set_cone(path, raw, options, scan);
@@ -290,7 +294,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   require_room(raw, options, path.string(), preparation.bytes());
   const auto before = stamps_of(raw);
   io::ValueTotals totals;
-  read_samples(raw, options, preparation, scan, totals, progress);
+  read_samples(raw, options, preparation, scan, totals, understood, progress);
   const std::int64_t samples = scan.size();
   require_alive(raw, scan.report.dead_pixels, samples, path.string());
   io::judge_values(totals, raw, path.string());
@@ -307,7 +311,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
-  auto& warnings = scan.report.warnings;
+  auto& warnings = understood.warnings;
   warnings.insert(warnings.begin(), raw.warnings.begin(), raw.warnings.end());
   scan.report.notes.insert(scan.report.notes.begin(), warnings.begin(), warnings.end());
   scan.report.preparation = for_columns(options.preparation, raw.columns);
@@ -318,9 +322,13 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
 
 }  // namespace
 
-ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress,
+                        Understood* understood) {
+  Understood found;
   try {
-    return read_whole(path, options, progress);
+    ProjectionSet scan = read_whole(path, options, progress, found);
+    if (understood) *understood = std::move(found);
+    return scan;
   } catch (const std::bad_alloc&) {
     throw ResourceError(path.string() + ": not enough memory to read the scan");
   }

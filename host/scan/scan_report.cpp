@@ -25,9 +25,7 @@ ViewRanges used_ranges(const io::RawScan& raw, const std::vector<std::int64_t>& 
 
 }  // namespace
 
-void describe(const io::RawScan& raw, const ScanOptions& options, InputReport& report) {
-  report.format = raw.format;
-  report.notes = raw.notes;
+void describe(const io::RawScan& raw, const ScanOptions& options, Understood& report) {
   report.stated = options.input;
   if (!report.stated.views.empty()) report.stated.views = used_ranges(raw, {});
   report.values = raw.values;
@@ -61,7 +59,7 @@ void describe(const io::RawScan& raw, const ScanOptions& options, InputReport& r
 }
 
 void note_saturated(const FlatField& field, double full, const io::ValueTotals& totals,
-                    std::int64_t flat_samples, InputReport& report) {
+                    std::int64_t flat_samples, Understood& report) {
   if (full == 0) return;
   const auto note = [&](const char* what, std::int64_t at, std::int64_t samples, const char* effect) {
     if (100 * at < samples) return;

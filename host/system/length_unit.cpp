@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <utility>
 
 namespace vdvr {
@@ -43,6 +44,12 @@ std::optional<int> metres_exponent(const std::string& unit) {
     for (const char* metre : {"meter", "metre"})
       if (text == std::string(prefix) + metre) return exponent;
   return {};
+}
+
+double power_of_ten(int n) {
+  double power = 1;
+  for (int i = 0; i < std::abs(n); ++i) power *= 10;  // exact up to 10^22
+  return n < 0 ? 1 / power : power;
 }
 
 }  // namespace vdvr

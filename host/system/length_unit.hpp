@@ -10,4 +10,7 @@ namespace vdvr {
 /// spelling, in capitals, in the plural, with a micro sign in UTF-8 or Latin-1. Nothing where it is unknown.
 std::optional<int> metres_exponent(const std::string& unit);
 
+/// 10^n, the double nearest to it for |n| up to 22.
+double power_of_ten(int n);
+
 }  // namespace vdvr

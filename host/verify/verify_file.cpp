@@ -35,9 +35,6 @@ VdvrFile read_to_verify(const std::filesystem::path& path, std::uint64_t max_mem
 
 void check_input(const ProjectionSet& scan, const Certificate& c) {
   if (scan.report.sha256 == c.input_sha256) {
-    if (scan.report.stated != c.field.input)
-      throw MismatchError(fmt::format("these projections were read with: {}; the volume's were with: {}",
-                                      text_of(scan.report.stated), text_of(c.field.input)));
     if (scan.report.preparation == c.field.preparation) return;
     throw MismatchError(fmt::format("these projections were prepared by: {}; the volume's were by: {}",
                                     text_of(scan.report.preparation), text_of(c.field.preparation)));

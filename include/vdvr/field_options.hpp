@@ -6,7 +6,6 @@
 #include <string_view>
 #include <utility>
 
-#include "vdvr/input_statement.hpp"
 #include "vdvr/preparation.hpp"
 
 namespace vdvr {
@@ -38,8 +37,6 @@ struct FieldOptions {
   std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections
   /// What was done to the projections. It is done where they are read (ScanOptions), and recorded here.
   Preparation preparation{};
-  /// What was stated of the input, likewise.
-  InputStatement input{};
 };
 
 }  // namespace vdvr

@@ -1,6 +1,6 @@
 // What a user states of a scan that its files do not say, or say otherwise: by options of a command, or by
-// members of scan.json (docs/inputs.md). Recorded in the certificate's `field`, stated again by whoever reads
-// the scan to verify it.
+// members of scan.json (docs/inputs.md). Recorded in the certificate's `options`, stated again by whoever
+// reads the scan to verify it.
 #pragma once
 
 #include <cstdint>

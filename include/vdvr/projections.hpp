@@ -11,7 +11,6 @@
 
 #include "vdvr/cone_geometry.hpp"
 #include "vdvr/export.hpp"
-#include "vdvr/input_statement.hpp"
 #include "vdvr/preparation.hpp"
 #include "vdvr/sample_array.hpp"
 
@@ -29,37 +28,18 @@ struct ParallelGeometry {
   [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
 };
 
-/// One of the views as its file names it.
-struct NamedView {
-  std::int64_t view = 0;        ///< of the scan
-  std::int64_t projection = 0;  ///< of the file, where views were left out
-  std::string name;             ///< the file, or the dataset and the number
-};
-
-/// What no file and no option says, what was taken instead, and how to say otherwise.
-struct Assumption {
-  std::string what, why, otherwise;
-};
-
 /// What reading and pre-processing did, reported to the user and stored with the certificate.
 struct InputReport {
-  std::string name;               ///< file or folder name as given, without its directory
-  std::string sha256;             ///< of the file, or of a folder's sorted lines "sha256 name"
-  std::string format;             ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
-  std::int64_t dead_pixels = 0;   ///< samples replaced by the median of their neighbours
-  double transmission_floor = 0;  ///< the floor under -log
-  std::string center_source;      ///< "file", "option", "found", "default"
-  double source_to_detector = 0;  ///< of cone beam, in world units; 0: not stated, as matrices do not
-  bool air_background = false;    ///< a linear air background was fitted and taken off
-  Preparation preparation;        ///< what else was done to the projections
-  InputStatement stated;          ///< what options said of the input
-  SampleValues values = SampleValues::line_integrals;  ///< what the files hold
-  std::string values_source;                           ///< who says so
-  std::int64_t flats = 0, darks = 0;  ///< frames that were averaged; 0 where a level stands for them
-  std::vector<NamedView> frames;      ///< the first, the second and the last view
-  std::vector<Assumption> assumed;
-  std::vector<std::string> warnings;  ///< what makes F doubtful; one line each, among `notes` too
-  std::vector<std::string> notes;     ///< one line each, shown to the user
+  std::string name;                ///< file or folder name as given, without its directory
+  std::string sha256;              ///< of the file, or of a folder's sorted lines "sha256 name"
+  std::string format;              ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
+  std::int64_t dead_pixels = 0;    ///< samples replaced by the median of their neighbours
+  double transmission_floor = 0;   ///< the floor under -log
+  std::string center_source;       ///< "file", "option", "found", "default"
+  double source_to_detector = 0;   ///< of cone beam, in world units; 0: not stated, as matrices do not
+  bool air_background = false;     ///< a linear air background was fitted and taken off
+  Preparation preparation;         ///< what else was done to the projections
+  std::vector<std::string> notes;  ///< one line each, shown to the user
 };
 
 /// Line integrals, float data[view][row v][column u].

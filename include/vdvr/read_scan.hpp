@@ -10,6 +10,7 @@
 #include "vdvr/preparation.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 
 namespace vdvr {
 
@@ -40,8 +41,9 @@ struct ScanOptions {
 /// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre:
 /// option, else file, else found from opposite views, else (U-1)/2; of cone beam option, else file, else
 /// (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated files, ...).
+/// `understood` is filled unless it is null.
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
-                                 const Progress& progress = {});
+                                 const Progress& progress = {}, Understood* understood = nullptr);
 
 /// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
 /// theta in degrees. Written whole or not at all.

@@ -172,6 +172,10 @@ void add_projections(nb::module_& m) {
       .def_rw("flat", &InputStatement::flat)
       .def_rw("values", &InputStatement::values)
       .def("__str__", [](const InputStatement& s) { return text_of(s); });
+  nb::class_<Understood>(m, "Understood", "What was understood of a scan's files.")
+      .def(nb::init<>())
+      .def_ro("stated", &Understood::stated)
+      .def_ro("warnings", &Understood::warnings, "What makes the scan doubtful, a line each.");
   m.def("view_ranges_of", &view_ranges_of, "text"_a);
   nb::enum_<Beam>(m, "Beam").value("parallel", Beam::parallel).value("cone", Beam::cone);
   nb::class_<ScanOptions>(m, "ScanOptions")
@@ -207,8 +211,6 @@ void add_projections(nb::module_& m) {
       .def_prop_ro("sha256", [](const ProjectionSet& s) { return s.report.sha256; })
       .def_prop_ro("center_source", [](const ProjectionSet& s) { return s.report.center_source; })
       .def_prop_ro("notes", [](const ProjectionSet& s) { return s.report.notes; })
-      .def_prop_ro("warnings", [](const ProjectionSet& s) { return s.report.warnings; })
-      .def_prop_ro("stated", [](const ProjectionSet& s) { return text_of(s.report.stated); })
       .def_prop_ro("preparation", [](const ProjectionSet& s) { return s.report.preparation; });
   m.def("data_of", &data_of, "scan"_a);
   m.def("scan_of", &scan_of, "array"_a.noconvert(), "described"_a);
@@ -216,12 +218,13 @@ void add_projections(nb::module_& m) {
       "read_scan",
       [](const std::filesystem::path& path, const ScanOptions& options, nb::handle progress) {
         auto scan = std::make_shared<ProjectionSet>();
+        Understood understood;
         run_long(progress, [&](const Progress& report) {
           const std::lock_guard turn(hdf5_turn());
-          *scan = read_scan(path, options, report);
+          *scan = read_scan(path, options, report, &understood);
           for (auto& note : check_scan(*scan)) scan->report.notes.push_back(std::move(note));
         });
-        return scan;
+        return std::pair(scan, understood);
       },
       "path"_a, "options"_a, "progress"_a.none());
   m.def(
@@ -293,6 +296,7 @@ void add_plans(nb::module_& m) {
   nb::class_<CertifyOptions>(m, "CertifyOptions")
       .def(nb::init<>())
       .def_rw("field", &CertifyOptions::field)
+      .def_rw("input", &CertifyOptions::input)
       .def_prop_rw(
           "size", [](const CertifyOptions& o) { return o.grid.size; },
           [](CertifyOptions& o, std::optional<Index3> size) { o.grid.size = size; }, nb::arg().none())

@@ -58,6 +58,7 @@ class Scan:
     """
 
     _core: "_core.ProjectionSet"
+    _understood: "_core.Understood"
 
     def __init__(
         self,
@@ -77,12 +78,14 @@ class Scan:
         described.pitch_u, described.pitch_v = (number(p, "pitch") for p in pitches)
         described.unit = unit
         described.name = name
+        self._understood = _core.Understood()
         self._core = _core.scan_of(_projections(projections, line_integrals), described)
 
     @classmethod
-    def _of(cls, core: "_core.ProjectionSet") -> "Scan":
+    def _of(cls, core: "_core.ProjectionSet", understood: "_core.Understood") -> "Scan":
         scan = cls.__new__(cls)
         scan._core = core
+        scan._understood = understood
         return scan
 
     @property
@@ -138,7 +141,7 @@ class Scan:
     @property
     def warnings(self) -> List[str]:
         """What makes it doubtful, a line each; among the notes too."""
-        return self._core.warnings
+        return self._understood.warnings
 
     def save(self, path: Path) -> None:
         """Writes a Data Exchange file (HDF5) that `vdvr build` and `read_scan` read."""
@@ -215,7 +218,7 @@ def read_scan(
         members = ("distance_mm", "energy_kev", "delta_beta")
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     options.preparation = preparation
-    scan = Scan._of(_core.read_scan(path, options, progress))
+    scan = Scan._of(*_core.read_scan(path, options, progress))
     for text in scan.warnings:
         warnings.warn(text, stacklevel=2)
     return scan

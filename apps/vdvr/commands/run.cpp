@@ -180,7 +180,7 @@ Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::
       {"files", files},
       {"outside_certificate", out.outside},
       {"geometry", geometry_json(out.planned.scan.geometry)},
-      {"understood", understood_json(out.planned.scan)},
+      {"understood", understood_json(out.planned.scan, out.planned.understood)},
       {"report", report_json(out.planned.scan.report)},
       {"grid", grid_json(out.built.volume.grid)},
       {"bricks", levels_json(out.built.volume)},
@@ -220,13 +220,14 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
   const Progress progress = line.callback();
   Outcome out;
   // What was understood comes first: whoever sees that it is wrong need not wait for the rest.
-  const auto show = [&](const ProjectionSet& scan) {
+  const auto show = [&](const Planned& read) {
     line.clear();
     if (common.json || common.quiet) return;
-    print_scan(scan);
+    print_scan(read.scan, &read.understood);
     std::fflush(stdout);
   };
-  out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress, show); });
+  out.planned =
+      timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress, show); });
   out.built =
       timed(out.seconds, "build", [&] { return build_planned(device, out.planned, wanted, progress); });
   const Certificate& certificate = out.built.certificate;
