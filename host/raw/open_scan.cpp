@@ -8,6 +8,7 @@
 #include "host/raw/hdf5_scan.hpp"
 #include "host/raw/raster_scan.hpp"
 #include "host/raw/scan_folder.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -34,7 +35,7 @@ bool is_json(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   char c = 0;
   file >> std::ws >> c;
-  return c == '{';
+  return c == '{' || path.filename() == "scan.json";
 }
 
 RawScan open_hdf5(const fs::path& path, const ScanOptions& options) {
@@ -95,6 +96,7 @@ bool may_name_hdf5(const fs::path& description) {
   std::string text(std::min(fs::file_size(description, error), largest), '\0');
   std::ifstream file(description, std::ios::binary);
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text = utf8_of(std::move(text));
   return text.find("hdf5") != std::string::npos || text.find('\\') != std::string::npos;
 }
 
