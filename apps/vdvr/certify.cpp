@@ -19,7 +19,8 @@ void add_plan_options(Arguments& args) {
       .value("picture-tolerance", "N",
              "refine until every pixel of the views is certain to N levels of 255; --epsilon then holds "
              "everywhere (default 25%)")
-      .value("views", "VIEWS.json", "the cameras, the size and the transfer function of these pictures")
+      .value("picture-views", "VIEWS.json",
+             "the cameras, the size and the transfer function of these pictures")
       .value("picture-finest", "0.002|0.2%",
              "the least tolerance that a brick is asked for, of the range (default N / 4000)");
   add_field(args);
@@ -37,17 +38,20 @@ constexpr double levels_to_finest = 4000;
 
 std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
   if (!args.has("picture-tolerance")) {
-    refuse(args, {"views", "picture-finest"}, "goes with --picture-tolerance");
+    refuse(args, {"picture-views", "picture-finest"}, "goes with --picture-tolerance");
     return std::nullopt;
   }
-  if (!args.has("views"))
-    throw InputError("--picture-tolerance needs --views VIEWS.json: the pictures that it speaks of");
+  if (!has_picture_views(args))
+    throw InputError(
+        "--picture-tolerance needs --picture-views VIEWS.json: the pictures that it speaks of (--views "
+        "VIEWS.json "
+        "means the same)");
   refuse(args, {"window"}, "excludes --picture-tolerance: bricks beside the window have no bound");
   PictureWanted out;
   out.levels = args.positive_or("picture-tolerance", out.levels);
   if (out.levels > 255)
     throw InputError(fmt::format("--picture-tolerance: {} levels, but a pixel has 255", out.levels));
-  out.views = read_views(args.path("views"));
+  out.views = read_views(picture_views(args));
   out.finest =
       args.has("picture-finest") ? fraction_option(args, "picture-finest") : out.levels / levels_to_finest;
   return out;
@@ -84,9 +88,11 @@ Wanted wanted_to_certify(const Arguments& args) {
   return wanted;
 }
 
-Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress) {
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
+                      const std::function<void(const Planned&)>& seen) {
   Planned planned;
-  planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress);
+  planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
+  if (seen) seen(planned);
   if (!wanted.pictures) {
     planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
     return planned;
@@ -122,9 +128,9 @@ double everywhere_of(const Planned& planned, const Wanted& wanted) {
 }
 
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
-  if (!planned.pictures)
-    return certify(device, planned.scan, std::move(planned.plan), wanted.options, progress);
   CertifyOptions options = wanted.options;
+  options.input = planned.understood.stated;
+  if (!planned.pictures) return certify(device, planned.scan, std::move(planned.plan), options, progress);
   options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
   BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
   planned.pictures->note(result.certificate);

@@ -12,6 +12,7 @@
 #include "vdvr/picture_refinement.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 
 namespace vdvr::cli {
 
@@ -42,6 +43,7 @@ Wanted wanted_to_certify(const Arguments& args);
 
 struct Planned {
   ProjectionSet scan;
+  Understood understood;  ///< of its files
   Plan plan;
   std::shared_ptr<PictureRefinement> pictures;  ///< none, unless refined for some
 };
@@ -49,7 +51,9 @@ struct Planned {
 Json pictures_json(const Planned& planned);
 void print_pictures(const Planned& planned);
 /// Reads IN and plans.
-Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress);
+/// `seen` is called between the two.
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
+                      const std::function<void(const Planned&)>& seen = {});
 /// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.
 /// Throws InputError where that is less than what a brick may be asked for.
 PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted);

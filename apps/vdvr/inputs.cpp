@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/crew.hpp"
 #include "vdvr/certify.hpp"
@@ -32,8 +33,15 @@ InputKind kind_of(const fs::path& path, const Arguments& args) {
 
 namespace {
 
+// Warnings go to the terminal whatever is printed there beside them.
+void say_warnings(const Understood& understood, const Arguments& args) {
+  for (const std::string& warning : understood.warnings)
+    say(fmt::format("{}: WARNING: {}\n", args.who(), with_options(warning)));
+}
+
 ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
-                   std::optional<Beam> beam, const Progress& progress) {
+                   std::optional<Beam> beam, const InputStatement& stored, const Progress& progress,
+                   Understood& understood) {
   switch (kind_of(path, args)) {
     case InputKind::certified:
       throw InputError(fmt::format("{}: is a certified volume, not projections", path.string()));
@@ -52,11 +60,14 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
+  options.input = input_statement(args, stored);
   options.follow_links = args.has("follow-links");
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
-  return read_scan(path, options, progress);
+  ProjectionSet scan = read_scan(path, options, progress, &understood);
+  if (!common.quiet) say_warnings(understood, args);
+  return scan;
 }
 
 ProjectionSet checked(ProjectionSet scan) {
@@ -68,23 +79,32 @@ ProjectionSet checked(ProjectionSet scan) {
 
 ProjectionSet load_any_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
                             const Progress& progress) {
-  return load(path, args, field, {}, progress);
+  Understood understood;
+  return load(path, args, field, {}, {}, progress, understood);
 }
 
 ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
-                        const Progress& progress) {
-  return checked(load(path, args, field, {}, progress));
+                        const Progress& progress, Understood* understood) {
+  Understood own;
+  return checked(load(path, args, field, {}, {}, progress, understood ? *understood : own));
 }
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
                                   const Progress& progress) {
   const auto geometry = noted_geometry(certificate);
+  const InputStatement stored = noted_input(certificate);
   std::error_code error;
   // Folders say it themselves; no other file is of cone beam.
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
-  return checked(load(path, args, certificate.field,
-                      geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
-                      progress));
+  Understood understood;
+  ProjectionSet scan =
+      checked(load(path, args, certificate.field,
+                   geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, stored,
+                   progress, understood));
+  if (understood.stated != stored)
+    throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
+                                    path.string(), text_of(understood.stated), text_of(stored)));
+  return scan;
 }
 
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {

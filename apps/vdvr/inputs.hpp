@@ -8,6 +8,7 @@
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
@@ -18,16 +19,17 @@ enum class InputKind { certified, volume, scan };
 InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
 
 /// A scan, checked for what reconstruction assumes; the notes of the check join the report's. `field.center`
-/// overrides.
+/// overrides. `understood` is filled unless it is null.
 ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
-                        const Progress& progress);
+                        const Progress& progress, Understood* understood = nullptr);
 
 /// The same without the check: of what reconstruction may refuse, too.
 ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& args,
                             const FieldOptions& field, const Progress& progress);
 
-/// The checked scan under a certificate's field options. An HDF5 file that the certificate says is of cone
-/// beam is read so (--beam).
+/// The checked scan under a certificate's field options, and with what was stated of its input. An HDF5 file
+/// that the certificate says is of cone beam is read so (--beam). Throws MismatchError where options state
+/// something else.
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
 

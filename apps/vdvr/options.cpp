@@ -65,14 +65,6 @@ std::optional<int> rate(const Arguments& args, const std::string& name, std::int
 
 }  // namespace
 
-void add_scan(Arguments& args) {
-  args.value("angles-file", "FILE", "for MHA/NRRD stacks: angles in degrees, one per view")
-      .value("beam", "cone|parallel",
-             "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
-      .flag("follow-links",
-            "read and hash what HDF5 links and virtual datasets name outside the scan's folder too");
-}
-
 void add_field(Arguments& args) {
   args.group("Field (what is certified)")
       .value("center", "C", "column onto which the rotation axis projects")

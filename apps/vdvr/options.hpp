@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "apps/common/common_options.hpp"
+#include "apps/vdvr/scan_options.hpp"
 #include "vdvr/build.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/plan.hpp"
@@ -13,9 +14,6 @@
 
 namespace vdvr::cli {
 
-/// --angles-file, for stacks that carry no angles, --beam, and --follow-links, for HDF5 files in several
-/// folders.
-void add_scan(Arguments& args);
 void add_field(Arguments& args);
 void add_grid(Arguments& args);
 void add_rates(Arguments& args);

@@ -9,7 +9,7 @@
 #include <cstdio>
 
 #include "apps/common/messages.hpp"
-#include "apps/vdvr/cone.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
 
 namespace fs = std::filesystem;
@@ -107,19 +107,6 @@ void print_notes(const std::vector<std::string>& notes) {
   for (const auto& note : notes) fmt::print("  note         {}\n", with_options(note));
 }
 
-void print_scan(const ProjectionSet& scan) {
-  const ParallelGeometry& g = scan.geometry;
-  fmt::print("scan           {} ({}), {} views of {} x {} pixels\n", scan.report.name, scan.report.format,
-             g.views(), g.columns, g.rows);
-  fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
-  fmt::print("  centre       column {:.4f} ({})\n", g.center, scan.report.center_source);
-  if (scan.cone) print_cone(scan);
-  if (scan.report.dead_pixels != 0) fmt::print("  dead pixels  {} replaced\n", scan.report.dead_pixels);
-  if (scan.report.air_background) fmt::print("  background   linear air background taken off\n");
-  fmt::print("  sha256       {}\n", scan.report.sha256);
-  print_notes(scan.report.notes);
-}
-
 void print_grid(const Grid& g) {
   fmt::print("grid           {} x {} x {} cells of {:.6g} x {:.6g} x {:.6g} {}, first sample at {}\n",
              g.cells[0], g.cells[1], g.cells[2], g.spacing[0], g.spacing[1], g.spacing[2], g.unit,
@@ -191,6 +178,8 @@ void print_certificate(const Certificate& c) {
              c.rates.gold);
   fmt::print("  field        filter {} to {:.4g} of Nyquist{}\n", text_of(c.field.filter), c.field.cutoff,
              c.field.center ? fmt::format(", centre {:.4f}", *c.field.center) : "");
+  if (const InputStatement stated = noted_input(c); !stated.none())
+    fmt::print("  stated       of the input: {}\n", text_of(stated));
   if (!c.field.preparation.none())
     fmt::print("  prepared     {}; F is that of the prepared projections\n", text_of(c.field.preparation));
   fmt::print("  not covered  {} samples ({:.2f} %)\n", c.not_covered_count, 100 * c.not_covered_fraction);

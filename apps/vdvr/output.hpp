@@ -12,6 +12,7 @@
 #include "apps/common/output_folder.hpp"
 #include "apps/common/volume_json.hpp"
 #include "apps/vdvr/options.hpp"
+#include "apps/vdvr/understood.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/mixed_volume.hpp"
@@ -41,7 +42,6 @@ Json seconds_json(const std::map<std::string, double>& seconds);
 std::string vec_text(const Vec3& v);
 /// "2.4 GiB"
 std::string bytes_text(std::uint64_t bytes);
-void print_scan(const ProjectionSet& scan);
 void print_grid(const Grid& grid);
 void print_bounds(const std::vector<Bound>& bounds, double epsilon_abs);
 void print_budget(const ErrorBudget& budget, double epsilon_abs);

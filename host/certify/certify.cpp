@@ -13,6 +13,7 @@
 #include "host/fdk/filter_cone.hpp"
 #include "host/gold/gold_settings.hpp"
 #include "vdvr/certified_region.hpp"
+#include "host/scan/input_statement_json.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -74,7 +75,7 @@ Grid grid_of_region(const ProjectionSet& scan, const FieldOptions& field, const 
 
 // What the volume was built with, and the scan's geometry: a reader of the file can tell which points are
 // covered without the projections.
-std::string options_json(const Plan& plan, const BuildOptions& build, const ProjectionSet& scan) {
+std::string options_json(const Plan& plan, const CertifyOptions& options, const ProjectionSet& scan) {
   const ParallelGeometry& geometry = scan.geometry;
   const Comparison& comparison = plan.settings.comparison;
   const LevelTriple& c = plan.layout.coarsening;
@@ -84,12 +85,13 @@ std::string options_json(const Plan& plan, const BuildOptions& build, const Proj
   j["closing"] = vdvr::text_of(comparison.closing);
   j["coefficients"] = vdvr::text_of(comparison.coefficients);
   j["levels"] = vdvr::text_of(plan.layout.levels);
-  j["storage"] = text_of(build.storage);
+  j["storage"] = text_of(options.build.storage);
   j["terms"] = vdvr::text_of(comparison.terms);
   j["epsilon_of"] = comparison.epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.rates.upsampling;
   j["u_filter"] = vdvr::text_of(plan.rates.interpolation);
   j["gold"] = plan.rates.gold;
+  if (!options.input.none()) j["input"] = json_of(options.input);
   j["geometry"] = {{"columns", geometry.columns},
                    {"rows", geometry.rows},
                    {"pitch_u", geometry.pitch_u},
@@ -152,7 +154,7 @@ BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& 
 BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan, const CertifyOptions& options,
                     const Progress& progress) {
   check_options(options);
-  std::string noted = options_json(plan, options.build, scan);
+  std::string noted = options_json(plan, options, scan);
   BuildResult result = build_or_give_up(device, scan, std::move(plan), options.build, progress);
   Certificate& c = result.certificate;
   refuse_empty_promise(c);
@@ -189,6 +191,16 @@ std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
     return scan;
   } catch (const nlohmann::json::exception& e) {
     throw FileError(fmt::format("certificate, options.geometry: {}", e.what()));
+  }
+}
+
+InputStatement noted_input(const Certificate& certificate) {
+  const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
+  if (!options.is_object() || !options.contains("input")) return {};
+  try {
+    return input_statement_of(options.at("input"));
+  } catch (const InputError& e) {
+    throw FileError(fmt::format("certificate, options: {}", e.what()));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "host/export/pack.hpp"
 #include "host/hdf5/hdf5_writer.hpp"
+#include "host/system/length_unit.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -24,11 +25,7 @@ constexpr int deflate_level = 4;
 
 /// Micrometres per unit; nothing where the unit is none of length.
 std::optional<double> micrometres(const std::string& unit) {
-  if (unit == "nm") return 1e-3;
-  if (unit == "um") return 1.0;
-  if (unit == "mm") return 1e3;
-  if (unit == "cm") return 1e4;
-  if (unit == "m") return 1e6;
+  if (const auto exponent = metres_exponent(unit)) return power_of_ten(*exponent + 6);
   return std::nullopt;
 }
 

@@ -1,5 +1,5 @@
 // CIL's AcquisitionGeometry.create_Cone3D with its panel and angles, the arguments saved as JSON. Called by
-// host/scan/scan_members.cpp.
+// host/raw/scan_members.cpp.
 #pragma once
 
 #include <filesystem>

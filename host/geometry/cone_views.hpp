@@ -1,5 +1,5 @@
 // What a geometry file says of a cone-beam scan, and what every such file is held to. Filled by the readers
-// of this room; called by host/scan/scan_members.cpp.
+// of this room; called by host/raw/scan_members.cpp.
 #pragma once
 
 #include <array>
@@ -31,6 +31,7 @@ struct ConeViews {
   std::string unit;                ///< of its lengths; empty where the format says nothing
   double source_to_detector = 0;   ///< 0 where the format does not say, or views differ
   std::vector<std::string> notes;  ///< what was assumed
+  std::string if_at_edge;          ///< the likely cause, where the axis falls on the detector's first pixel
 };
 
 /// The matrix with lambda = 1 at the isocentre. Throws FileError ("where: view k: ...") unless it is that of

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <optional>
 
 #include "host/io/natural_order.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -18,16 +18,15 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 Description::Description(fs::path file, const std::set<std::string>& known) : file_(std::move(file)) {
-  std::error_code error;
-  std::ifstream stream(file_);
-  if (!fs::is_regular_file(file_, error) || !stream)
-    fail(file_.filename() == "scan.json" ? "cannot be opened; a folder is a scan by its scan.json"
-                                         : "cannot be opened");
   // The description of a scan takes lines, not megabytes: a larger file is something else.
   constexpr std::uintmax_t largest = 16u << 20;
-  if (fs::file_size(file_, error) > largest) fail("is too large for a description");
+  std::error_code error;
+  if (!fs::is_regular_file(file_, error))
+    fail(file_.filename() == "scan.json" ? "cannot be opened; a folder is a scan by its scan.json"
+                                         : "cannot be opened");
+  const std::string text = read_text(file_, "a description", largest);
   try {
-    json_ = json::parse(stream, nullptr, true, true);
+    json_ = json::parse(text, nullptr, true, true);
   } catch (const json::exception& e) {
     fail(fmt::format("is not JSON: {}", e.what()));
   }
@@ -156,6 +155,12 @@ std::vector<std::pair<std::int64_t, std::int64_t>> Description::ranges(const std
     all.push_back(*range);
   }
   return all;
+}
+
+std::vector<std::pair<std::int64_t, std::int64_t>> Description::one_or_more_ranges(
+    const std::string& key) const {
+  if (const auto one = range_of(json_.at(key))) return {*one};
+  return ranges(key);
 }
 
 fs::path Description::inside(const std::string& name, const std::string& key) const {

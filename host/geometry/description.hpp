@@ -25,6 +25,10 @@ class Description {
   [[nodiscard]] std::string quoted(const std::string& key) const;
   [[nodiscard]] std::filesystem::path folder() const { return file_.parent_path(); }
 
+  [[nodiscard]] bool is_number(const std::string& key) const { return json_.at(key).is_number(); }
+  [[nodiscard]] bool is_text(const std::string& key, const std::string& text) const {
+    return json_.at(key).is_string() && json_.at(key).get<std::string>() == text;
+  }
   [[nodiscard]] bool is_list(const std::string& key) const { return json_.at(key).is_array(); }
   /// A list whose first entry is one.
   [[nodiscard]] bool is_table(const std::string& key) const {
@@ -45,6 +49,9 @@ class Description {
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> half_open(const std::string& key, std::int64_t count,
                                                                 const char* what) const;
   [[nodiscard]] std::vector<std::pair<std::int64_t, std::int64_t>> ranges(const std::string& key) const;
+  /// The same, or one range by itself.
+  [[nodiscard]] std::vector<std::pair<std::int64_t, std::int64_t>> one_or_more_ranges(
+      const std::string& key) const;
 
   /// A file of the folder; names out of it are refused.
   [[nodiscard]] std::filesystem::path inside(const std::string& name, const std::string& key) const;

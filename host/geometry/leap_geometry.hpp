@@ -1,5 +1,5 @@
 // LEAP's geometries `set_conebeam` and `set_modularbeam`, their arguments saved as JSON. Called by
-// host/scan/scan_members.cpp.
+// host/raw/scan_members.cpp.
 #pragma once
 
 #include <filesystem>

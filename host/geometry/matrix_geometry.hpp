@@ -1,5 +1,5 @@
 // `matrices` of scan.json: a 3x4 matrix for each view in NumPy's format. Called by
-// host/scan/scan_members.cpp.
+// host/raw/scan_members.cpp.
 #pragma once
 
 #include <filesystem>

@@ -7,11 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <numbers>
+#include <sstream>
 
 #include "host/io/number_text.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -25,10 +26,9 @@ class Members {
  public:
   explicit Members(fs::path path) : path_(std::move(path)) {
     std::error_code error;
-    std::ifstream file(path_, std::ios::binary);
-    if (!fs::is_regular_file(path_, error) || !file) fail("no such file, or not readable");
+    if (!fs::is_regular_file(path_, error)) fail("no such file, or not readable");
     constexpr std::uintmax_t largest = 16u << 20;
-    if (fs::file_size(path_, error) > largest) fail("is too large for a description");
+    std::istringstream file(read_text(path_, "a description", largest));
     bool ours = true;
     for (std::string line; std::getline(file, line);) {
       const std::string_view text = without_blanks(line);
@@ -51,7 +51,7 @@ class Members {
     const std::string value = text(key);
     if (value.empty()) return {};
     const auto number = number_of(value);
-    if (!number) fail(fmt::format("{} is '{}', not a number", key, value.substr(0, 40)));
+    if (!number) fail(fmt::format("{} is '{}', not a number{}", key, value.substr(0, 40), comma_hint(value)));
     return number;
   }
   double need(const std::string& key) const {

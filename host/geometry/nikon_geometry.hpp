@@ -1,5 +1,5 @@
 // Nikon's .xtekct files: a scan's geometry, its white level, and where its projections lie. Called by
-// host/scan/scan_folder.cpp and scan_members.cpp.
+// host/raw/scan_folder.cpp and scan_members.cpp.
 #pragma once
 
 #include <filesystem>

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "host/io/number_text.hpp"
+#include "host/system/text_encoding.hpp"
 #include "host/io/xml_file.hpp"
 #include "vdvr/error.hpp"
 
@@ -184,7 +185,8 @@ class RtkReader {
   double number(const XmlElement& element) const {
     const auto value = number_of(element.text);
     if (!value || !element.children.empty())
-      fail(element, fmt::format("{} is '{}', not a number", element.name, element.text.substr(0, 40)));
+      fail(element, fmt::format("{} is '{}', not a number{}", element.name, element.text.substr(0, 40),
+                                comma_hint(element.text)));
     return *value;
   }
 
@@ -256,13 +258,13 @@ class RtkReader {
     out_.notes.emplace_back(
         "RTK's axis of rotation is its y: its point (x, y, z) is (x, -z, y) here, and its gantry angle the "
         "angle of a view");
-    if (header_.origin[0] == 0 && header_.origin[1] == 0)
-      out_.notes.push_back(
-          fmt::format("{}: the stack's origin is 0, so the source's axis hits its first pixel; a centred "
-                      "detector has the "
-                      "Offset {:g} {:g}",
-                      header_.file.filename().string(), -stack_.middle_column() * header_.spacing[0],
-                      -stack_.middle_row() * header_.spacing[1]));
+    if (header_.origin[0] != 0 || header_.origin[1] != 0) return;
+    out_.if_at_edge = fmt::format(
+        "{}: the stack's origin is 0, so the source's axis hits its first pixel; a centred detector "
+        "has the Offset {:g} {:g}",
+        header_.file.filename().string(), -stack_.middle_column() * header_.spacing[0],
+        -stack_.middle_row() * header_.spacing[1]);
+    out_.notes.push_back(out_.if_at_edge);
   }
 
   std::filesystem::path path_;

@@ -1,4 +1,4 @@
-// RTK's XML files of geometry. Called by host/scan/scan_members.cpp.
+// RTK's XML files of geometry. Called by host/raw/scan_members.cpp.
 #pragma once
 
 #include <filesystem>

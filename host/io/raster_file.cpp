@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "host/system/limits.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -89,7 +90,7 @@ class Header {
       char* end = nullptr;
       values.push_back(std::strtod(word.c_str(), &end));
       if (*end != '\0' || (!std::isfinite(values.back()) && !(nan_is_unknown && std::isnan(values.back()))))
-        fail(fmt::format("'{}' holds '{}', not a number", key, word));
+        fail(fmt::format("'{}' holds '{}', not a number{}", key, word, comma_hint(word)));
     }
     if (values.size() != count)
       fail(fmt::format("'{}' holds {} numbers, {} are needed", key, values.size(), count));

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <string_view>
 
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -27,7 +27,6 @@ class Reader {
   Reader(const fs::path& path, std::string_view text) : path_(path), text_(text) {}
 
   XmlElement document() {
-    take("\xef\xbb\xbf");
     if (take("<?xml")) skip_past("?>", "the XML declaration");
     skip_between();
     if (take("<!DOCTYPE")) {
@@ -151,14 +150,8 @@ class Reader {
 
 XmlElement read_xml(const fs::path& path) {
   std::error_code error;
-  std::ifstream file(path, std::ios::binary);
-  if (!fs::is_regular_file(path, error) || !file)
-    throw FileError(path.string() + ": no such file, or not readable");
-  const std::uintmax_t bytes = fs::file_size(path, error);
-  if (bytes > largest_file) throw FileError(path.string() + ": is too large for a geometry file");
-  std::string text(bytes, '\0');
-  if (!file.read(text.data(), static_cast<std::streamsize>(bytes)))
-    throw FileError(path.string() + ": cannot be read");
+  if (!fs::is_regular_file(path, error)) throw FileError(path.string() + ": no such file, or not readable");
+  const std::string text = read_text(path, "a geometry file", largest_file);
   return Reader(path, text).document();
 }
 

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <bit>
 #include <cmath>
 #include <numbers>
 
+#include "host/system/length_unit.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -41,20 +41,7 @@ double paganin_area_mm2(const PhaseRetrieval& phase) {
 }
 
 double millimetres_of(const std::string& unit) {
-  static constexpr std::array<std::pair<const char*, double>, 12> known{{{"m", 1e3},
-                                                                         {"cm", 10},
-                                                                         {"mm", 1},
-                                                                         {"millimeter", 1},
-                                                                         {"millimetre", 1},
-                                                                         {"um", 1e-3},
-                                                                         {"\u00b5m", 1e-3},
-                                                                         {"\u03bcm", 1e-3},
-                                                                         {"micron", 1e-3},
-                                                                         {"micrometer", 1e-3},
-                                                                         {"micrometre", 1e-3},
-                                                                         {"nm", 1e-6}}};
-  for (const auto& [name, millimetres] : known)
-    if (unit == name) return millimetres;
+  if (const auto exponent = metres_exponent(unit)) return power_of_ten(*exponent + 3);
   throw InputError(fmt::format(
       "phase: the pitch is in '{}', whose length is not known; give 'pitch' and 'unit' (m, cm, mm, um or nm) "
       "in a scan.json",

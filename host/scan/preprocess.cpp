@@ -82,8 +82,11 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
   for (std::int64_t k = 0; k < flats.count; ++k) {
     flats.read(k, 1, frame.data());
     bool any = false;
-    for (std::size_t i = 0; i < size && !any; ++i)
-      any = frame[i] - field.dark[i] > 0 && std::isfinite(frame[i]);
+    for (std::size_t i = 0; i < size; ++i) {
+      any = any || (frame[i] - field.dark[i] > 0 && std::isfinite(frame[i]));
+      if (frame[i] > field.largest_flat) field.largest_flat = frame[i], field.at_largest = 0;
+      field.at_largest += frame[i] == field.largest_flat ? 1 : 0;
+    }
     if (!any)
       throw FileError(fmt::format(
           "{}: no pixel of this flat is above the dark; leave it out or measure it again", flats.name(k)));
@@ -103,7 +106,7 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
 }
 
 std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
-                               const FlatField& field, const std::string& name) {
+                               const FlatField& field) {
   std::vector<bool> dead(counts.size());
   std::int64_t replaced = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -113,11 +116,7 @@ std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std:
     replaced += dead[i] ? 1 : 0;
   }
   if (replaced == 0) return 0;
-  if (replaced == static_cast<std::int64_t>(counts.size()))
-    throw FileError(
-        fmt::format("{}: no pixel of this projection can be used (transmission above {:.3g}); select views "
-                    "without it",
-                    name, field.floor));
+  if (replaced == static_cast<std::int64_t>(counts.size())) return replaced;
   const auto distance = distance_to_valid(dead, rows, columns);
   for (std::size_t i = 0; i < counts.size(); ++i)
     if (dead[i])

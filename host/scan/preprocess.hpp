@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/scan/raw_scan.hpp"
+#include "host/raw/raw_scan.hpp"
 
 namespace vdvr {
 
@@ -16,8 +16,10 @@ namespace vdvr {
 struct FlatField {
   std::vector<double> dark;  ///< [row][column], mean over the darks
   std::vector<double>
-      gain;          ///< mean flat - mean dark; NaN where it is not positive and finite (a dead pixel)
-  double floor = 0;  ///< transmissions at or below it count as dead
+      gain;                 ///< mean flat - mean dark; NaN where it is not positive and finite (a dead pixel)
+  double floor = 0;         ///< transmissions at or below it count as dead
+  double largest_flat = 0;  ///< of all flats' samples
+  std::int64_t at_largest = 0;  ///< samples of flats that have it
 };
 
 /// Averages darks and flats. The floor is half of what the detector can tell apart from nothing: half a count
@@ -28,9 +30,9 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
 
 /// counts[row][column] become line integrals in place; returns how many pixels were replaced. A dead pixel
 /// (gain, count or transmission unusable) gets the median of the valid ones in the smallest square about it
-/// that has any. Throws FileError naming a projection that has no valid pixel.
+/// that has any. Of a projection without one, all pixels count, and are left NaN.
 std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
-                               const FlatField& field, const std::string& name);
+                               const FlatField& field);
 
 /// Subtracts from each row the least-squares line through its samples in the (inclusive) column ranges.
 void subtract_air_background(std::span<double> view, std::int64_t rows, std::int64_t columns,

@@ -14,12 +14,13 @@
 #include <thread>
 
 #include "host/hdf5/hdf5_writer.hpp"
-#include "host/io/raster_file.hpp"
 #include "host/prepare/prepare.hpp"
-#include "host/scan/hdf5_scan.hpp"
+#include "host/scan/motion.hpp"
 #include "host/scan/preprocess.hpp"
-#include "host/scan/raster_scan.hpp"
-#include "host/scan/scan_folder.hpp"
+#include "host/scan/values.hpp"
+#include "host/raw/open_scan.hpp"
+#include "host/scan/cone_scan.hpp"
+#include "host/scan/scan_report.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "vdvr/error.hpp"
@@ -41,69 +42,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// --- which reader ---
-
-// The signature may follow a user block of 512, 1024, ... bytes (HDF5 File Format Specification, III.A).
-bool is_hdf5(const fs::path& path) {
-  const std::string signature("\x89HDF\r\n\x1a\n", 8);
-  std::ifstream file(path, std::ios::binary);
-  std::error_code error;
-  const std::uint64_t size = fs::file_size(path, error);
-  for (std::uint64_t at = 0; !error && at + signature.size() <= size; at = at == 0 ? 512 : 2 * at) {
-    std::string start(signature.size(), '\0');
-    file.seekg(static_cast<std::streamoff>(at));
-    if (!file.read(start.data(), static_cast<std::streamsize>(start.size()))) return false;
-    if (start == signature) return true;
-  }
-  return false;
-}
-
-bool is_json(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  char c = 0;
-  file >> std::ws >> c;
-  return c == '{';
-}
-
-io::RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& folder) {
-  std::error_code error;
-  const auto status = fs::status(path, error);
-  if (!fs::exists(status)) throw FileError(path.string() + ": no such file or folder");
-  folder = fs::is_directory(status);
-  const bool raster = !folder && io::is_raster_file(path);
-  if (options.angles_file && !raster)
-    throw InputError(path.string() +
-                     ": an angles file goes with an MHA or NRRD stack; other scans bring their angles");
-  if (folder) return io::open_scan_folder(path, options.max_memory_bytes, options.beam, options.follow_links);
-  if (!fs::is_regular_file(status)) throw FileError(path.string() + ": is neither a file nor a folder");
-  if (fs::file_size(path, error) == 0) throw FileError(path.string() + ": is empty");
-  const bool cone = options.beam == Beam::cone;
-  if (is_hdf5(path)) {
-    io::RawScan raw = io::open_hdf5_scan(path, {}, options.follow_links, cone);
-    if (raw.cone)
-      raw.notes.insert(raw.notes.end(), raw.cone->geometry.notes.begin(), raw.cone->geometry.notes.end());
-    return raw;
-  }
-  if (raster && cone)
-    throw InputError(
-        path.string() +
-        ": a stack states no distances, so cone beam (`beam`) cannot be read from it; describe the scan "
-        "in scan.json by 'geometry'");
-  if (raster) {
-    if (!options.angles_file)
-      throw InputError(path.string() + ": a stack needs its angles; give them with `angles_file`");
-    return io::open_raster_scan(path, *options.angles_file);
-  }
-  if (is_json(path)) {
-    if (path.filename() != "scan.json")
-      throw FileError(path.string() + ": a scan's description is named scan.json");
-    folder = true;
-    return io::open_scan_folder(path.has_parent_path() ? path.parent_path() : ".", options.max_memory_bytes,
-                                options.beam, options.follow_links);
-  }
-  throw FileError(path.string() +
-                  ": is no scan: not HDF5 (Data Exchange, NXtomo), not a folder with scan.json, not an MHA "
-                  "or NRRD stack; or its first bytes are missing");
+// The scan as its files, scan.json and the options describe it.
+io::RawScan open_described(const fs::path& path, const ScanOptions& options, bool& folder) {
+  io::RawScan raw = io::open_scan(path, options, folder);
+  io::settle_values(raw, options.input, path.string());
+  return raw;
 }
 
 // --- geometry and memory ---
@@ -178,19 +121,22 @@ void require_finite(std::span<const double> view, const io::RawScan& raw, std::i
 }
 
 void read_samples(const io::RawScan& raw, const ScanOptions& options, const ViewPreparation& preparation,
-                  ProjectionSet& scan, const Progress& progress) {
+                  ProjectionSet& scan, io::ValueTotals& totals, Understood& understood,
+                  const Progress& progress) {
   const std::int64_t size = raw.rows * raw.columns, step = block_views(raw, options.max_memory_bytes);
   FlatField field;
   if (raw.counts) {
     field = make_flat_field(raw.flats, raw.darks, raw.rows, raw.columns, raw.integer);
     scan.report.transmission_floor = field.floor;
   }
+  const double full = raw.counts && !raw.flat_level ? io::saturation_of(raw, field.largest_flat) : 0;
   const auto samples = static_cast<std::size_t>(raw.projections.count * size);
   scan.data =
       SampleArray(samples, scratch_for(samples * sizeof(float), options.max_memory_bytes, options.scratch),
                   "the projections");
   std::vector<double> block(static_cast<std::size_t>(step * size));
-  std::vector<std::int64_t> dead(static_cast<std::size_t>(step));
+  std::vector<std::int64_t> dead(static_cast<std::size_t>(step)), blank;
+  std::vector<io::ValueTotals> of_view(static_cast<std::size_t>(step));
   std::atomic<bool> rounds = false;
   std::atomic<std::int64_t> outliers = 0;
   for (std::int64_t first = 0; first < raw.projections.count; first += step) {
@@ -198,15 +144,19 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, const View
     raw.projections.read(first, n, block.data());
     for_each_view(n, [&](std::int64_t k) {
       const std::span<double> view(block.data() + k * size, static_cast<std::size_t>(size));
-      if (raw.counts)
-        dead[static_cast<std::size_t>(k)] =
-            to_line_integrals(view, raw.rows, raw.columns, field, raw.projections.name(first + k));
-      else {
+      io::ValueTotals& own = of_view[static_cast<std::size_t>(k)] = {};
+      if (raw.counts) {
+        if (full > 0) own.saturated = std::count(view.begin(), view.end(), full);
+        std::int64_t& replaced = dead[static_cast<std::size_t>(k)] =
+            to_line_integrals(view, raw.rows, raw.columns, field);
+        if (replaced == size) return;
+      } else {
         require_finite(view, raw, first + k);
         if (std::any_of(view.begin(), view.end(),
                         [](double p) { return static_cast<double>(static_cast<float>(p)) != p; }))
           rounds = true;
       }
+      own.add(view, raw.columns);
       if (!preparation.none()) {
         View copy{raw.columns, raw.rows, {view.begin(), view.end()}};
         outliers += preparation.apply(copy);
@@ -217,9 +167,16 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, const View
       std::transform(view.begin(), view.end(), scan.data.begin() + (first + k) * size,
                      [](double p) { return static_cast<float>(p); });
     });
-    for (std::int64_t k = 0; k < n; ++k) scan.report.dead_pixels += dead[static_cast<std::size_t>(k)];
+    for (std::int64_t k = 0; k < n; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      scan.report.dead_pixels += dead[i];
+      if (raw.counts && dead[i] == size) blank.push_back(first + k);
+      else totals.add(of_view[i]);
+    }
     report(progress, "read", static_cast<double>(first + n) / static_cast<double>(raw.projections.count));
   }
+  if (!blank.empty()) refuse_blank(raw, blank, field.floor);
+  note_saturated(field, full, totals, raw.flats.count * size, understood);
   scan.report.air_background = !raw.air_columns.empty();
   if (options.preparation.outliers)
     scan.report.notes.push_back(fmt::format("{} of {} samples were outliers and got the median of {} x {}",
@@ -260,17 +217,6 @@ std::string name_of(const fs::path& path, bool folder) {
   if (folder && whole.filename() == "scan.json") whole = whole.parent_path();
   if (!whole.has_filename()) whole = whole.parent_path();
   return whole.filename().string();
-}
-
-void require_on_detector(const fs::path& path, double center, std::int64_t columns,
-                         const ScanOptions& options) {
-  const double last = static_cast<double>(columns) - 0.5;
-  if (!(center >= -0.5 && center <= last)) {
-    const std::string text =
-        fmt::format("{}: centre {} is not on the detector's columns -0.5 to {}", path.string(), center, last);
-    if (options.center) throw InputError(text);
-    throw FileError(text);
-  }
 }
 
 // In columns of the file.
@@ -315,87 +261,10 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
   require_on_detector(path, g.center, g.columns, options);
 }
 
-// --- cone beam ---
-
-// All views moved alike, so that the isocentre is seen at column `wanted` on the average. Where it is but for
-// the mean's rounding, nothing moves: a certificate's centre gives the matrices that it was made of.
-void move_axis(ConeGeometry& cone, double wanted) {
-  double mean = 0, largest = 0;
-  const auto views = static_cast<double>(cone.views.size());
-  for (const ViewMatrix& m : cone.views) {
-    mean += m[0][3] / m[2][3] / views;
-    largest = std::max(largest, std::abs(m[0][3] / m[2][3]));
-  }
-  if (std::abs(wanted - mean) <= (2 * views + 4) * 0x1p-53 * largest) return;
-  for (ViewMatrix& m : cone.views) m = recentred(m, m[0][3] / m[2][3] + wanted - mean);
-}
-
-// The opposite views, which would see what the narrower side does not, do not exist. Who states a full turn
-// has it so.
-void require_no_displaced_short_scan(const fs::path& path, const ConeGeometry& cone,
-                                     const ParallelGeometry& g) {
-  const SourceArc arc = source_arc(cone);
-  const double below = g.center, above = static_cast<double>(g.columns - 1) - g.center;
-  const bool open = cone.redundancy == Redundancy::short_scan ||
-                    natural_redundancy(cone, g.columns) == Redundancy::short_scan;
-  const bool displaced =
-      cone.redundancy == Redundancy::displaced || std::abs(above - below) >= 0.1 * (above + below);
-  if (open && displaced && cone.redundancy != Redundancy::full_turn)
-    throw FileError(fmt::format(
-        "{}: a short scan ({:.1f} degrees) whose axis is seen at column {:.2f} of {}: the opposite views "
-        "that would see the far side do not exist; crop the wider side of the detector, or measure a full "
-        "turn",
-        path.string(), arc.arc_rad * (180 / std::numbers::pi), g.center, g.columns));
-}
-
-void set_cone(const fs::path& path, const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan) {
-  ConeGeometry cone;
-  cone.views = raw.cone->geometry.views;
-  InputReport& r = scan.report;
-  r.source_to_detector = raw.cone->geometry.source_to_detector;
-  r.center_source = options.center ? "option" : raw.center ? "file" : raw.cone->geometry.center_source;
-  std::optional<double> wanted = raw.center;
-  if (options.center) wanted = unbinned_center(*options.center, options.preparation.binning);
-  if (wanted) {
-    require_on_detector(path, *wanted, raw.columns, options);
-    move_axis(cone, *wanted);
-    r.notes.push_back(fmt::format("all views were moved so that the axis is at column {:g}, as {} says",
-                                  *wanted, options.center ? "`center`" : "scan.json's 'center'"));
-  }
-  cone.redundancy = raw.cone->redundancy.value_or(natural_redundancy(cone, raw.columns));
-  scan.geometry = parallel_limit(cone, raw.columns, raw.rows, raw.unit);
-  require_on_detector(path, scan.geometry.center, raw.columns, options);
-  require_no_displaced_short_scan(path, cone, scan.geometry);
-  const SourceArc arc = source_arc(cone);
-  r.notes.push_back(
-      fmt::format("weights of a {} scan, as {}: sources over {:.1f} degrees, axis at column {:.2f}",
-                  text_of(cone.redundancy), raw.cone->redundancy ? "scan.json says" : "the views tell",
-                  arc.arc_rad * (180 / std::numbers::pi), scan.geometry.center));
-  scan.cone = std::move(cone);
-}
-
-// A description that may name an HDF5 file: by its member, or by a letter of it written as \\u0068.
-bool may_name_hdf5(const fs::path& description) {
-  std::error_code error;
-  if (!fs::is_regular_file(description, error)) return false;
-  constexpr std::uintmax_t largest = 16u << 20;  // the reader refuses a larger one
-  std::string text(std::min(fs::file_size(description, error), largest), '\0');
-  std::ifstream file(description, std::ios::binary);
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  return text.find("hdf5") != std::string::npos || text.find('\\') != std::string::npos;
-}
-
-bool holds_hdf5(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) return may_name_hdf5(path / "scan.json");
-  if (!fs::is_regular_file(path, error)) return false;
-  return is_hdf5(path) || (path.filename() == "scan.json" && may_name_hdf5(path));
-}
-
 // Everything that comes from the files, and nothing kept.
 void read_frames(const fs::path& path, const ScanOptions& options) {
   bool folder = false;
-  const io::RawScan raw = open_scan(path, options, folder);
+  const io::RawScan raw = open_described(path, options, folder);
   std::uint64_t bytes = 0;
   for (const auto& stamp : stamps_of(raw)) bytes += stamp.first;
   io::extend_rehearsal(bytes);
@@ -408,21 +277,27 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
       frames->read(first, std::min(step, frames->count - first), block.data());
 }
 
-ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress) {
-  if (holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
+                         Understood& understood) {
+  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
-  const io::RawScan raw = open_scan(path, options, folder);
+  io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
   scan.report.name = name_of(path, folder);
   scan.report.format = raw.format;
   scan.report.notes = raw.notes;
+  describe(raw, options, understood);
   scan.geometry = geometry_of(raw, path.string());
   const ViewPreparation preparation(options.preparation, scan.geometry, raw.cone.has_value());
   if (raw.cone) set_cone(path, raw, options, scan);
+  io::require_still(raw, std::min(scan.geometry.pitch_u, scan.geometry.pitch_v), path.string());
   require_room(raw, options, path.string(), preparation.bytes());
   const auto before = stamps_of(raw);
-  read_samples(raw, options, preparation, scan, progress);
+  io::ValueTotals totals;
+  read_samples(raw, options, preparation, scan, totals, understood, progress);
   const std::int64_t samples = scan.size();
+  require_alive(raw, scan.report.dead_pixels, samples, path.string());
+  io::judge_values(totals, raw, path.string());
   scan.report.sha256 = hash_of(raw, folder);
   if (const auto after = stamps_of(raw); after != before) {
     const auto changed = std::mismatch(before.begin(), before.end(), after.begin()).first - before.begin();
@@ -436,6 +311,9 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (options.angles_file)
     scan.report.notes.push_back("the hash covers the stack, not the angles file, whose sha256 is " +
                                 sha256_of_file(*options.angles_file));
+  auto& warnings = understood.warnings;
+  warnings.insert(warnings.begin(), raw.warnings.begin(), raw.warnings.end());
+  scan.report.notes.insert(scan.report.notes.begin(), warnings.begin(), warnings.end());
   scan.report.preparation = for_columns(options.preparation, raw.columns);
   prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
   if (!raw.cone) choose_center(path, raw, options, scan);
@@ -444,9 +322,13 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
 
 }  // namespace
 
-ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress) {
+ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const Progress& progress,
+                        Understood* understood) {
+  Understood found;
   try {
-    return read_whole(path, options, progress);
+    ProjectionSet scan = read_whole(path, options, progress, found);
+    if (understood) *understood = std::move(found);
+    return scan;
   } catch (const std::bad_alloc&) {
     throw ResourceError(path.string() + ": not enough memory to read the scan");
   }

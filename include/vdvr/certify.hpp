@@ -7,6 +7,7 @@
 #include "vdvr/build.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
+#include "vdvr/input_statement.hpp"
 #include "vdvr/plan.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -22,6 +23,7 @@ struct CertifyOptions {
   RateOptions rates;
   PlanSettings plan;  ///< foresee: of make_plan alone; certify() needs nothing of it
   BuildOptions build;
+  InputStatement input;  ///< what was stated when the scan was read (Understood::stated), for the certificate
 };
 
 /// The plan that certify() follows. Throws what make_plan of plan.hpp and make_grid throw.
@@ -50,6 +52,10 @@ VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, Plan pla
 /// tells the points that the certificate speaks of; none where another program wrote the file without. Throws
 /// FileError where it is ill-formed.
 VDVR_API std::optional<ProjectionSet> noted_geometry(const Certificate& certificate);
+
+/// What was stated of the input, as certify() noted it; whoever reads the scan again states the same. Throws
+/// FileError where it is ill-formed.
+VDVR_API InputStatement noted_input(const Certificate& certificate);
 
 /// The centre that defines F: the field's, else the scan's.
 inline double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {

@@ -10,6 +10,7 @@
 #include "vdvr/preparation.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
 
 namespace vdvr {
 
@@ -19,10 +20,11 @@ VDVR_API const char* text_of(Beam beam);
 VDVR_API std::optional<Beam> beam_of(const std::string& text);
 
 struct ScanOptions {
-  std::optional<std::filesystem::path> angles_file;  ///< for MHA/NRRD stacks; degrees, one per view
+  std::optional<std::filesystem::path> angles_file;  ///< for stacks and HDF5 files; degrees, one per view
   /// Overrides the file's; in columns of the projections as they are prepared, binned ones where they are.
   std::optional<double> center;
   Preparation preparation;  ///< what is done to the projections
+  InputStatement input;     ///< wins over what the files say
   /// Cone: by the distances of an NXtomo file, which is read as parallel beam otherwise. Refused where there
   /// are none, and beside another description of the geometry.
   std::optional<Beam> beam;
@@ -39,8 +41,9 @@ struct ScanOptions {
 /// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre:
 /// option, else file, else found from opposite views, else (U-1)/2; of cone beam option, else file, else
 /// (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated files, ...).
+/// `understood` is filled unless it is null.
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
-                                 const Progress& progress = {});
+                                 const Progress& progress = {}, Understood* understood = nullptr);
 
 /// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
 /// theta in degrees. Written whole or not at all.

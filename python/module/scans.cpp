@@ -160,6 +160,23 @@ void add_geometry(nb::module_& m) {
 }
 
 void add_projections(nb::module_& m) {
+  nb::enum_<SampleValues>(m, "SampleValues")
+      .value("counts", SampleValues::counts)
+      .value("transmission", SampleValues::transmission)
+      .value("line integrals", SampleValues::line_integrals);
+  nb::class_<InputStatement>(m, "InputStatement")
+      .def(nb::init<>())
+      .def_rw("entry", &InputStatement::entry)
+      .def_rw("views", &InputStatement::views)
+      .def_rw("dark", &InputStatement::dark)
+      .def_rw("flat", &InputStatement::flat)
+      .def_rw("values", &InputStatement::values)
+      .def("__str__", [](const InputStatement& s) { return text_of(s); });
+  nb::class_<Understood>(m, "Understood", "What was understood of a scan's files.")
+      .def(nb::init<>())
+      .def_ro("stated", &Understood::stated)
+      .def_ro("warnings", &Understood::warnings, "What makes the scan doubtful, a line each.");
+  m.def("view_ranges_of", &view_ranges_of, "text"_a);
   nb::enum_<Beam>(m, "Beam").value("parallel", Beam::parallel).value("cone", Beam::cone);
   nb::class_<ScanOptions>(m, "ScanOptions")
       .def(nb::init<>())
@@ -167,6 +184,7 @@ void add_projections(nb::module_& m) {
       .def_rw("center", &ScanOptions::center)
       .def_rw("preparation", &ScanOptions::preparation)
       .def_rw("beam", &ScanOptions::beam)
+      .def_rw("input", &ScanOptions::input)
       .def_rw("max_memory_bytes", &ScanOptions::max_memory_bytes)
       .def_rw("follow_links", &ScanOptions::follow_links);
   nb::class_<ArrayScan>(m, "ArrayScan")
@@ -200,12 +218,13 @@ void add_projections(nb::module_& m) {
       "read_scan",
       [](const std::filesystem::path& path, const ScanOptions& options, nb::handle progress) {
         auto scan = std::make_shared<ProjectionSet>();
+        Understood understood;
         run_long(progress, [&](const Progress& report) {
           const std::lock_guard turn(hdf5_turn());
-          *scan = read_scan(path, options, report);
+          *scan = read_scan(path, options, report, &understood);
           for (auto& note : check_scan(*scan)) scan->report.notes.push_back(std::move(note));
         });
-        return scan;
+        return std::pair(scan, understood);
       },
       "path"_a, "options"_a, "progress"_a.none());
   m.def(
@@ -277,6 +296,7 @@ void add_plans(nb::module_& m) {
   nb::class_<CertifyOptions>(m, "CertifyOptions")
       .def(nb::init<>())
       .def_rw("field", &CertifyOptions::field)
+      .def_rw("input", &CertifyOptions::input)
       .def_prop_rw(
           "size", [](const CertifyOptions& o) { return o.grid.size; },
           [](CertifyOptions& o, std::optional<Index3> size) { o.grid.size = size; }, nb::arg().none())

@@ -114,6 +114,11 @@ def _checked(scan: Any) -> Any:
     return scan._core
 
 
+def _stated(scan: Any) -> "_core.InputStatement":
+    """What read_scan was told beside the file, for the certificate."""
+    return scan._understood.stated if isinstance(scan, Scan) else _core.InputStatement()
+
+
 @_takes_options
 def plan(
     scan: Scan,
@@ -131,6 +136,7 @@ def plan(
     ToleranceError : the tolerance is out of reach; the message says what would do.
     """
     wanted = _options(**options)
+    wanted.input = _stated(scan)
     return _core.make_plan(open_device(device), _checked(scan), tolerance(epsilon, epsilon_abs), wanted, progress)
 
 
@@ -167,6 +173,7 @@ def build(
     KeyboardInterrupt : Ctrl-C, within about a second.
     """
     wanted = _options(**options)
+    wanted.input = _stated(scan)
     wanted.foresee = False
     projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs)
     if save is None:

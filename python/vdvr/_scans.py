@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -20,12 +21,17 @@ Progress = Callable[[str, float], Any]
 _TOMOPY_FILTERS = {"ramlak": "ram-lak", "shepp": "shepp-logan"}
 
 
-def _projections(array: "ArrayLike") -> "NDArray[np.float32]":
+def _projections(array: "ArrayLike", line_integrals: bool = False) -> "NDArray[np.float32]":
     data = np.asarray(array)
     if data.ndim != 3:
         raise _core.InputError(f"projections: an array of {data.ndim} axes; give [view, row, column]")
     if data.dtype.kind not in "fiu":
         raise _core.InputError(f"projections: elements of type {data.dtype}; give numbers")
+    if data.dtype.kind in "iu" and not line_integrals:
+        raise _core.InputError(
+            f"projections: whole numbers ({data.dtype}), which are counts as a rule; give -log((counts - dark) / "
+            "(flat - dark)); where that was taken, floats, or line_integrals=True of Scan"
+        )
     # No copy where the layout is C's and the type float32 already.
     return np.ascontiguousarray(data, dtype=np.float32)
 
@@ -35,14 +41,15 @@ class Scan:
 
     Parameters
     ----------
-    projections : array [view, row, column], line integrals (after -log), row 0 on top. float32 as it is, any
-        other type of number rounded to float32. A float32 array in C's order is not copied: do not write to it while
+    projections : array [view, row, column], line integrals (after -log), row 0 on top. float32 as it is, other
+        floats rounded to float32; whole numbers with `line_integrals=True` only. A float32 array in C's order is not copied: do not write to it while
         the scan, or a build from it, is used.
     angles_deg : one angle a view, degrees.
     center : column onto which the axis of rotation projects; columns' middles are integers. By default it is
         found from the views, and where they do not tell it is the detector's middle.
     pitch : width of a column, or (width, height) of a pixel, in `unit`.
     unit : of length; densities are per `unit`.
+    line_integrals : says that whole numbers are line integrals, and not counts.
 
     Raises
     ------
@@ -51,6 +58,7 @@ class Scan:
     """
 
     _core: "_core.ProjectionSet"
+    _understood: "_core.Understood"
 
     def __init__(
         self,
@@ -61,6 +69,7 @@ class Scan:
         pitch: Union[float, Tuple[float, float]] = 1.0,
         unit: str = "pixel",
         name: str = "array",
+        line_integrals: bool = False,
     ) -> None:
         described = _core.ArrayScan()
         described.angles_deg = [float(a) for a in np.asarray(angles_deg, dtype=np.float64).ravel()]
@@ -69,12 +78,14 @@ class Scan:
         described.pitch_u, described.pitch_v = (number(p, "pitch") for p in pitches)
         described.unit = unit
         described.name = name
-        self._core = _core.scan_of(_projections(projections), described)
+        self._understood = _core.Understood()
+        self._core = _core.scan_of(_projections(projections, line_integrals), described)
 
     @classmethod
-    def _of(cls, core: "_core.ProjectionSet") -> "Scan":
+    def _of(cls, core: "_core.ProjectionSet", understood: "_core.Understood") -> "Scan":
         scan = cls.__new__(cls)
         scan._core = core
+        scan._understood = understood
         return scan
 
     @property
@@ -127,6 +138,11 @@ class Scan:
         """What was noticed, a line each."""
         return self._core.notes
 
+    @property
+    def warnings(self) -> List[str]:
+        """What makes it doubtful, a line each; among the notes too."""
+        return self._understood.warnings
+
     def save(self, path: Path) -> None:
         """Writes a Data Exchange file (HDF5) that `vdvr build` and `read_scan` read."""
         _core.write_data_exchange(path, self._core)
@@ -148,6 +164,12 @@ def read_scan(
     stripes: Union[bool, float, Sequence[float]] = False,
     outliers: Union[float, Sequence[float], None] = None,
     phase: Optional[Sequence[float]] = None,
+    entry: Optional[str] = None,
+    views: Union[str, Sequence[Sequence[int]], None] = None,
+    darks: Union[str, float, None] = None,
+    flats: Union[str, float, None] = None,
+    transmission: bool = False,
+    line_integrals: bool = False,
     follow_links: bool = False,
     max_memory: Optional[int] = None,
     progress: Optional[Progress] = None,
@@ -159,7 +181,7 @@ def read_scan(
     Parameters
     ----------
     center : column of the axis, in columns of the prepared projections; by default the file's, else found.
-    angles_file : of an MHA or NRRD stack: degrees, one a view.
+    angles_file : of an MHA or NRRD stack, or an HDF5 file: degrees, one a view.
     beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
     binning : columns and rows that become one.
     median, gaussian : side of the median's window; standard deviations in columns and rows.
@@ -168,12 +190,20 @@ def read_scan(
     outliers : takes out pixels whose transmission is above their neighbours' median by more than this fraction
         of the open beam; or (fraction, side of the window).
     phase : (distance from object to detector in mm, energy in keV, delta / beta) of Paganin's phase retrieval.
+    entry : the group of an HDF5 file that holds the scan, where there are several.
+    views : the projections used: "0:40,41:90", or [(0, 40), (41, 90)], half-open.
+    darks, flats : "none", or one number that stands for them: counts without beam, counts of the open beam.
+    transmission : values are transmissions, normalised by flats and darks, without -log.
+    line_integrals : values are line integrals, whatever they look like.
     max_memory : bytes; by default half of what is free.
+
+    What makes the scan doubtful comes as a Python warning, and stands in `Scan.warnings`.
     """
     options = _core.ScanOptions()
     options.center = None if center is None else number(center, "center")
     options.angles_file = None if angles_file is None else angles_file
     options.beam = None if beam is None else choice(_core.Beam, beam, "beam")
+    options.input = _statement(entry, views, darks, flats, transmission, line_integrals)
     options.follow_links = follow_links
     options.max_memory_bytes = _core.half_of_free_memory() if max_memory is None else int(max_memory)
     preparation = _core.Preparation()
@@ -188,7 +218,38 @@ def read_scan(
         members = ("distance_mm", "energy_kev", "delta_beta")
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     options.preparation = preparation
-    return Scan._of(_core.read_scan(path, options, progress))
+    scan = Scan._of(*_core.read_scan(path, options, progress))
+    for text in scan.warnings:
+        warnings.warn(text, stacklevel=2)
+    return scan
+
+
+def _statement(
+    entry: Optional[str],
+    views: Union[str, Sequence[Sequence[int]], None],
+    darks: Union[str, float, None],
+    flats: Union[str, float, None],
+    transmission: bool,
+    line_integrals: bool,
+) -> "_core.InputStatement":
+    """What the caller says of an input that its files do not say, or say otherwise."""
+    if transmission and line_integrals:
+        raise _core.InputError("transmission and line_integrals exclude each other")
+    stated = _core.InputStatement()
+    stated.entry = entry or ""
+    if isinstance(views, str):
+        stated.views = _core.view_ranges_of(views)
+    elif views is not None:
+        stated.views = [(int(first), int(end)) for first, end in views]
+    if darks is not None:
+        stated.dark = 0.0 if darks == "none" else number(darks, "darks")
+    if flats is not None:
+        stated.flat = 1.0 if flats == "none" else number(flats, "flats")
+    if transmission:
+        stated.values = choice(_core.SampleValues, "transmission", "values")
+    if line_integrals:
+        stated.values = choice(_core.SampleValues, "line integrals", "values")
+    return stated
 
 
 def _step(step: Any, members: Sequence[str], given: Any, name: str) -> Any:

@@ -10,13 +10,17 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
   std::ofstream(folder / "stack.mha")
       << "NDims = 3\nBinaryDataByteOrderMSB = False\nDimSize = 3 1 4\nElementType = MET_UCHAR\n"
          "ElementDataFile = LOCAL\nabcdefghijkl";
-  return {"# degrees\n0 45\n90, 135\n", "0\n4.5e1\n-90\n+135.0 # the last\n"};
+  return {"# degrees\n0 45\n90, 135\n", "0\n4.5e1\n-90\n+135.0 # the last\n",
+          "\xef\xbb\xbf"
+          "0,0\r\n1,5\r\n3,0\r\n4,5\r\n",
+          "# \xb0\n0;1;2;3\n"};
 }
 
 void read(const std::filesystem::path& file) {
   ScanOptions options;
   options.max_memory_bytes = memory_limit;
   options.angles_file = file;
+  options.input.values = SampleValues::line_integrals;
   static_cast<void>(read_scan(file.parent_path() / "stack.mha", options));
 }
 

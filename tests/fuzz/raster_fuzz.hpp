@@ -27,6 +27,7 @@ inline void read_raster(const std::filesystem::path& file, std::uint64_t limit) 
   ScanOptions options;
   options.max_memory_bytes = limit;
   options.angles_file = file.parent_path() / "angles.txt";
+  options.input.values = SampleValues::line_integrals;
   static_cast<void>(read_scan(file, options));
 }
 

@@ -29,7 +29,17 @@ std::vector<std::string> seeds(const fs::path& folder) {
       {"source_to_axis", 50}, {"source_to_detector", 100.5}, {"pitch", {0.5, 0.75}}, {"center", 1.25},
       {"row", 0.5},           {"angles", {0, 90, 180, 270}}, {"tilt", {1, -2}},      {"sense", -1},
       {"offset_u", 0.125}};
-  return {tiffs.dump(1), more.dump(1), hdf5.dump(1), cone.dump(1)};
+  nlohmann::json stated = hdf5;
+  stated["flats"] = 4000.5;
+  stated["darks"] = "none";
+  stated["description"] = "counts";
+  stated["entry"] = "exchange";
+  stated["use"] = {{0, 1}, {2, 4}};
+  nlohmann::json named = tiffs;
+  named.erase("angle_range");
+  named["angles"] = "names";
+  named["darks"] = 1;
+  return {tiffs.dump(1), more.dump(1), hdf5.dump(1), cone.dump(1), stated.dump(1), named.dump(1)};
 }
 
 void read(const fs::path& file) {

@@ -1,6 +1,8 @@
 #define BOOST_TEST_MODULE read_scan
 #include "vdvr/read_scan.hpp"
 
+#include "host/system/length_unit.hpp"
+#include "host/system/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 
@@ -221,6 +223,56 @@ BOOST_AUTO_TEST_CASE(nxtomo_with_wrong_keys_is_refused) {
   BOOST_TEST(has(refusal(write_nxtomo(folder / "a.nxs", {2, 1, 0})), "3 keys for 8 frames"));
   BOOST_TEST(has(refusal(write_nxtomo(folder / "b.nxs", {2, 0, 0, 0, 3, 0, 0, 0})), "no flats"));
   BOOST_TEST(has(refusal(write_nxtomo(folder / "c.nxs", {2, 1, 0, 7, 3, 0, 0, 0})), "key 7"));
+}
+
+// --- what is stated ---
+
+BOOST_AUTO_TEST_CASE(ranges_of_views_are_half_open_and_rise) {
+  BOOST_TEST((view_ranges_of("0:40,41:90") == ViewRanges{{0, 40}, {41, 90}}));
+  BOOST_TEST((view_ranges_of(":3,7,9:") == ViewRanges{{0, 3}, {7, 8}, {9, last_view}}));
+  BOOST_TEST((checked_ranges(view_ranges_of("7:"), 9) == ViewRanges{{7, 9}}));
+  BOOST_TEST(text_of(view_ranges_of("0:40,41:")) == "0:40,41:");
+  for (const char* text : {"", ":", "a", "1:2:3", "-1:3", "1.5", "1,,2", "1:2,"})
+    BOOST_CHECK_THROW(view_ranges_of(text), InputError);
+  for (const char* text : {"3:3", "3:2", "0:10", "0:4,3:5", "9"})
+    BOOST_CHECK_THROW(checked_ranges(view_ranges_of(text), 9), InputError);
+}
+
+BOOST_AUTO_TEST_CASE(statement_is_kept_in_the_report_and_wins_over_the_file) {
+  const TemporaryFolder folder;
+  Exchange e;
+  const Path path = write_exchange(folder / "a.h5", e);
+  ScanOptions options;
+  options.input.values = SampleValues::line_integrals;
+  options.input.views = {{1, 3}};
+  const ProjectionSet scan = read_scan(path, options);
+  BOOST_TEST(scan.geometry.views() == 2);
+  BOOST_TEST((scan.report.stated == options.input));
+  BOOST_TEST(scan.data[0] == static_cast<float>(e.data[V * U]));
+  options.input.dark = 0;
+  BOOST_TEST(has(refusal(path, options), "leave `flats` and `darks` out"));
+}
+
+BOOST_AUTO_TEST_CASE(text_is_read_in_the_encodings_that_editors_save) {
+  BOOST_TEST(utf8_of("\xef\xbb\xbf"
+                     "a\xc2\xb5") == "a\u00b5");
+  BOOST_TEST(utf8_of("\xb5m") == "\u00b5m");
+  BOOST_TEST(utf8_of(std::string("\xff\xfe"
+                                 "1\0\xac\x20",
+                                 6)) == "1\u20ac");
+  BOOST_TEST(utf8_of(std::string("\xfe\xff\xd8\x3d\xde\x00", 6)) == "\U0001f600");
+  BOOST_TEST(utf8_of("\xc0\x80") == "\u00c0\u20ac");  // no overlong forms
+  BOOST_TEST(comma_hint("-0,5") == "; a decimal comma? write -0.5");
+  for (const char* word : {"0.5", "1,5,2", "a,b", ",", "1.5,2"}) BOOST_TEST(comma_hint(word) == "");
+}
+
+BOOST_AUTO_TEST_CASE(units_of_length_are_known_by_many_names) {
+  for (const char* unit : {"mm", "MM", "Millimeter", "millimetres", " mm "})
+    BOOST_TEST(metres_exponent(unit).value_or(1) == -3, unit);
+  for (const char* unit : {"um", "\u00b5m", "\u03bcm", "\xb5m", "Microns", "micrometre"})
+    BOOST_TEST(metres_exponent(unit).value_or(1) == -6, unit);
+  BOOST_TEST(metres_exponent("M").value_or(1) == 0);
+  for (const char* unit : {"", "furlong", "pixel", "s"}) BOOST_TEST(!metres_exponent(unit), unit);
 }
 
 // --- what is no scan ---

@@ -3,7 +3,7 @@
 #include <boost/test/data/test_case.hpp>
 
 #include "host/io/natural_order.hpp"
-#include "host/scan/scan_folder.hpp"
+#include "host/raw/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 
@@ -70,6 +70,13 @@ BOOST_AUTO_TEST_CASE(folder_is_read_in_natural_order) {
   description["use"] = {1, 3};
   static_cast<void>(folder.file("scan.json", description.dump()));
   const ProjectionSet part = read_scan(folder.path());
+  ScanOptions two;
+  two.input.views = view_ranges_of("0,2:");
+  const ProjectionSet chosen = read_scan(folder.path(), two);
+  BOOST_TEST((chosen.report.stated.views == ViewRanges{{0, 1}, {2, 4}}));
+  BOOST_TEST(chosen.report.frames.back().projection == 3);
+  BOOST_TEST((std::vector<float>(chosen.data.begin() + V * U, chosen.data.end()) ==
+              std::vector<float>(scan.data.begin() + 2 * V * U, scan.data.end())));
   BOOST_TEST(part.geometry.theta_rad ==
              std::vector<double>(scan.geometry.theta_rad.begin() + 1, scan.geometry.theta_rad.begin() + 3));
   BOOST_TEST((part.data == std::vector<float>(scan.data.begin() + V * U, scan.data.begin() + 3 * V * U)));
@@ -94,7 +101,7 @@ BOOST_AUTO_TEST_CASE(folder_with_wrong_members_is_refused_by_member) {
       {{{"projections", "p/*.png"}}, "matches no file"},
       {{{"projections", "../*.tif"}}, "stay within"},
       {{{"flats", {"missing.tif"}}}, "missing.tif"},
-      {{{"flats", 3}}, "flats"},
+      {{{"flats", true}}, "flats"},
       {{{"use", {3, 3}}}, "use"},
       {{{"use", {0, 5}}}, "use"},
       {{{"center", "middle"}}, "center"},
@@ -106,7 +113,7 @@ BOOST_AUTO_TEST_CASE(folder_with_wrong_members_is_refused_by_member) {
       {{{"unknown", 1}}, "unknown"},
       {{{"hdf5", "a.h5"}}, "one of"},
       {{{"angles", "dark.tif"}}, "dark.tif"},
-      {{{"description", "counts"}}, "description"}};
+      {{{"description", "photons"}}, "description"}};
   for (const auto& [change, part] : changes) {
     nlohmann::json description = good;
     description.update(change);
@@ -143,6 +150,8 @@ BOOST_AUTO_TEST_CASE(stack_is_read_with_its_angles_file) {
   ScanOptions options;
   BOOST_TEST(has(refusal(stack), "`angles_file`"));
   options.angles_file = folder.file("angles.txt", "0\n90\n");
+  BOOST_TEST(has(refusal(stack, options), "`line_integrals`"));
+  options.input.values = SampleValues::line_integrals;
   const ProjectionSet scan = read_scan(stack, options);
   BOOST_TEST(scan.geometry.rows == 1);
   BOOST_TEST(scan.geometry.columns == 3);

@@ -74,19 +74,21 @@ int volume_info(const std::filesystem::path& path, const Arguments& args, const 
 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
   ProgressLine progress(args.who(), common.quiet);
-  const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
+  Understood understood;
+  const ProjectionSet scan = load_scan(path, args, {}, progress.callback(), &understood);
   const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
   Json json = {{"file", path.string()},
                {"kind", "projections"},
                {"geometry", geometry_json(scan.geometry)},
+               {"understood", understood_json(scan, understood)},
                {"report", report_json(scan.report)},
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
   if (scan.cone) json["cone"] = cone_json(scan);
   print_result(common, json, [&] {
-    print_scan(scan);
+    print_scan(scan, &understood);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
     print_grid(grid);
   });

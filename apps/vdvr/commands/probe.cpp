@@ -143,12 +143,16 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
         fmt::format("{}: is a projection set; --exact gives the field F at the points, or build it first",
                     path.string()));
   FieldOptions field = field_options(args);
+  std::optional<Certificate> like;
   if (args.has("like")) {
     if (has_field_options(args))
       throw InputError("--like takes the field options from its file; do not give them again");
-    field = open_certified(args.path("like"), args).certificate.field;
+    like = open_certified(args.path("like"), args).certificate;
+    field = like->field;
   }
-  const ExactField exact(load_scan(path, args, field, progress), field, progress);
+  const ExactField exact(like ? load_certified_scan(path, args, *like, progress)
+                              : load_scan(path, args, field, progress),
+                         field, progress);
   std::vector<Probe> probes(points.size());
   std::vector<Vec3> covered;
   for (std::size_t i = 0; i < points.size(); ++i)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 
@@ -179,6 +180,7 @@ Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::
       {"files", files},
       {"outside_certificate", out.outside},
       {"geometry", geometry_json(out.planned.scan.geometry)},
+      {"understood", understood_json(out.planned.scan, out.planned.understood)},
       {"report", report_json(out.planned.scan.report)},
       {"grid", grid_json(out.built.volume.grid)},
       {"bricks", levels_json(out.built.volume)},
@@ -194,7 +196,6 @@ Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::
 
 void print_outcome(const std::filesystem::path& folder, const Outcome& out, std::uint64_t file_bytes) {
   const Certificate& c = out.built.certificate;
-  print_scan(out.planned.scan);
   print_grid(out.built.volume.grid);
   print_certificate(c);
   print_verification(out.verified, c);
@@ -218,7 +219,15 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
   ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
-  out.planned = timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress); });
+  // What was understood comes first: whoever sees that it is wrong need not wait for the rest.
+  const auto show = [&](const Planned& read) {
+    line.clear();
+    if (common.json || common.quiet) return;
+    print_scan(read.scan, &read.understood);
+    std::fflush(stdout);
+  };
+  out.planned =
+      timed(out.seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress, show); });
   out.built =
       timed(out.seconds, "build", [&] { return build_planned(device, out.planned, wanted, progress); });
   const Certificate& certificate = out.built.certificate;

@@ -1,5 +1,5 @@
 // Angles and cone-beam geometry of a scan.json; see scan_members.hpp.
-#include "host/scan/scan_members.hpp"
+#include "host/raw/scan_members.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,8 @@
 #include "host/geometry/rtk_geometry.hpp"
 #include "host/geometry/tigre_geometry.hpp"
 #include "host/io/raster_file.hpp"
-#include "host/scan/raster_scan.hpp"
+#include "host/raw/name_angles.hpp"
+#include "host/raw/raster_scan.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -20,12 +21,32 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Names that tell views apart.
+std::vector<std::string> names_of_views(const RawScan& scan) {
+  return scan.shared_files ? std::vector<std::string>{} : scan.view_files;
+}
+
 std::vector<double> angles_of(const Description& about, const Description& root, RawScan& scan) {
   if (about.is_list("angles")) return about.numbers("angles");
   const std::string name = about.text("angles");
+  std::error_code error;
+  if (name == "names" && !fs::exists(root.inside(name, "angles"), error)) {
+    std::string why;
+    const auto found = angles_in_names(names_of_views(scan), why);
+    if (found.empty())
+      about.fail(fmt::format("{} are to be taken from the names of the projections, but {}",
+                             about.quoted("angles"), why));
+    return found;
+  }
   const auto angles = read_numbers(root.inside(name, "angles"));
   use_file(scan, root, name);
   return angles;
+}
+
+// Names that hold an angle say the same as the angles.
+void require_names(const Description& about, const RawScan& scan, const std::vector<double>& angles) {
+  if (const std::string wrong = names_against(names_of_views(scan), angles); !wrong.empty())
+    about.fail(wrong);
 }
 
 // Of `geometry`: its own angles, else those of scan.json, else those of the HDF5 file.
@@ -40,6 +61,7 @@ std::vector<double> circular_angles(const Description& about, const Description&
     return scan.theta_deg;
   }
   const std::vector<double> angles = angles_of(geometry, about, scan);
+  require_names(about, scan, angles);
   if (about.has("angles") && outer.size() != angles.size())
     about.fail(fmt::format("'angles' gives {} angles, 'geometry.angles' {}; leave one of them out",
                            outer.size(), angles.size()));
@@ -115,11 +137,14 @@ void use_file(RawScan& scan, const Description& about, const std::string& name) 
 }
 
 std::vector<double> listed_angles(const Description& about, RawScan& scan) {
-  const std::vector<double> angles = angles_of(about, about, scan);
-  if (!about.has("angle_range")) return angles;
-  const auto [first, end] =
-      about.half_open("angle_range", static_cast<std::int64_t>(angles.size()), "angles");
-  return {angles.begin() + first, angles.begin() + end};
+  std::vector<double> angles = angles_of(about, about, scan);
+  if (about.has("angle_range")) {
+    const auto [first, end] =
+        about.half_open("angle_range", static_cast<std::int64_t>(angles.size()), "angles");
+    angles = {angles.begin() + first, angles.begin() + end};
+  }
+  require_names(about, scan, angles);
+  return angles;
 }
 
 void set_cone(const Description& about, const std::string& kind, RawScan& scan) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/hdf5/hdf5_reader.hpp"
-#include "host/scan/raw_scan.hpp"
+#include "host/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 
@@ -16,10 +16,12 @@ struct NxtomoGroups {
 };
 
 /// Fills `cone` of a scan whose projections, angles, pitch and unit are known, and takes its angles away.
-/// `frames` are the numbers of the projections among `frame_count`. Throws FileError: distances or pixel
-/// sizes that are missing, not finite, zero or upstream where they must not be; a unit of length that is
-/// unknown; a sample that moves along the axis.
-void set_nxtomo_cone(const hdf5::Reader& file, const NxtomoGroups& groups,
-                     const std::vector<std::int64_t>& frames, std::int64_t frame_count, RawScan& scan);
+/// Throws FileError: distances or pixel sizes that are missing, not finite, zero or upstream where they must
+/// not be; a unit of length that is unknown.
+void set_nxtomo_cone(const hdf5::Reader& file, const NxtomoGroups& groups, RawScan& scan);
+
+/// Of a scan that is read as parallel beam: a warning where the file's distances spread the rays by so much
+/// that this moves one by more than a quarter of a pixel within the object.
+void warn_of_magnification(const hdf5::Reader& file, const NxtomoGroups& groups, RawScan& scan);
 
 }  // namespace vdvr::io

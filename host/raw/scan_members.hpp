@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "host/geometry/description.hpp"
-#include "host/scan/raw_scan.hpp"
+#include "host/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 

@@ -1,7 +1,7 @@
 // A folder with scan.json: TIFF frames found by pattern, or an HDF5 file, with the geometry beside them
 // (docs/inputs.md). Every name in scan.json is relative to the folder and stays within it. Called by
 // read_scan.
-#include "host/scan/scan_folder.hpp"
+#include "host/raw/scan_folder.hpp"
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -11,13 +11,14 @@
 #include <set>
 #include <tuple>
 
+#include "host/geometry/circular_geometry.hpp"
 #include "host/geometry/description.hpp"
 #include "host/geometry/nikon_geometry.hpp"
 #include "host/io/raster_file.hpp"
 #include "host/io/tiff.hpp"
-#include "host/scan/scan_members.hpp"
-#include "host/scan/hdf5_scan.hpp"
-#include "host/scan/raster_scan.hpp"
+#include "host/raw/scan_members.hpp"
+#include "host/raw/hdf5_scan.hpp"
+#include "host/raw/raster_scan.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
@@ -27,9 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 std::set<std::string> known_members() {
-  std::set<std::string> known{"projections", "hdf5",        "flats",   "darks",      "angles",
-                              "angle_range", "use",         "center",  "pitch",      "unit",
-                              "air_columns", "description", "comment", "redundancy", "beam"};
+  std::set<std::string> known{"projections", "hdf5",       "flats", "darks", "angles",      "angle_range",
+                              "use",         "center",     "pitch", "unit",  "air_columns", "description",
+                              "comment",     "redundancy", "beam",  "entry"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -58,52 +59,65 @@ std::shared_ptr<TiffSeries> open_series(const Description& about, const std::vec
   return std::make_shared<TiffSeries>(std::move(files), max_memory_bytes);
 }
 
-// Frames of `key`, and their files into the hash.
-Frames listed_frames(const Description& about, const char* key, RawScan& scan,
-                     std::uint64_t max_memory_bytes) {
-  if (!about.has(key))
-    about.fail(fmt::format(
-        "'{}' is missing; counts need flats and darks (line integrals say so with \"description\": "
-        "\"line integrals\")",
-        key));
-  const auto names = about.matches(key);
-  for (const auto& name : names) use_file(scan, about, name);
-  return tiff_frames(about, names, scan, open_series(about, names, max_memory_bytes));
+// MetaImage and NRRD stacks among the files, as they follow each other.
+Frames stack_frames(const fs::path& path, const RawScan& scan, std::uint64_t max_memory_bytes) {
+  const RawScan stack = open_raster_stack(path, max_memory_bytes);
+  if (stack.rows != scan.rows || stack.columns != scan.columns)
+    throw FileError(fmt::format("{}: {} rows x {} columns, but the projections have {} x {}", path.string(),
+                                stack.rows, stack.columns, scan.rows, scan.columns));
+  return stack.projections;
 }
 
-// Frames that all hold one number: the flats and darks of scanners that give a level for them.
-Frames level_frame(double level, const RawScan& scan, const std::string& name) {
-  Frames frames;
-  frames.count = 1;
-  frames.name = [name](std::int64_t) { return name; };
-  frames.read = [level, size = scan.rows * scan.columns](std::int64_t, std::int64_t n, double* out) {
-    std::fill_n(out, n * size, level);
-  };
-  return frames;
-}
-
-// Flats and darks, unless the values are line integrals.
-void set_counts(const Description& about, const std::optional<NikonScan>& nikon, RawScan& scan,
-                std::uint64_t max_memory_bytes) {
-  scan.counts = true;
-  if (about.has("description")) {
-    if (about.text("description") != "line integrals")
-      about.fail("'description' can only be \"line integrals\"");
-    scan.counts = false;
-  }
-  if (!scan.counts) return;
-  if (nikon && !about.has("flats") && !about.has("darks")) {
-    scan.flats = level_frame(nikon->white_level, scan, nikon->path.string() + ": WhiteLevel");
-    scan.darks = level_frame(0, scan, nikon->path.string() + ": the dark level");
+// Frames of `flats` or `darks`, TIFF files or one stack, and their files into the hash; or the level that
+// stands for them.
+void set_reference(const Description& about, const char* key, std::uint64_t max_memory_bytes, RawScan& scan,
+                   Frames& frames, std::optional<double>& level) {
+  if (about.is_number(key) || about.is_text(key, "none")) {
+    level = about.is_number(key) ? about.number(key) : key == std::string("flats") ? 1.0 : 0.0;
+    frames = level_frame(*level, scan.rows * scan.columns, fmt::format("'{}', {:g}", key, *level));
     return;
   }
-  scan.flats = listed_frames(about, "flats", scan, max_memory_bytes);
-  scan.darks = listed_frames(about, "darks", scan, max_memory_bytes);
+  const auto names = about.matches(key);
+  for (const auto& name : names) use_file(scan, about, name);
+  const fs::path first = about.folder() / names.front();
+  if (names.size() > 1 || !is_raster_file(first)) {
+    frames = tiff_frames(about, names, scan, open_series(about, names, max_memory_bytes));
+    return;
+  }
+  frames = stack_frames(first, scan, max_memory_bytes);
+  const RasterHeader header = read_raster_header(first);
+  if (header.data_file != header.file)
+    use_file(scan, about,
+             (fs::path(names.front()).parent_path() / header.data_file.filename()).generic_string());
 }
 
-// `file_of_view`: by view the number of its name.
+// What scan.json says of the values, and its flats and darks. They win over an HDF5 file's.
+void set_counts(const Description& about, const std::optional<NikonScan>& nikon,
+                std::uint64_t max_memory_bytes, RawScan& scan) {
+  if (about.has("description")) {
+    scan.stated = sample_values_of(about.text("description"));
+    if (!scan.stated)
+      about.fail("'description' can only be \"line integrals\", \"transmission\" or \"counts\"");
+    scan.values_source = "'description' of scan.json";
+  }
+  if (scan.stated && scan.stated != SampleValues::counts) return;
+  if (nikon && !about.has("flats") && !about.has("darks") && !about.has("hdf5")) {
+    const std::int64_t size = scan.rows * scan.columns;
+    scan.flats = level_frame(nikon->white_level, size, nikon->path.string() + ": WhiteLevel");
+    scan.darks = level_frame(0, size, nikon->path.string() + ": the dark level");
+    scan.flat_level = nikon->white_level;
+    scan.dark_level = 0;
+    return;
+  }
+  if (about.has("flats")) set_reference(about, "flats", max_memory_bytes, scan, scan.flats, scan.flat_level);
+  if (about.has("darks")) set_reference(about, "darks", max_memory_bytes, scan, scan.darks, scan.dark_level);
+  const std::string name = (about.folder() / "scan.json").string();
+  if (scan.no_flats.empty()) scan.no_flats = name + ": 'flats' is missing";
+  if (scan.no_darks.empty()) scan.no_darks = name + ": 'darks' is missing";
+}
+
 RawScan open_tiffs(const Description& about, const std::vector<std::string>& names,
-                   std::uint64_t max_memory_bytes, std::vector<std::size_t>& file_of_view) {
+                   std::uint64_t max_memory_bytes) {
   RawScan scan;
   const auto series = open_series(about, names, max_memory_bytes);
   const TiffStack& stack = series->stack();
@@ -111,7 +125,8 @@ RawScan open_tiffs(const Description& about, const std::vector<std::string>& nam
   scan.columns = stack.columns;
   scan.integer = stack.is_integer;
   scan.projections = tiff_frames(about, names, scan, series);
-  for (std::int64_t k = 0; k < stack.images; ++k) file_of_view.push_back(series->file_of(k));
+  for (std::int64_t k = 0; k < stack.images; ++k) scan.view_files.push_back(names[series->file_of(k)]);
+  scan.shared_files = stack.images != static_cast<std::int64_t>(names.size());
   return scan;
 }
 
@@ -147,12 +162,23 @@ bool wants_distances(const Description& about, std::optional<Beam> beam) {
   return true;
 }
 
-RawScan open_hdf5(const Description& about, bool follow_links, bool cone) {
-  for (const char* key : {"flats", "darks", "description"})
-    if (about.has(key))
-      about.fail(fmt::format("'{}' goes with 'projections'; an HDF5 file brings its own", key));
+// Kinds of geometry that bring their own angles; 'geometry' may.
+bool brings_angles(const Description& about) {
+  const auto kind = cone_kind(about);
+  return kind && (*kind != "geometry" || circular_description(about).has("angles"));
+}
+
+RawScan open_hdf5(const Description& about, const ScanOptions& options, bool cone) {
+  Hdf5Wanted wanted;
+  wanted.entry = options.input.entry;
+  if (wanted.entry.empty() && about.has("entry")) wanted.entry = about.text("entry");
+  if (cone) wanted.beam = Beam::cone;
+  else if (options.beam || about.has("beam") || cone_kind(about)) wanted.beam = Beam::parallel;
+  wanted.own_angles = !about.has("angles") && !brings_angles(about);
+  RawScan of_angles;
+  if (about.has("angles")) wanted.angles_deg = listed_angles(about, of_angles);
   const std::string name = about.text("hdf5");
-  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), about.folder(), follow_links, cone);
+  RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), about.folder(), options.follow_links, wanted);
   scan.files.front().first = name;  // as scan.json has it
   return scan;
 }
@@ -160,7 +186,10 @@ RawScan open_hdf5(const Description& about, bool follow_links, bool cone) {
 void set_geometry(const Description& about, RawScan& scan) {
   if (about.has("center")) scan.center = about.number("center");
   if (about.has("unit")) scan.unit = about.text("unit");
-  if (about.has("pitch")) std::tie(scan.pitch_u, scan.pitch_v) = about.pair("pitch");
+  if (about.has("pitch")) {
+    std::tie(scan.pitch_u, scan.pitch_v) = about.pair("pitch");
+    scan.pitch_stated = true;
+  }
   if (!about.has("air_columns")) return;
   scan.air_columns = about.ranges("air_columns");
   std::int64_t count = 0;
@@ -183,46 +212,53 @@ void set_angles(const Description& about, RawScan& scan) {
                            scan.theta_deg.size(), scan.projections.count));
 }
 
+void require_entry_of_hdf5(const Description& about, const ScanOptions& options) {
+  const std::string what = "names a group of an HDF5 file, and there is no 'hdf5'";
+  if (about.has("hdf5")) return;
+  if (about.has("entry")) about.fail("'entry' " + what);
+  if (!options.input.entry.empty())
+    throw InputError(fmt::format("{}: `entry` {}", (about.folder() / "scan.json").string(), what));
+}
+
+void use_views(const Description& about, RawScan& scan) {
+  ViewRanges ranges = about.one_or_more_ranges("use");
+  try {
+    select_views(scan, ranges);
+  } catch (const InputError& e) {
+    about.fail(fmt::format("'use': {}", e.what()));
+  }
+}
+
 }  // namespace
 
-RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes, std::optional<Beam> beam,
-                         bool follow_links) {
+RawScan open_scan_folder(const fs::path& folder, const ScanOptions& options) {
   const Description about(folder / "scan.json", known_members());
   std::optional<NikonScan> nikon;
   if (about.has("nikon")) nikon = read_nikon(about.inside(about.text("nikon"), "nikon"));
   const bool own_projections = nikon && !about.has("projections") && !about.has("hdf5");
   if (!own_projections && about.has("projections") == about.has("hdf5"))
     about.fail("needs one of 'projections' and 'hdf5'");
-  const bool distances = wants_distances(about, beam);
+  const bool distances = wants_distances(about, options.beam);
+  require_entry_of_hdf5(about, options);
   RawScan scan;
-  std::vector<std::string> names;         // of the projections' TIFF files; empty for one file of all
-  std::vector<std::size_t> file_of_view;  // a name's number
   if (about.has("hdf5")) {
-    scan = open_hdf5(about, follow_links, distances);
+    scan = open_hdf5(about, options, distances);
   } else {
-    names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
+    const auto names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
     const bool stack = names.size() == 1 && is_raster_file(folder / names.front());
-    scan = stack ? open_stack(about, names.front(), max_memory_bytes)
-                 : open_tiffs(about, names, max_memory_bytes, file_of_view);
-    if (stack) names.clear();
-    set_counts(about, nikon, scan, max_memory_bytes);
+    scan = stack ? open_stack(about, names.front(), options.max_memory_bytes)
+                 : open_tiffs(about, names, options.max_memory_bytes);
   }
+  set_counts(about, nikon, options.max_memory_bytes, scan);
   scan.format = "scan.json";
+  scan.folder = folder;
   use_file(scan, about, "scan.json");
   set_geometry(about, scan);
   if (distances) set_cone(about, "beam", scan);
   else if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
   else set_angles(about, scan);
-  const std::int64_t count = scan.projections.count;
-  const auto [first, end] = about.has("use") ? about.half_open("use", count, "projections")
-                                             : std::pair<std::int64_t, std::int64_t>(0, count);
-  if (about.has("use")) select_views(scan, first, end);
-  // Each file whose views are used, once.
-  for (std::int64_t k = first; !names.empty() && k < end; ++k) {
-    const std::size_t file = file_of_view[static_cast<std::size_t>(k)];
-    if (k == first || file != file_of_view[static_cast<std::size_t>(k - 1)])
-      use_file(scan, about, names[file]);
-  }
+  // Views that options choose are chosen among all.
+  if (about.has("use") && options.input.views.empty()) use_views(about, scan);
   return scan;
 }
 

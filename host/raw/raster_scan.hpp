@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <vector>
-#include "host/scan/raw_scan.hpp"
+#include "host/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 
-/// A MetaImage or NRRD stack [angle][v][u] without its angles, and until the caller says otherwise of line
-/// integrals. Throws FileError, ResourceError.
+/// A MetaImage or NRRD stack [angle][v][u] without its angles. Throws FileError, ResourceError.
 RawScan open_raster_stack(const std::filesystem::path& path, std::uint64_t max_memory_bytes);
 /// The same with its angles.
 RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file);

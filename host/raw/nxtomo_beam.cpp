@@ -1,16 +1,17 @@
 // Distances of NXtomo as NeXus defines them: from the sample, along the beam, so that the source's is
 // negative; some writers give its amount. See nxtomo_beam.hpp.
-#include "host/scan/nxtomo_beam.hpp"
+#include "host/raw/nxtomo_beam.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <optional>
 
+#include "host/system/length_unit.hpp"
 #include "host/system/limits.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -19,23 +20,6 @@ namespace {
 using hdf5::Dataset, hdf5::Reader;
 
 constexpr double radians = std::numbers::pi / 180;
-
-// Powers of ten that make metres of a unit of length.
-std::optional<int> exponent_of(const std::string& unit) {
-  static const std::map<std::string, int> known{{"m", 0},           {"meter", 0},
-                                                {"metre", 0},       {"meters", 0},
-                                                {"metres", 0},      {"cm", -2},
-                                                {"centimeter", -2}, {"centimetre", -2},
-                                                {"mm", -3},         {"millimeter", -3},
-                                                {"millimetre", -3}, {"um", -6},
-                                                {"\u00b5m", -6},    {"\u03bcm", -6},
-                                                {"micron", -6},     {"microns", -6},
-                                                {"micrometer", -6}, {"micrometre", -6},
-                                                {"nm", -9},         {"nanometer", -9},
-                                                {"nanometre", -9},  {"", 0}};
-  const auto found = known.find(unit);
-  return found == known.end() ? std::nullopt : std::optional(found->second);
-}
 
 // One number of a dataset, which may be a list of equal ones; nothing where the dataset is absent.
 std::optional<double> find_number(const Reader& file, const std::string& object) {
@@ -59,8 +43,8 @@ std::optional<double> find_number(const Reader& file, const std::string& object)
 
 // The factor that brings a dataset's lengths to the unit of the pixel sizes: 1 where they are the same.
 double to_unit_of(const Reader& file, const std::string& object, const std::string& unit) {
-  const std::string own = file.find_text(object, "units").value_or("m");
-  const auto from = exponent_of(own), to = exponent_of(unit);
+  const std::string own = utf8_of(file.find_text(object, "units").value_or("m"));
+  const auto from = metres_exponent(own), to = metres_exponent(unit);
   if (!from) file.refuse(object, fmt::format("units '{}'; m, cm, mm, um or nm are needed", own));
   if (!to)
     file.refuse(object, fmt::format("the pixel sizes have units '{}'; m, cm, mm, um or nm are needed", unit));
@@ -106,29 +90,6 @@ std::optional<double> axis_position(const Reader& file, const std::string& objec
       "the axis is taken at {} {:g}: {} is {:g}, read as {}; readers differ on that", what, at, object,
       *value, as_place ? std::string("a ") + what : std::string("an offset from the middle")));
   return at;
-}
-
-// A sample that is moved along the axis during the scan makes it helical.
-void require_one_height(const Reader& file, const NxtomoGroups& groups,
-                        const std::vector<std::int64_t>& frames, std::int64_t frame_count, double pitch,
-                        const std::string& unit) {
-  const std::string object = groups.sample + "/z_translation";
-  if (!file.is_dataset(object)) return;
-  const Dataset data = file.numeric_dataset(object);
-  if (static_cast<std::int64_t>(checked_bytes(data.extents(), 1, data.name)) != frame_count) return;
-  const std::vector<double> all = data.read_all();
-  double low = all[static_cast<std::size_t>(frames.front())], high = low;
-  for (const std::int64_t k : frames) {
-    low = std::min(low, all[static_cast<std::size_t>(k)]);
-    high = std::max(high, all[static_cast<std::size_t>(k)]);
-  }
-  const double moved = (high - low) * to_unit_of(file, object, unit);
-  if (!(moved <= 0.5 * pitch))
-    file.refuse(
-        object,
-        fmt::format("the sample moves along the axis by {:g} {}, more than half a pixel; helical scans are "
-                    "not supported",
-                    moved, unit));
 }
 
 void note_sample_pixels(const Reader& file, const NxtomoGroups& groups, const CircularView& view,
@@ -198,16 +159,13 @@ void place_axis(const Reader& file, const NxtomoGroups& groups, const RawScan& s
 
 }  // namespace
 
-void set_nxtomo_cone(const Reader& file, const NxtomoGroups& groups, const std::vector<std::int64_t>& frames,
-                     std::int64_t frame_count, RawScan& scan) {
+void set_nxtomo_cone(const Reader& file, const NxtomoGroups& groups, RawScan& scan) {
   RawCone cone;
   cone.member = "beam";
   ConeViews& out = cone.geometry;
   CircularView view = view_of(file, groups, scan, out.notes);
   note_sample_pixels(file, groups, view, scan.unit, out.notes);
   place_axis(file, groups, scan, view, out);
-  require_one_height(file, groups, frames, frame_count,
-                     view.pitch_v * view.source_to_axis / view.source_to_detector, scan.unit);
   for (std::size_t k = 0; k < scan.theta_deg.size(); ++k) {
     view.theta_rad = scan.theta_deg[k] * radians;
     out.views.push_back(checked_view(view, file.path(), static_cast<std::int64_t>(k)));
@@ -224,6 +182,42 @@ void set_nxtomo_cone(const Reader& file, const NxtomoGroups& groups, const std::
         "/transformations is not read: where it flips the detector, the volume is a mirror image");
   scan.cone = std::move(cone);
   scan.theta_deg.clear();
+}
+
+namespace {
+
+// One finite number, in metres; nothing where there is none.
+std::optional<double> find_metres(const Reader& file, const std::string& object) {
+  if (!file.is_dataset(object)) return {};
+  const Dataset data = file.numeric_dataset(object);
+  if (checked_bytes(data.extents(), 1, data.name) != 1) return {};
+  const auto exponent = metres_exponent(utf8_of(file.find_text(object, "units").value_or("m")));
+  const double value = data.read_all()[0];
+  if (!exponent || !std::isfinite(value)) return {};
+  return std::abs(value) * std::pow(10.0, *exponent);
+}
+
+}  // namespace
+
+// A ray that leaves the axis by the fan angle gamma is displaced, at the rim of the object, by R tan(gamma)
+// from the parallel ray that it is taken for: R is what the detector sees at the axis, on either side.
+void warn_of_magnification(const Reader& file, const NxtomoGroups& groups, RawScan& scan) {
+  const auto exponent = metres_exponent(scan.unit);
+  if (groups.source.empty() || !scan.pitch_stated || !exponent) return;
+  const auto source = find_metres(file, groups.source + "/distance"),
+             behind = find_metres(file, groups.detector + "/distance");
+  if (!source || !behind || !(*source > 0) || !(*behind > 0)) return;
+  const double reach = 0.5 * static_cast<double>(scan.columns) * scan.pitch_u * std::pow(10.0, *exponent),
+               magnification = (*source + *behind) / *source;
+  const double pixels = reach / magnification * (reach / (*source + *behind)) /
+                        (scan.pitch_u * std::pow(10.0, *exponent) / magnification);
+  if (!(pixels > 0.25)) return;
+  scan.warnings.push_back(fmt::format(
+      "read as PARALLEL BEAM, but the file states distances of cone beam: source to sample {:g} m, sample to "
+      "detector {:g} m, magnification {:.4g}, which moves rays by up to {:.2g} pixels within the object: is "
+      "it a "
+      "laboratory scanner? `beam` cone reads it so; `beam` parallel says that this is right",
+      *source, *behind, magnification, pixels));
 }
 
 }  // namespace vdvr::io

@@ -1,0 +1,15 @@
+// What was understood of a scan, on one screen: what its values are, how the views turn, which file is which
+// view, what was assumed and how to say otherwise. Called by info, run and whatever else reads a scan.
+#pragma once
+
+#include "apps/common/common_options.hpp"
+#include "vdvr/projections.hpp"
+#include "vdvr/understood.hpp"
+
+namespace vdvr::cli {
+
+Json understood_json(const ProjectionSet& scan, const Understood& understood);
+/// With `understood`, what was understood too.
+void print_scan(const ProjectionSet& scan, const Understood* understood = nullptr);
+
+}  // namespace vdvr::cli

@@ -1,0 +1,16 @@
+// An InputStatement as it stands in the certificate's `options` (docs/file-format.md). Called by
+// certify.cpp.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "vdvr/input_statement.hpp"
+
+namespace vdvr {
+
+/// Only what is stated.
+nlohmann::json json_of(const InputStatement& statement);
+/// Throws InputError for an unknown member, or a value that is none.
+InputStatement input_statement_of(const nlohmann::json& json);
+
+}  // namespace vdvr

@@ -1,0 +1,36 @@
+"""NXtomo files that say where the sample was. Right: a sample that stands still, but for noise far below a pixel, is read; a
+helix, a series of heights and random shifts are refused by name, and the part at rest is named."""
+import h5py
+import numpy as np
+from support import DEGREES, FLAT, VIEWS, counts_of, disc
+
+PIXEL = 2e-6
+
+
+def make(folder):
+    counts = counts_of(disc(density=.03))
+    flats, darks = np.full((2, 5, 65), FLAT, 'u2'), np.zeros((2, 5, 65), 'u2')
+    frames, noise = VIEWS + 4, np.random.default_rng(1)
+    steps = np.repeat([0., 1e-3, 2e-3], [44, 50, 30])
+    for name, axis, at, unit in (('still', 'z', np.full(frames, .0123), 'm'), ('noise', 'x', 5 + noise.uniform(-.05, .05, frames) * 2, 'um'),
+                                 ('helix', 'z', np.linspace(0, 1e-3, frames), 'm'), ('heights', 'z', steps, 'm'),
+                                 ('shifts', 'x', noise.uniform(-5, 5, frames), 'um'), ('along', 'y', np.linspace(0, .1, frames), 'MM'),
+                                 ('one', 'z', np.array([.3]), 'm'), ('outside', 'z', np.array([7.] * 4 + [1.] * VIEWS), 'm')):
+        with h5py.File(folder / f'{name}.nx', 'w') as h:
+            detector = h.create_group('entry/instrument/detector')
+            detector['data'], detector['image_key'] = np.concatenate([darks, flats, counts]), [2, 2, 1, 1] + [0] * VIEWS
+            for side in 'xy':
+                size = detector.create_dataset(f'{side}_pixel_size', data=PIXEL)
+                size.attrs['units'] = 'm'
+            h['entry/sample/rotation_angle'] = np.concatenate([np.zeros(4), DEGREES])
+            h.create_dataset(f'entry/sample/{axis}_translation', data=at).attrs['units'] = unit
+
+
+def check(program):
+    for scan in ('still', 'noise', 'one', 'outside'):
+        program.views(f'{scan}.nx', VIEWS)
+    for scan, axis in (('helix', 'z'), ('heights', 'z'), ('shifts', 'x'), ('along', 'y')):
+        program.refused('info', f'{scan}.nx', names=[f'{axis}_translation', 'moves', 'pixels'])
+    line = program.refused('info', 'heights.nx', names=['--views 40:90'])
+    program.expect('500 pixels' in line or '1e+03 pixels' in line, line)
+    program.views('heights.nx', 50, '--views', '40:90')
