@@ -49,8 +49,11 @@ RawScan open_data_exchange(const Reader& file, const std::string& group, const H
   scan.pitch_v = pitch_v.value_or(1);
   scan.pitch_stated = pitch_u && pitch_v;
   if (const auto unit = file.find_text(object, "unit")) scan.unit = utf8_of(*unit);
-  if (const auto text = file.find_text(object, "description")) scan.stated = sample_values_of(*text);
-  if (scan.stated) scan.values_source = "the attribute description of " + object;
+  // Counts as beamlines write them are described as "transmission": that says nothing of normalisation.
+  if (file.find_text(object, "description") == "line integrals") {
+    scan.stated = SampleValues::line_integrals;
+    scan.values_source = "the attribute description of " + object;
+  }
   open_reference(file, group + "/data_white", "flat", data, scan.flats, scan.no_flats);
   open_reference(file, group + "/data_dark", "dark", data, scan.darks, scan.no_darks);
   return scan;

@@ -100,7 +100,12 @@ void set_counts(const Description& about, const std::optional<NikonScan>& nikon,
       about.fail("'description' can only be \"line integrals\", \"transmission\" or \"counts\"");
     scan.values_source = "'description' of scan.json";
   }
-  if (scan.stated && scan.stated != SampleValues::counts) return;
+  if (scan.stated && scan.stated != SampleValues::counts) {
+    if (about.has("flats") || about.has("darks"))
+      scan.notes.push_back(fmt::format("'flats' and 'darks' are not used: values are {}, as {} says",
+                                       text_of(*scan.stated), scan.values_source));
+    return;
+  }
   if (nikon && !about.has("flats") && !about.has("darks") && !about.has("hdf5")) {
     const std::int64_t size = scan.rows * scan.columns;
     scan.flats = level_frame(nikon->white_level, size, nikon->path.string() + ": WhiteLevel");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host/system/length_unit.hpp"
 #include "vdvr/error.hpp"
@@ -50,17 +51,16 @@ void require_still(const RawScan& scan, double pitch, const std::string& name) {
     if (moved == 0) continue;
     const auto scale = pixels_per_unit(scan, axis.unit, pitch);
     if (scale && moved * *scale <= still_pixels) continue;
-    const std::string how_far =
-        scale ? fmt::format("{:g} {}, {:.3g} pixels", moved, axis.unit, moved * *scale)
-              : fmt::format(
-                    "{:g} {}; the size of a pixel is not known in that unit ('pitch' and 'unit' of "
-                    "scan.json state it)",
-                    moved, axis.unit);
+    const std::string how_far = scale
+                                    ? fmt::format("{:g} {}, {:.3g} pixels", moved, axis.unit, moved * *scale)
+                                    : fmt::format(
+                                          "{:g} {}; the size of a pixel is not known in that unit ('pitch' "
+                                          "and 'unit' of scan.json state it)",
+                                          moved, axis.unit);
     const ViewRanges still = longest_still(scan, axis.at, scale ? still_pixels / *scale : 0);
     throw FileError(
         fmt::format("{}: {}: the sample moves by {}; helical scans, series of heights and random shifts are "
-                    "not supported, "
-                    "F is that of a sample that only turns{}",
+                    "not supported, F is that of a sample that only turns{}",
                     name, axis.object, how_far,
                     still.empty() ? std::string()
                                   : fmt::format(". The longest part at rest is `views` {}", text_of(still))));

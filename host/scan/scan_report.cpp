@@ -77,8 +77,8 @@ void require_alive(const io::RawScan& raw, std::int64_t dead, std::int64_t sampl
   if (3 * dead < samples) return;
   throw FileError(fmt::format(
       "{}: {} of {} samples ({:.0f} %) are dead: no count above the dark, no flat above it, or not finite. "
-      "Too many to "
-      "replace by neighbours; look at the flats ({}) and darks ({}), and whether they are of this scan",
+      "Too many to replace by neighbours; look at the flats ({}) and darks ({}), and whether they are of "
+      "this scan",
       name, dead, samples, 100 * static_cast<double>(dead) / static_cast<double>(samples),
       raw.flat_level ? fmt::format("level {:g}", *raw.flat_level) : fmt::format("{} frames", raw.flats.count),
       raw.dark_level ? fmt::format("level {:g}", *raw.dark_level)

@@ -36,25 +36,23 @@ SampleValues usual_values(const RawScan& scan, const std::string& name) {
   if (scan.format != "mha" && scan.format != "nrrd") return SampleValues::counts;
   if (scan.flats.count > 0 || scan.darks.count > 0) return SampleValues::counts;
   if (scan.integer)
-    throw FileError(fmt::format(
-        "{}: holds whole numbers, which are counts as a rule: give the open beam by `flats` LEVEL (and "
-        "`darks` "
-        "none), or images by 'flats' and 'darks' of a scan.json; `line_integrals` says that -log was taken",
-        name));
+    throw FileError(
+        fmt::format("{}: holds whole numbers, which are counts as a rule: give the open beam by `flats` "
+                    "LEVEL (and `darks` none), or images by 'flats' and 'darks' of a scan.json; "
+                    "`line_integrals` says that -log was taken",
+                    name));
   return SampleValues::line_integrals;
 }
 
 std::string remedy_for(const char* what) {
   return what == std::string("flats")
              ? "; counts need the open beam: 'flats' in scan.json (beside 'hdf5' too), or `flats` LEVEL. "
-               "Values "
-               "that are normalised already are read by `transmission`, and after -log by `line_integrals` "
-               "(\"description\": \"line integrals\")"
+               "Values that are normalised already are read by `transmission`, and after -log by "
+               "`line_integrals` (\"description\": \"line integrals\")"
              : "; counts need them: 'darks' in scan.json (beside 'hdf5' too), or `darks` none where the "
-               "detector "
-               "has no dark current, such as a photon counter. Values that are normalised already are read "
-               "by "
-               "`transmission`, and after -log by `line_integrals` (\"description\": \"line integrals\")";
+               "detector has no dark current, such as a photon counter. Values that are normalised already "
+               "are read by `transmission`, and after -log by `line_integrals` (\"description\": \"line "
+               "integrals\")";
 }
 
 void need(const Frames& frames, const std::string& none, const char* what, const std::string& name) {
@@ -150,29 +148,26 @@ void judge_values(const ValueTotals& t, RawScan& scan, const std::string& name) 
   const double mean = t.sum / static_cast<double>(t.samples), edges = t.edges / static_cast<double>(t.views),
                middle = t.middle / static_cast<double>(t.views);
   if (scan.counts && scan.flat_level && scan.air_columns.empty() && mean < -std::log(2.0))
-    throw FileError(
-        fmt::format("{}: transmissions of {:.3g} on the average, where 1 is the open beam: these are counts "
-                    "with another one; "
-                    "`flats` LEVEL states it, 'air_columns' of scan.json take it from the images",
-                    name, std::exp(-mean)));
+    throw FileError(fmt::format(
+        "{}: transmissions of {:.3g} on the average, where 1 is the open beam: these are counts with another "
+        "one; `flats` LEVEL states it, 'air_columns' of scan.json take it from the images",
+        name, std::exp(-mean)));
   if (!scan.counts && t.fractions == 0 && t.largest > most_of_counts) {
     const std::string what = fmt::format(
         "all values are whole numbers, of up to {:g}: a line integral of that transmits exp(-{:g}), less "
-        "than one of "
-        "2^32 photons",
+        "than one of 2^32 photons",
         t.largest, t.largest);
     if (scan.values_source.empty())
-      throw FileError(
-          fmt::format("{}: {}; counts need `flats` LEVEL and `darks`, `line_integrals` says that -log "
-                      "was taken",
-                      name, what));
+      throw FileError(fmt::format(
+          "{}: {}; counts need `flats` LEVEL and `darks`, `line_integrals` says that -log was taken", name,
+          what));
     scan.warnings.push_back(what + ". Are they counts?");
   } else if (!scan.counts && middle < edges && 0.5 <= edges && edges <= 2 && mean > 0 && t.largest < 2) {
-    scan.warnings.push_back(fmt::format(
-        "values are {:.3g} at the detector's edges and {:.3g} in its middle: transmissions are so, line "
-        "integrals "
-        "of an object that the detector sees whole are 0 at the edges; `transmission` takes -log of them",
-        edges, middle));
+    scan.warnings.push_back(
+        fmt::format("values are {:.3g} at the detector's edges and {:.3g} in its middle: transmissions are "
+                    "so, line integrals of an object that the detector sees whole are 0 at the edges; "
+                    "`transmission` takes -log of them",
+                    edges, middle));
   }
   if (mean < -0.05)
     scan.warnings.push_back(fmt::format(

@@ -1,6 +1,7 @@
 // What the frames of a scan hold, and what turns counts into line integrals. Called by read_scan.cpp.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>

@@ -4,7 +4,7 @@
 
 #include <array>
 #include <fstream>
-#include <iterator>
+#include <utility>
 
 #include "vdvr/error.hpp"
 
@@ -89,9 +89,12 @@ std::string read_text(const std::filesystem::path& path, const std::string& what
   std::ifstream file(path, std::ios::binary);
   if (!std::filesystem::is_regular_file(path, error) || !file)
     throw FileError(fmt::format("{}: {} cannot be opened", path.string(), what));
-  if (std::filesystem::file_size(path, error) > most)
-    throw FileError(fmt::format("{}: is too large for {}", path.string(), what));
-  return utf8_of({std::istreambuf_iterator<char>(file), {}});
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  if (bytes > most) throw FileError(fmt::format("{}: is too large for {}", path.string(), what));
+  std::string text(bytes, '\0');
+  if (!file.read(text.data(), static_cast<std::streamsize>(bytes)))
+    throw FileError(fmt::format("{}: cannot be read", path.string()));
+  return utf8_of(std::move(text));
 }
 
 std::string comma_hint(const std::string& word) {

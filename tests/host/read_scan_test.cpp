@@ -245,9 +245,10 @@ BOOST_AUTO_TEST_CASE(statement_is_kept_in_the_report_and_wins_over_the_file) {
   ScanOptions options;
   options.input.values = SampleValues::line_integrals;
   options.input.views = {{1, 3}};
-  const ProjectionSet scan = read_scan(path, options);
+  Understood understood;
+  const ProjectionSet scan = read_scan(path, options, {}, &understood);
   BOOST_TEST(scan.geometry.views() == 2);
-  BOOST_TEST((scan.report.stated == options.input));
+  BOOST_TEST((understood.stated == options.input));
   BOOST_TEST(scan.data[0] == static_cast<float>(e.data[V * U]));
   options.input.dark = 0;
   BOOST_TEST(has(refusal(path, options), "leave `flats` and `darks` out"));

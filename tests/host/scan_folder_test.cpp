@@ -72,9 +72,10 @@ BOOST_AUTO_TEST_CASE(folder_is_read_in_natural_order) {
   const ProjectionSet part = read_scan(folder.path());
   ScanOptions two;
   two.input.views = view_ranges_of("0,2:");
-  const ProjectionSet chosen = read_scan(folder.path(), two);
-  BOOST_TEST((chosen.report.stated.views == ViewRanges{{0, 1}, {2, 4}}));
-  BOOST_TEST(chosen.report.frames.back().projection == 3);
+  Understood understood;
+  const ProjectionSet chosen = read_scan(folder.path(), two, {}, &understood);
+  BOOST_TEST((understood.stated.views == ViewRanges{{0, 1}, {2, 4}}));
+  BOOST_TEST(understood.frames.back().projection == 3);
   BOOST_TEST((std::vector<float>(chosen.data.begin() + V * U, chosen.data.end()) ==
               std::vector<float>(scan.data.begin() + 2 * V * U, scan.data.end())));
   BOOST_TEST(part.geometry.theta_rad ==

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 
 import numpy as np
 import pyvista
@@ -98,6 +99,21 @@ assert view[3, 4, 5] == big[3, 4, 5]
 del view
 assert sys.getrefcount(big) == holders, "the array is held after its scan is gone"
 del big
+
+# --- what is stated of an input ---
+raises(vdvr.InputError, "whole numbers", lambda: vdvr.Scan(np.ones((12, 3, 13), np.uint16), angles, center=6.0))
+assert vdvr.Scan(np.ones((12, 3, 13), np.uint16), angles, center=6.0, line_integrals=True).shape == (12, 3, 13)
+scan.save("stated.h5")
+for views in ("0:4,5:", [(0, 4), (5, 12)]):
+    part = vdvr.read_scan("stated.h5", views=views, center=6.0)
+    assert np.array_equal(part.data, np.delete(noise, 4, 0)) and not part.warnings
+raises(vdvr.InputError, "leave", lambda: vdvr.read_scan("stated.h5", darks="none"))
+raises(vdvr.InputError, "exclude", lambda: vdvr.read_scan("stated.h5", transmission=True, line_integrals=True))
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    doubtful = vdvr.Scan(-noise - 1, angles, center=6.0)
+    doubtful.save("doubtful.h5")
+    assert any("below 0" in w for w in vdvr.read_scan("doubtful.h5").warnings) and len(caught) == 1
 
 # --- errors ---
 bad = noise.copy()

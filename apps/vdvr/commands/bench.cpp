@@ -175,25 +175,25 @@ int bench_build(Arguments& args) {
   std::vector<double> seconds;
   std::optional<BuildResult> built;  // checked by build itself: it throws unless the certificate holds
   double plan_seconds = 0;
-  Planned planned;
+  std::optional<Planned> planned;
   Grid grid;
   FieldOptions field;
   for (std::size_t i = 0; i < repetitions; ++i) {
     built.reset();
-    planned = {};
+    planned.reset();
     const auto start = Clock::now();
-    planned = read_and_plan(device, args, wanted, progress.callback());
+    planned.emplace(read_and_plan(device, args, wanted, progress.callback()));
     plan_seconds = since(start);
-    grid = planned.plan.grid;
-    field = planned.plan.field;
-    built = build_planned(device, planned, wanted, progress.callback());
+    grid = planned->plan.grid;
+    field = planned->plan.field;
+    built = build_planned(device, *planned, wanted, progress.callback());
     seconds.push_back(since(start));
   }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   const std::uint64_t peak_device_bytes = device.peak_memory();
   const std::vector<double> fbp_seconds =
-      seconds_of_fbp(device, planned.scan, grid, field, std::max<std::size_t>(3, repetitions));
+      seconds_of_fbp(device, planned->scan, grid, field, std::max<std::size_t>(3, repetitions));
   progress.clear();
   Json line = bench_line("build", device, repetitions);
   line["cells"] = built->volume.grid.cells;

@@ -68,7 +68,7 @@ def check(program):
     program.ok('build', 'normalised.nx', '--transmission', '--views', '0:60,61:120', '--epsilon', '25%', '--size', '48x48x4', '-o',
                'v.vdvr', '--quiet')
     program.ok('verify', 'v.vdvr', '--projections', 'normalised.nx', '--quiet')
-    said = json.loads(program.ok('info', 'v.vdvr', '--json'))['certificate']['field'].get('input')
+    said = json.loads(program.ok('info', 'v.vdvr', '--json'))['certificate']['options'].get('input')
     program.expect(said == {'views': [[0, 60], [61, 120]], 'values': 'transmission'}, f'certificate: {said}')
     run = program.run('verify', 'v.vdvr', '--projections', 'normalised.nx', '--quiet', '--views', '0:120')
     program.expect(run.returncode == 1 and 'views 0:120' in run.stderr, f'verify with other views: {run.returncode} {run.stderr}')

@@ -16,6 +16,7 @@ def make(folder):
     with h5py.File(folder / 'exchange.h5', 'w') as h:
         h['/exchange/data'], h['/exchange/data_white'], h['/exchange/data_dark'] = counts, FLATS, DARKS
         h['/exchange/theta'] = DEGREES
+        h['/exchange/data'].attrs['description'] = 'transmission'  # as beamlines describe raw counts
     with h5py.File(folder / 'scan.nx', 'w') as h:
         h['/entry/instrument/detector/data'] = np.concatenate([DARKS, FLATS, counts])
         h['/entry/instrument/detector/image_key'] = [2, 2, 1, 1] + [0] * VIEWS
