@@ -99,18 +99,18 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
 #if VDVR_UPRIGHT
       const REAL inverse = (REAL)1 / l_plane, u = u_plane * inverse + v->part_u, whole_u = floor(u);
       const int column = (int)v->whole_u + (int)whole_u - 2;
-      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - (REAL)0.5));
+      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
       const REAL8 v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
 #else
       const REAL8 inverse = (REAL)1 / (v->step_lambda[2] * dz + l_plane),
                   u8 = (v->step_u[2] * dz + u_plane) * inverse + v->part_u, whole_u = floor(u8),
                   v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
       const int8 column = (int)v->whole_u + convert_int8(whole_u) - 2;
-      const float8 g_u = convert_float8(u8 - whole_u - (REAL)0.5);
+      const float8 g_u = convert_float8(u8 - whole_u - 0.5f);
 #endif
       const REAL8 whole_v = floor(v8);
       const int8 row = (int)v->whole_v + convert_int8(whole_v) - 2;
-      const float8 g_v = convert_float8(v8 - whole_v - (REAL)0.5);
+      const float8 g_v = convert_float8(v8 - whole_v - 0.5f);
 #if VDVR_UPRIGHT
       FOR_HEIGHTS(UPRIGHT_PART)
 #else
