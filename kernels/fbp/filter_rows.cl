@@ -6,8 +6,6 @@
 // every second tap is zero but the centre (Ram-Lak), so that a column sees only those of the other parity and
 // itself. Sums run in runs of 16 terms that are then added. VDVR_DOUBLE 1: taps, weights and sums in double
 // precision, rounded once, to the float that is stored. Called by host/fbp/filter_rows.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/filter_rows.h"
 

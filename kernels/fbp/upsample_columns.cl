@@ -4,8 +4,6 @@
 // that is stored. A work-item carries 2 VDVR_LANES rows of one view as VDVR_LANES complex rows: the
 // convolution's kernel is real. Layouts: in and out as shared/chunks.h says; scratch: VDVR_WIDTH work-items
 // side by side, element by element. Called by host/fbp/upsample_columns.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/upsample_columns.h"
 
@@ -36,13 +34,14 @@
     PUT(im, AT(i) + VDVR_LANES); \
   }
 // Times a root of unity, and times its conjugate.
-#define TURN(i, re, im, w) KEEP(i, (re) * (w).x - (im) * (w).y, (re) * (w).y + (im) * (w).x)
-#define TURNED_BACK(name, i, w)              \
-  SUM name##_re, name##_im;                  \
-  {                                          \
-    COMPLEX(r, i)                            \
-    name##_re = r_re * (w).x + r_im * (w).y; \
-    name##_im = r_im * (w).x - r_re * (w).y; \
+#define TURN(i, re, im, w) \
+  KEEP(i, fma((re), (SUM)((w).x), -((im) * (SUM)((w).y))), fma((re), (SUM)((w).y), (im) * (SUM)((w).x)))
+#define TURNED_BACK(name, i, w)                                  \
+  SUM name##_re, name##_im;                                      \
+  {                                                              \
+    COMPLEX(r, i)                                                \
+    name##_re = fma(r_re, (SUM)((w).x), r_im * (SUM)((w).y));    \
+    name##_im = fma(r_im, (SUM)((w).x), -(r_re * (SUM)((w).y))); \
   }
 // A row of either half of the lanes, at a detector column.
 #define ROWS(u) WIDE(LOAD(rows + (size_t)(u)*16))
