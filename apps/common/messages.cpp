@@ -34,6 +34,7 @@ const std::set<std::string>& fields_with_options() {
                                            "max_memory",
                                            "method",
                                            "mode",
+                                           "nan_as",
                                            "origin",
                                            "oversampling",
                                            "range",

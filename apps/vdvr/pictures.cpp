@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
 
 Scene open_scene(const std::filesystem::path& path, const Arguments& args, const std::string& method,
                  bool unverified) {
-  const std::uint64_t max_memory = common_options(args).max_memory;
   switch (kind_of(path, args)) {
     case InputKind::certified: {
       VdvrFile file = open_certified(path, args, unverified);
@@ -20,7 +19,7 @@ Scene open_scene(const std::filesystem::path& path, const Arguments& args, const
       return {std::move(file.volume), std::move(file.certificate), !unverified};
     }
     case InputKind::volume:
-      return {as_mixed(read_volume(path, max_memory)), std::nullopt, false};
+      return {as_mixed(load_volume(path, args)), std::nullopt, false};
     case InputKind::scan:
       break;
   }

@@ -7,6 +7,7 @@
 #include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/overlay.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -119,6 +120,7 @@ void add_render_options(Arguments& args) {
   add_certify(args);
   add_clip(args);
   add_scan(args);
+  add_volume_input(args);
   add_projection_options(args);
   args.group("Camera");
   add_orbit(args, kRenderOrbit, "what is shown");

@@ -9,11 +9,16 @@
 
 namespace vdvr {
 
-ExportNote note_of(const VdvrFile& file, const Grid& grid) {
+ExportNote note_of(const Grid& grid) {
   if (grid.unit.find_first_of("\n\r\"") != std::string::npos)
     throw InputError("the volume's unit holds quotes or line ends, which no other format takes");
   ExportNote note;
   note.grid = grid;
+  return note;
+}
+
+ExportNote note_of(const VdvrFile& file, const Grid& grid) {
+  ExportNote note = note_of(grid);
   const Certificate& c = file.certificate;
   note.certified = !c.comparison;
   note.epsilon = c.epsilon;
@@ -36,10 +41,12 @@ nlohmann::ordered_json certificate_note(const ExportNote& n) {
     j["epsilon"] = n.epsilon;
     j["epsilon_abs"] = n.epsilon_abs;
   }
-  j["exact_between_samples"] = n.exact_between_samples;
-  if (n.certified && n.exact_between_samples && n.samples == SampleType::f32)
-    j["between_samples_abs"] = n.epsilon_abs + n.jump;
-  j["content_sha256"] = n.content_sha256;
+  if (!n.content_sha256.empty()) {
+    j["exact_between_samples"] = n.exact_between_samples;
+    if (n.certified && n.exact_between_samples && n.samples == SampleType::f32)
+      j["between_samples_abs"] = n.epsilon_abs + n.jump;
+    j["content_sha256"] = n.content_sha256;
+  }
   j["generator"] = "vdvr " VDVR_VERSION;
   return j;
 }
@@ -70,10 +77,13 @@ std::string imagej_text(const ExportNote& n, std::int64_t images) {
   text += fmt::format("xorigin={}\nyorigin={}\nzorigin={}\n", -g.origin[0] / g.spacing[0],
                       -g.origin[1] / g.spacing[1], -g.origin[2] / g.spacing[2]);
   const double top = std::ldexp(1.0, static_cast<int>(8 * bytes_of(n.samples))) - 1;
-  if (n.samples == SampleType::f32) text += fmt::format("min={}\nmax={}\n", n.lowest, n.highest);
-  else text += fmt::format("min=0\nmax={}\ncf=0\nc0={}\nc1={}\nvunit=density\n", top, n.offset, n.scale);
+  if (n.samples == SampleType::f32 && n.range_is_known)
+    text += fmt::format("min={}\nmax={}\n", n.lowest, n.highest);
+  if (n.samples != SampleType::f32)
+    text += fmt::format("min=0\nmax={}\ncf=0\nc0={}\nc1={}\nvunit=density\n", top, n.offset, n.scale);
   if (n.certified) text += fmt::format("vdvr_epsilon_abs={}\n", n.epsilon_abs);
-  return text + fmt::format("vdvr_content_sha256={}\n", n.content_sha256);
+  if (!n.content_sha256.empty()) text += fmt::format("vdvr_content_sha256={}\n", n.content_sha256);
+  return text;
 }
 
 }  // namespace vdvr

@@ -14,15 +14,18 @@ struct ExportNote {
   Grid grid;
   SampleType samples = SampleType::f32;
   double scale = 1, offset = 0;
-  double lowest = 0, highest = 0;  ///< of V; found where a format shows it
+  double lowest = 0, highest = 0;  ///< of the values; found where a format shows it
+  bool range_is_known = false;     ///< false of planes that are still to come
   bool exact_between_samples = false;
   double jump = 0;         ///< as in ExportResult; found where the samples hold all of V
   bool certified = false;  ///< false for the record of a comparison, which promises nothing
   double epsilon = 0, epsilon_abs = 0;
-  std::string content_sha256;
+  std::string content_sha256;  ///< of the .vdvr; empty of a volume that never was one
 };
 
-/// `grid` is of the exported samples. Throws InputError for a unit that would break out of a header's line.
+/// Of a volume without a certificate. Throws InputError for a unit that would break out of a header's line.
+ExportNote note_of(const Grid& grid);
+/// `grid` is of the exported samples.
 ExportNote note_of(const VdvrFile& file, const Grid& grid);
 
 /// "float32", "uint16", "uint8".

@@ -1,5 +1,5 @@
 // Slab by slab: V is sampled on all cores, turned into the file's type, and handed to the format's sink. What
-// was exported is never whole in memory. Called by `vdvr export`.
+// was exported is never whole in memory. Called by `vdvr export` and `vdvr reconstruct`.
 #include "vdvr/export_volume.hpp"
 
 #include <fmt/format.h>
@@ -59,6 +59,11 @@ bool is_ours(const std::string& name, ExportFormat format) {
   if (format == ExportFormat::tiff) return name == "volume.json" || between("slice_", ".tif");
   if (format == ExportFormat::vtm) return between("block_", ".vti");
   return name == "zarr.json" || (name.size() == 1 && digits(name));
+}
+
+/// Whether an export is a folder.
+bool is_folder(const fs::path& path, ExportFormat format) {
+  return format == ExportFormat::ome_zarr || (format == ExportFormat::tiff && !is_tiff_file_name(path));
 }
 
 /// A folder in the way is replaced only where nothing else would go with it.
@@ -124,6 +129,12 @@ void set_scale(ExportNote& note, const ExportOptions& options) {
   note.scale = hi > lo ? (hi - lo) / top : 1;
 }
 
+/// Of planes that wait for others.
+std::uint64_t kept_bytes(const ExportOptions& options) {
+  const std::uint64_t most = std::uint64_t{64} << 20;
+  return options.max_memory_bytes > 0 ? std::min(most, options.max_memory_bytes / 16) : most;
+}
+
 /// Planes that a slab has: as many as 64 MiB hold, or as memory leaves.
 std::int64_t slab_planes(const MixedVolume& v, const Grid& grid, const ExportOptions& options,
                          std::int64_t together, const std::string& name) {
@@ -158,11 +169,13 @@ std::unique_ptr<VolumeSink> sink_of(const fs::path& path, const ExportNote& note
       return flat_sink(path, note, false);
     case ExportFormat::hdf5:
       return hdf5_sink(path, note, options.compression);
+    case ExportFormat::ome_zarr:
+      return ome_zarr_sink(without_slash(path), note, options.compression, kept_bytes(options));
     default:
       break;
   }
   if (is_tiff_file_name(path)) return tiff_pages_sink(path, note);
-  return tiff_folder_sink(path, note);
+  return tiff_folder_sink(without_slash(path), note);
 }
 
 std::uint64_t write_slabs(const MixedVolume& v, const fs::path& path, const ExportNote& note,
@@ -277,16 +290,101 @@ ExportResult export_volume(const VdvrFile& file, const fs::path& path, const Exp
     result.bytes = totals.bytes;
     return result;
   }
-  const bool folder = options.format == ExportFormat::tiff && !is_tiff_file_name(path);
-  if (folder) require_replaceable(without_slash(path), options.format);
+  if (is_folder(path, options.format)) require_replaceable(without_slash(path), options.format);
   // TIFF shows the range, integers span it.
-  if (options.format == ExportFormat::tiff || options.samples != SampleType::f32)
+  if (options.format == ExportFormat::tiff || options.samples != SampleType::f32) {
     std::tie(note.lowest, note.highest) = range_of_samples(v, progress);
+    note.range_is_known = true;
+  }
   set_scale(note, options);
   result.scale = note.scale;
   result.offset = note.offset;
-  result.bytes =
-      write_slabs(v, folder ? without_slash(path) : path, note, options, finest, result.clipped, progress);
+  result.bytes = write_slabs(v, path, note, options, finest, result.clipped, progress);
+  return result;
+}
+
+// --- planes that come one after the other ---
+
+struct UniformWriter::State {
+  State(const fs::path& path, const ExportNote& n, const ExportOptions& options)
+      : note(n), sink(sink_of(path, n, options)), encode(n), room(kept_bytes(options)) {
+    const Index3 samples = n.grid.samples();
+    plane = at(samples[0] * samples[1]);
+    // Whole planes that the format wants together, as many as there is room for.
+    const std::int64_t together = sink->planes_together();
+    const auto most = static_cast<std::int64_t>(room / (plane * sizeof(float)));
+    batch = at(std::max(most / together, std::int64_t{1}) * together) * plane;
+  }
+
+  void put(std::span<const float> samples) {
+    sink->put(planes, encode(samples));
+    planes += static_cast<std::int64_t>(samples.size() / plane);
+  }
+
+  ExportNote note;
+  std::unique_ptr<VolumeSink> sink;
+  Encoder encode;
+  std::uint64_t room;
+  std::size_t plane = 0, batch = 0;
+  std::vector<float> waiting;
+  std::int64_t planes = 0;  ///< put so far
+};
+
+void check_uniform_output(const fs::path& path, const ExportOptions& options) {
+  if (options.format == ExportFormat::vtm)
+    throw InputError(fmt::format(
+        "{}: vtm holds bricks of several resolutions, which a uniform volume has none of", path.string()));
+  check_options(path, options);
+  if (options.oversampling != 1) throw InputError("`oversampling` is of certified volumes");
+  if (options.samples != SampleType::f32 && !options.range)
+    throw InputError(
+        "`samples` u16 and u8 need a `range` that they span: the values are not known before they are "
+        "written");
+  if (is_folder(path, options.format)) require_replaceable(without_slash(path), options.format);
+}
+
+UniformWriter::UniformWriter(const fs::path& path, const Grid& grid, const ExportOptions& options) {
+  check_uniform_output(path, options);
+  static_cast<void>(io::checked_bytes(grid.samples(), sizeof(float), path.string()));
+  ExportNote note = note_of(grid);
+  set_scale(note, options);
+  state_ = std::make_unique<State>(path, note, options);
+}
+
+UniformWriter::~UniformWriter() = default;
+
+void UniformWriter::append(std::span<const float> samples) {
+  State& s = *state_;
+  while (!samples.empty()) {
+    if (s.waiting.empty() && samples.size() >= s.batch) {
+      s.put(samples.first(s.batch));
+      samples = samples.subspan(s.batch);
+      continue;
+    }
+    const std::size_t more = std::min(samples.size(), s.batch - s.waiting.size());
+    s.waiting.insert(s.waiting.end(), samples.begin(), samples.begin() + static_cast<std::ptrdiff_t>(more));
+    samples = samples.subspan(more);
+    if (s.waiting.size() < s.batch) return;
+    s.put(s.waiting);
+    s.waiting.clear();
+  }
+}
+
+ExportResult UniformWriter::commit() {
+  State& s = *state_;
+  if (s.waiting.size() % s.plane != 0) throw InputError("an exported volume ends within a plane");
+  if (!s.waiting.empty()) s.put(s.waiting);
+  s.waiting.clear();
+  const Index3 n = s.note.grid.samples();
+  if (s.planes != n[2]) throw InputError(fmt::format("{} of the {} planes of a volume came", s.planes, n[2]));
+  ExportResult result;
+  result.grid = s.note.grid;
+  result.samples = static_cast<std::uint64_t>(n[0] * n[1] * n[2]);
+  result.scale = s.note.scale;
+  result.offset = s.note.offset;
+  result.clipped = s.encode.clipped();
+  throw_if_stopped();
+  result.bytes = s.sink->commit();
   return result;
 }
 

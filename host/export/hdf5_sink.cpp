@@ -101,6 +101,7 @@ class Hdf5Sink : public VolumeSink {
       writer_.attribute(dataset, "epsilon", note.epsilon);
       writer_.attribute(dataset, "epsilon_abs", note.epsilon_abs);
     }
+    if (note.content_sha256.empty()) return;
     writer_.attribute(dataset, "exact_between_samples", std::int64_t{note.exact_between_samples});
     writer_.attribute(dataset, "content_sha256", note.content_sha256);
   }

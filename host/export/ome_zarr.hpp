@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "host/export/export_note.hpp"
+#include "host/export/volume_sink.hpp"
 #include "vdvr/progress.hpp"
 
 namespace vdvr {
@@ -17,5 +17,9 @@ struct ZarrTotals {
 /// memory is a few MiB a core.
 ZarrTotals write_ome_zarr(const VdvrFile& file, const std::filesystem::path& path, const ExportNote& note,
                           int finest, const ExportOptions& options, const Progress& progress);
+
+/// One level, of planes that come one after the other; of these `most_bytes` are kept, or one.
+std::unique_ptr<VolumeSink> ome_zarr_sink(const std::filesystem::path& path, const ExportNote& note,
+                                          Compression compression, std::uint64_t most_bytes);
 
 }  // namespace vdvr

@@ -245,7 +245,6 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {
-  std::vector<std::string> notes;
   if (g.views() < 2) throw InputError(fmt::format("{} view(s); tomography needs at least 2", g.views()));
   if (g.columns < 2 || g.rows < 1)
     throw InputError(fmt::format("a detector of {} columns x {} rows is too small", g.columns, g.rows));
@@ -265,12 +264,8 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
         g.center, g.columns, arc * 180 / std::numbers::pi));
   }
   const ViewWeights weights = view_weights(g.theta_rad);
-  if (weights.limited_angle)
-    notes.push_back(
-        "limited angle: a gap between views is above four times the median gap; its weight was capped");
-  if (weights.grouped_views > 0)
-    notes.push_back(fmt::format("{} coincident views share their weights", weights.grouped_views));
-  return notes;
+  require_directions(weights);
+  return weights.notes;
 }
 
 }  // namespace vdvr

@@ -363,8 +363,8 @@ class ProductFilter : public RowFilter {
   void launch(const Chunk& chunk, opencl::DeviceArray<float>& out, std::int64_t first_column,
               std::int64_t out_columns, const VdvrChunks& places) const {
     const ColumnTuning tuning = column_tuning(state_.info);
-    // As many bytes in a vector of sums.
-    const int lanes = is_double<Real> ? std::max(1, tuning.lanes / 2) : tuning.lanes;
+    // As many bytes in a vector of sums; of two lanes there is no vector.
+    const int lanes = !is_double<Real> ? tuning.lanes : tuning.lanes >= 8 ? tuning.lanes / 2 : 1;
     opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, Real, VdvrFilteredRows> kernel(
         state_, "fbp/filter_rows", "filter_rows",
         {{"VDVR_LANES", std::to_string(lanes)},

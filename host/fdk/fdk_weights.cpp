@@ -47,9 +47,11 @@ FdkWeights::FdkWeights(const ConeGeometry& cone, std::int64_t columns, std::int6
     view_.push_back(length(in_plane) / view.source_to_axis);
     views_.push_back(view);
   }
-  const ViewWeights weights = view_weights(angles, 2 * pi);
-  limited_angle_ = weights.limited_angle && redundancy_ != Redundancy::short_scan;
-  grouped_views_ = weights.grouped_views;
+  const ViewWeights weights =
+      view_weights(angles, 2 * pi, redundancy_ == Redundancy::short_scan ? Arc::open : Arc::closed);
+  require_directions(weights);
+  limited_angle_ = weights.wedges > 0;
+  notes_ = weights.notes;
   // A turn sees every ray twice.
   for (std::size_t k = 0; k < view_.size(); ++k) view_[k] *= 0.5 * weights.weight[k];
   if (redundancy_ == Redundancy::short_scan) check_short_scan();

@@ -33,8 +33,10 @@ class FdkWeights {
   /// The cosine of the angle between the ray through a pixel and the line from the source to the axis.
   [[nodiscard]] double cosine(std::size_t k, double column, double row) const;
 
+  /// Whether there are wedges that no source was in; of a short scan its opening is none.
   [[nodiscard]] bool limited_angle() const { return limited_angle_; }
-  [[nodiscard]] int grouped_views() const { return grouped_views_; }
+  /// For the user: those, gaps in doubt, views that share their weight.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   [[nodiscard]] double fan_angle(std::size_t k, double column) const;
@@ -50,7 +52,7 @@ class FdkWeights {
   double overlap_fan_ = 0;                  // of a displaced detector: the fan that all see on both sides
   bool displaced_up_ = false;               // it reaches farther towards high columns
   bool limited_angle_ = false;
-  int grouped_views_ = 0;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace vdvr

@@ -35,13 +35,8 @@ Grid make_grid(const ProjectionSet& scan, const GridOptions& options) {
 std::vector<std::string> check_scan(const ProjectionSet& scan) {
   if (!scan.cone) return check_scan(scan.geometry);
   const FdkWeights weights(*scan.cone, scan.geometry.columns, scan.geometry.rows);
-  std::vector<std::string> notes;
-  if (weights.limited_angle())
-    notes.push_back(
-        "limited angle: a gap between views is above four times the median gap; its weight was capped");
-  if (weights.grouped_views() > 0)
-    notes.push_back(fmt::format("{} coincident views share their weights", weights.grouped_views()));
-  notes.push_back(
+  std::vector<std::string> notes = weights.notes();
+  notes.emplace_back(
       "FDK: exact in the plane of the orbit, approximate above and below it; a circle does not see enough "
       "for more");
   return notes;

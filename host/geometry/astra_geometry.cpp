@@ -32,6 +32,7 @@ void circular_views(const Description& about, const std::string& where, const St
   view.row = stack.middle_row();
   const std::vector<double> angles = about.numbers("ProjectionAngles");
   require_views(where, "ProjectionAngles", static_cast<std::int64_t>(angles.size()), stack);
+  require_radians(where, "ProjectionAngles", angles);
   for (std::size_t k = 0; k < angles.size(); ++k) {
     view.theta_rad = angles[k];
     out.views.push_back(checked_view(view, where, static_cast<std::int64_t>(k)));

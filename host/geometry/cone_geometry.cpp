@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/geometry/angular_gaps.hpp"
 #include "host/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
@@ -16,6 +17,8 @@ namespace {
 
 // Rows and columns of a detector that are more skew than that are not taken for a rounded right angle.
 constexpr double most_skew = 1e-3;
+
+constexpr double turn = 2 * std::numbers::pi;
 
 Vec3 row_of(const ViewMatrix& m, std::size_t i) { return {m[i][0], m[i][1], m[i][2]}; }
 
@@ -30,6 +33,12 @@ Vec3 source_of(const ViewMatrix& m) {
   for (std::size_t i = 0; i < 3; ++i)
     out[i] = -(m[0][3] * bc[i] + m[1][3] * ca[i] + m[2][3] * ab[i]) / volume;
   return out;
+}
+
+std::vector<double> source_angles(const ConeGeometry& cone) {
+  std::vector<double> angles;
+  for (const ViewMatrix& matrix : cone.views) angles.push_back(cone_view(matrix).angle());
+  return angles;
 }
 
 }  // namespace
@@ -143,12 +152,9 @@ ViewMatrix circular_view(const CircularView& v) {
 }
 
 SourceArc source_arc(const ConeGeometry& cone) {
-  constexpr double turn = 2 * std::numbers::pi;
-  std::vector<double> angles;
-  for (const ViewMatrix& matrix : cone.views) {
-    const double angle = cone_view(matrix).angle();
-    angles.push_back(angle < 0 ? angle + turn : angle);
-  }
+  std::vector<double> angles = source_angles(cone);
+  for (double& angle : angles)
+    if (angle < 0) angle += turn;
   SourceArc arc;
   if (angles.empty()) return arc;
   std::sort(angles.begin(), angles.end());
@@ -167,10 +173,9 @@ SourceArc source_arc(const ConeGeometry& cone) {
 }
 
 Redundancy natural_redundancy(const ConeGeometry& cone, std::int64_t columns) {
-  const SourceArc arc = source_arc(cone);
   constexpr double open_gap = std::numbers::pi / 9;  // RTK's threshold for a short scan
-  if (arc.largest_gap_rad > open_gap && arc.largest_gap_rad > 3 * arc.median_gap_rad)
-    return Redundancy::short_scan;
+  const std::vector<double> wedges = angular_gaps(source_angles(cone), turn).wedges_rad();
+  if (!wedges.empty() && wedges.front() > open_gap) return Redundancy::short_scan;
   // The reach that all views have on either side.
   const double last = static_cast<double>(columns - 1);
   double below = last, above = last;

@@ -44,6 +44,9 @@ ViewMatrix checked_view(const DetectorVectors& vectors, const StackShape& stack,
 /// Throws FileError, which names `what`, unless as many views are described as there are.
 void require_views(const std::string& where, const std::string& what, std::int64_t described,
                    const StackShape& stack);
+/// Throws FileError where angles that a format has in radians are degrees: they reach beyond 14 turns, and
+/// end on a multiple of 180, or a step before it, to a hundredth of the step.
+void require_radians(const std::string& where, const std::string& what, const std::vector<double>& angles);
 /// The same of the detector.
 void require_detector(const std::string& where, std::int64_t columns, std::int64_t rows,
                       const StackShape& stack);

@@ -87,6 +87,7 @@ ConeViews tigre_geometry(const std::filesystem::path& path, const StackShape& st
              angles = angles_of(about, stack), offsets = rows_by_view(about, "offDetector", 2, stack),
              shift =
                  about.has("COR") ? by_view(about, "COR", stack) : std::vector<double>(angles.size(), 0.0);
+  require_radians(path.string(), "'angles'", angles);
   ConeViews out;
   for (std::size_t k = 0; k < angles.size(); ++k) {
     CircularView view;

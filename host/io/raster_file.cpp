@@ -79,7 +79,7 @@ class Header {
     fail(fmt::format("header has no '{}': truncated, or not the format its first line says", key));
   }
   /// NRRD writes vectors as (a,b,c): brackets and commas count as blanks.
-  std::vector<double> numbers(const std::string& key, std::size_t count) const {
+  std::vector<double> numbers(const std::string& key, std::size_t count, bool nan_is_unknown = false) const {
     std::string text = need(key);
     std::replace_if(
         text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
@@ -88,7 +88,7 @@ class Header {
     for (std::string word; in >> word;) {
       char* end = nullptr;
       values.push_back(std::strtod(word.c_str(), &end));
-      if (*end != '\0' || !std::isfinite(values.back()))
+      if (*end != '\0' || (!std::isfinite(values.back()) && !(nan_is_unknown && std::isnan(values.back()))))
         fail(fmt::format("'{}' holds '{}', not a number", key, word));
     }
     if (values.size() != count)
@@ -141,10 +141,17 @@ class Header {
 
 void set_spacing(const Header& header, RasterHeader& out, const std::vector<double>& spacing) {
   for (std::size_t a = 0; a < 3; ++a) {
+    if (std::isnan(spacing[a])) continue;  // not known, as NRRD has it
     if (!(spacing[a] > 0))
       header.fail(fmt::format("spacing {} along axis {}; it must be positive", spacing[a], a));
     out.spacing[a] = spacing[a];
   }
+}
+
+void set_axes(const Header& header, const std::string& key, const AxisDirections& directions,
+              RasterHeader& out) {
+  if (const std::string wrong = straight_axes(directions, out.samples, out.spacing, out.axes); !wrong.empty())
+    header.fail(fmt::format("'{}' {}", key, wrong));
 }
 
 // --- MetaImage ---
@@ -166,13 +173,6 @@ void set_met_type(const Header& header, const std::string& name, RasterHeader& o
 }
 
 void set_met_geometry(const Header& header, RasterHeader& out) {
-  for (const char* key : {"TransformMatrix", "Rotation", "Orientation"}) {
-    if (!header.find(key)) continue;
-    const auto m = header.numbers(key, 9);
-    for (std::size_t i = 0; i < 9; ++i)
-      if (m[i] != (i % 4 == 0 ? 1.0 : 0.0))
-        header.fail(fmt::format("'{}' turns or mirrors the axes; resample the file to the identity", key));
-  }
   for (const char* key : {"Offset", "Position", "Origin"})
     if (header.find(key)) {
       const auto origin = header.numbers(key, 3);
@@ -180,6 +180,14 @@ void set_met_geometry(const Header& header, RasterHeader& out) {
     }
   const char* spacing = header.find("ElementSpacing") ? "ElementSpacing" : "ElementSize";
   if (header.find(spacing)) set_spacing(header, out, header.numbers(spacing, 3));
+  for (const char* key : {"TransformMatrix", "Rotation", "Orientation"}) {
+    if (!header.find(key)) continue;
+    // Three numbers an axis of the file: its direction, of length 1.
+    const auto m = header.numbers(key, 9);
+    AxisDirections directions{};
+    for (std::size_t i = 0; i < 9; ++i) directions[i / 3][i % 3] = m[i] * out.spacing[i / 3];
+    set_axes(header, key, directions, out);
+  }
   // MetaImage lengths are millimetres unless it says otherwise; units it has no name for go into our Comment.
   out.unit = header.find(spacing) ? "mm" : "";
   if (const auto* unit = header.find("DistanceUnits"); unit && *unit != "?") out.unit = *unit;
@@ -259,19 +267,19 @@ void set_nrrd_geometry(const Header& header, RasterHeader& out) {
   for (const char* key : {"axis mins", "axismins", "axis maxs", "axismaxs"})
     if (header.find(key))
       header.fail(fmt::format("'{}' is not supported; give 'space origin' and 'space directions'", key));
-  if (header.find("spacings")) set_spacing(header, out, header.numbers("spacings", 3));
+  if (header.find("spacings")) set_spacing(header, out, header.numbers("spacings", 3, true));
   if (header.find("space directions")) {
     const auto m = header.numbers("space directions", 9);
-    for (std::size_t i = 0; i < 9; ++i)
-      if (i % 4 == 0 ? !(m[i] > 0) : m[i] != 0)
-        header.fail(
-            "'space directions' turn or mirror the axes; resample the file to positive, axis-aligned "
-            "directions");
-    set_spacing(header, out, {m[0], m[4], m[8]});
+    AxisDirections directions{};
+    for (std::size_t i = 0; i < 9; ++i) directions[i / 3][i % 3] = m[i];
+    for (std::size_t f = 0; f < 3; ++f)
+      out.spacing[f] = std::max({std::abs(m[3 * f]), std::abs(m[3 * f + 1]), std::abs(m[3 * f + 2])});
+    set_axes(header, "space directions", directions, out);
   }
   if (header.find("space origin")) {
-    const auto origin = header.numbers("space origin", 3);
-    std::copy(origin.begin(), origin.end(), out.origin.begin());
+    const auto origin = header.numbers("space origin", 3, true);
+    for (std::size_t a = 0; a < 3; ++a)
+      if (!std::isnan(origin[a])) out.origin[a] = origin[a];
   }
   for (const char* key : {"space units", "units"})
     if (const auto* units = header.find(key)) {
@@ -279,6 +287,23 @@ void set_nrrd_geometry(const Header& header, RasterHeader& out) {
       if (first != std::string::npos && last != std::string::npos)
         out.unit = units->substr(first + 1, last - first - 1);
     }
+}
+
+/// The byte after so many line ends.
+std::uint64_t after_lines(const fs::path& path, std::uint64_t from, std::int64_t lines) {
+  if (lines == 0) return from;
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(from));
+  std::string block(1 << 16, '\0');
+  for (std::uint64_t at = from;; at += block.size()) {
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    block.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+    for (std::size_t i = 0; i < block.size(); ++i)
+      if (block[i] == '\n' && --lines == 0) return at + i + 1;
+    if (block.empty())
+      throw FileError(fmt::format("{}: ends {} lines before the samples that 'line skip' leads to",
+                                  path.string(), lines));
+  }
 }
 
 RasterHeader read_nrrd(Header& header) {
@@ -308,9 +333,10 @@ RasterHeader read_nrrd(Header& header) {
     if (endian != "little" && endian != "big") header.fail(fmt::format("endian is '{}'", endian));
     out.big_endian = endian == "big";
   }
+  std::int64_t lines = 0, skip = 0;
   for (const char* key : {"line skip", "lineskip"})
-    if (header.find(key) && header.integer(key) != 0) header.fail("'line skip' is not supported");
-  std::int64_t skip = 0;
+    if (header.find(key)) lines = header.integer(key);
+  if (lines < 0) header.fail(fmt::format("'line skip' is {}", lines));
   for (const char* key : {"byte skip", "byteskip"})
     if (header.find(key)) skip = header.integer(key);
   if (skip != 0 && out.gzip) header.fail("'byte skip' together with gzip is not supported");
@@ -319,8 +345,8 @@ RasterHeader read_nrrd(Header& header) {
     header.fail(fmt::format("data file '{}' (one file per slice) is not supported", *data));
   out.data_file = data ? header.beside(*data) : header.path();
   out.data_at_end = skip < 0;
-  out.data_offset =
-      (data ? 0 : header.position()) + static_cast<std::uint64_t>(std::max<std::int64_t>(skip, 0));
+  out.data_offset = after_lines(out.data_file, data ? 0 : header.position(), lines) +
+                    static_cast<std::uint64_t>(std::max<std::int64_t>(skip, 0));
   return out;
 }
 

@@ -1,5 +1,5 @@
 // MetaImage (.mha, .mhd) and NRRD (.nrrd, .nhdr): headers, and samples of any scalar type as double, raw or
-// gzip, in either byte order. Axis order x, y, z; x fastest in the file. Called by host/io/volume_file.cpp
+// gzip, in either byte order. The file's first axis is the fastest. Called by host/io/volume_file.cpp
 // and host/scan/raster_scan.cpp.
 #pragma once
 
@@ -9,18 +9,22 @@
 #include <memory>
 #include <string>
 
+#include "host/io/raster_axes.hpp"
+
 namespace vdvr::io {
 
 enum class ScalarKind { unsigned_integer, signed_integer, floating };
 
 struct RasterHeader {
-  std::filesystem::path file;       ///< the header
-  std::filesystem::path data_file;  ///< the same file where the header is attached
-  std::string format;               ///< "mha" or "nrrd"
-  std::uint64_t data_offset = 0;    ///< bytes before the samples in data_file
-  bool data_at_end = false;         ///< the samples are the file's last bytes instead
-  std::array<std::int64_t, 3> samples{0, 0, 0};
-  std::array<double, 3> spacing{1, 1, 1}, origin{0, 0, 0};
+  std::filesystem::path file;                    ///< the header
+  std::filesystem::path data_file;               ///< the same file where the header is attached
+  std::string format;                            ///< "mha" or "nrrd"
+  std::uint64_t data_offset = 0;                 ///< bytes before the samples in data_file
+  bool data_at_end = false;                      ///< the samples are the file's last bytes instead
+  std::array<std::int64_t, 3> samples{0, 0, 0};  ///< by axis of the file
+  std::array<double, 3> spacing{1, 1, 1};        ///< by axis of the file
+  std::array<double, 3> origin{0, 0, 0};         ///< of its first sample, in the world
+  RasterAxes axes;
   std::string unit;  ///< empty when the file does not say
   ScalarKind kind = ScalarKind::floating;
   int sample_bytes = 4;
@@ -31,8 +35,10 @@ struct RasterHeader {
 /// True when the file begins like MetaImage or NRRD. False also when it cannot be read.
 bool is_raster_file(const std::filesystem::path& path);
 
-/// Throws FileError naming the field: not three-dimensional, vectors, rotations or flips, unknown types or
-/// encodings, samples outside the header's file beyond its folder.
+/// Throws FileError naming the field: not three-dimensional, vectors, axes oblique to the world's, unknown
+/// types or encodings, samples outside the header's file beyond its folder. Axes that are oblique by so
+/// little that no sample is off by more than a thousandth of the spacing count as straight: files hold
+/// rounded directions.
 RasterHeader read_raster_header(const std::filesystem::path& path);
 
 /// The samples behind a header. Opening checks that the file is long enough; gzip data are inflated at once.

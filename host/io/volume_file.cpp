@@ -6,12 +6,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <cmath>
 #include <fstream>
 #include <vector>
 
 #include "host/io/raster_file.hpp"
+#include "host/io/volume_samples.hpp"
 #include "host/io/volume_stack.hpp"
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
@@ -64,6 +65,37 @@ void append_little_endian(std::ofstream& file, std::span<const float> samples) {
   }
 }
 
+/// The volume whose axes are those of the world, of one whose axes run as `axes` says; every sample stays
+/// where it is.
+Volume along_axes(const Volume& from, const io::RasterAxes& axes) {
+  Volume to;
+  to.grid = from.grid;
+  std::array<std::int64_t, 3> stride{};  // in `to`, by axis of `from`
+  std::int64_t start = 0;
+  for (std::size_t f = 0; f < 3; ++f) {
+    const std::size_t a = axes.along[f];
+    to.grid.cells[a] = from.grid.cells[f];
+    to.grid.spacing[a] = from.grid.spacing[f];
+  }
+  const Index3 n = to.grid.samples(), plain{1, n[0], n[0] * n[1]};
+  for (std::size_t f = 0; f < 3; ++f) {
+    const std::size_t a = axes.along[f];
+    stride[f] = axes.reversed[f] ? -plain[a] : plain[a];
+    if (!axes.reversed[f]) continue;
+    start += (n[a] - 1) * plain[a];
+    to.grid.origin[a] -= static_cast<double>(n[a] - 1) * to.grid.spacing[a];
+  }
+  to.samples.resize(from.samples.size());
+  const Index3 m = from.grid.samples();
+  std::size_t i = 0;
+  for (std::int64_t z = 0; z < m[2]; ++z)
+    for (std::int64_t y = 0; y < m[1]; ++y)
+      for (std::int64_t x = 0; x < m[0]; ++x)
+        to.samples[static_cast<std::size_t>(start + x * stride[0] + y * stride[1] + z * stride[2])] =
+            from.samples[i++];
+  return to;
+}
+
 }  // namespace
 
 bool is_volume_input(const std::filesystem::path& path) {
@@ -80,10 +112,11 @@ bool is_volume_path(const std::filesystem::path& path) {
   return e == ".mha" || e == ".mhd" || e == ".nrrd" || e == ".nhdr";
 }
 
-Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  if (const auto parts = hdf5_volume_path(path))
-    return read_hdf5_volume(parts->first, parts->second, max_memory_bytes);
-  if (is_tiff_path(path) || is_tiff_folder(path)) return read_tiff_volume(path, max_memory_bytes);
+Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                   std::optional<double> nan_as) {
+  const VolumeLimits limits{max_memory_bytes, nan_as};
+  if (const auto parts = hdf5_volume_path(path)) return read_hdf5_volume(parts->first, parts->second, limits);
+  if (is_tiff_path(path) || is_tiff_folder(path)) return read_tiff_volume(path, limits);
   if (!is_volume_path(path))
     throw FileError(fmt::format(
         "{}: not a volume by its name (.mha, .mhd, .nrrd, .nhdr, .tif, FILE.h5:/dataset, a folder "
@@ -91,32 +124,23 @@ Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_b
         path.string()));
   io::RasterSamples source(io::read_raster_header(path), max_memory_bytes);
   const io::RasterHeader& header = source.header();
-  Volume volume;
-  for (std::size_t a = 0; a < 3; ++a) {
-    // One sample bounds no cell, so there is nothing to interpolate in.
-    if (header.samples[a] < 2)
-      throw FileError(fmt::format("{}: {} samples, but each axis needs at least two", path.string(),
-                                  io::shape_text(header.samples)));
-    volume.grid.cells[a] = header.samples[a] - 1;
+  io::VolumeSamples samples(path.string(), header.samples, max_memory_bytes, nan_as);
+  const std::int64_t count = samples.grid().sample_count();
+  std::vector<double> block(static_cast<std::size_t>(std::min<std::int64_t>(1 << 20, count)));
+  for (std::int64_t first = 0; first < count; first += static_cast<std::int64_t>(block.size())) {
+    block.resize(static_cast<std::size_t>(
+        std::min<std::int64_t>(static_cast<std::int64_t>(block.size()), count - first)));
+    source.read(first, static_cast<std::int64_t>(block.size()), block.data());
+    samples.append(block);
   }
-  volume.grid.origin = header.origin;
+  Volume volume = samples.take();
   volume.grid.spacing = header.spacing;
+  volume.grid.origin = header.origin;
   if (!header.unit.empty()) volume.grid.unit = header.unit;
-  const std::uint64_t bytes = io::checked_bytes(header.samples, sizeof(float), path.string());
-  io::require_memory(bytes, max_memory_bytes, path.string());
-  volume.samples.resize(bytes / sizeof(float));
-  std::vector<double> block(
-      static_cast<std::size_t>(std::min<std::int64_t>(1 << 20, volume.grid.sample_count())));
-  for (std::size_t first = 0; first < volume.samples.size(); first += block.size()) {
-    const std::size_t n = std::min(block.size(), volume.samples.size() - first);
-    source.read(static_cast<std::int64_t>(first), static_cast<std::int64_t>(n), block.data());
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto value = static_cast<float>(block[i]);
-      if (!std::isfinite(value))
-        throw FileError(
-            fmt::format("{}: sample {} is {}, not a finite float", path.string(), first + i, block[i]));
-      volume.samples[first + i] = value;
-    }
+  if (!header.axes.are_plain()) {
+    // The samples once more, in their new order.
+    io::require_memory(2 * volume.samples.size() * sizeof(float), max_memory_bytes, path.string());
+    volume = along_axes(volume, header.axes);
   }
   return volume;
 }

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
 
 #include "host/hdf5/hdf5_reader.hpp"
 #include "host/io/natural_order.hpp"
+#include "host/io/number_text.hpp"
 #include "host/io/tiff.hpp"
+#include "host/io/volume_samples.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
 #include "vdvr/error.hpp"
@@ -26,32 +26,6 @@ std::string lower_extension(const fs::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
-}
-
-/// Sizes memory for `samples` (x, y, z) on a grid of one pixel's spacing.
-Volume empty_volume(const std::string& name, const std::array<std::int64_t, 3>& samples,
-                    std::uint64_t max_memory_bytes) {
-  Volume volume;
-  for (std::size_t a = 0; a < 3; ++a) {
-    // One sample bounds no cell, so there is nothing to interpolate in.
-    if (samples[a] < 2)
-      throw FileError(fmt::format("{}: {} samples (x, y, z), but each axis needs at least two", name,
-                                  io::shape_text(samples)));
-    volume.grid.cells[a] = samples[a] - 1;
-  }
-  const std::uint64_t bytes = io::checked_bytes(samples, sizeof(float), name);
-  io::require_memory(bytes, max_memory_bytes, name);
-  volume.samples.reserve(bytes / sizeof(float));
-  return volume;
-}
-
-void append_samples(const std::string& name, Volume& volume, const std::vector<double>& samples) {
-  for (const double s : samples) {
-    const auto value = static_cast<float>(s);
-    if (!std::isfinite(value))
-      throw FileError(fmt::format("{}: sample {} is {}, not a finite float", name, volume.samples.size(), s));
-    volume.samples.push_back(value);
-  }
 }
 
 // --- HDF5 ---
@@ -94,77 +68,60 @@ std::vector<fs::path> tiff_files(const fs::path& folder) {
   return files;
 }
 
-/// "key=value" of ImageJ's description, which has one a line.
-std::string imagej_value(const std::string& description, const std::string& key) {
-  std::istringstream lines(description);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.rfind(key + "=", 0) == 0) return line.substr(key.size() + 1);
-  }
-  return "";
+/// A number of ImageJ's description; nothing where there is none.
+std::optional<double> imagej_number(const io::TiffStack& stack, const std::string& key) {
+  return io::number_of(io::imagej_value(stack.description, key));
 }
 
-void read_imagej_grid(const std::string& name, const io::TiffStack& stack, Grid& grid) {
+void read_imagej_grid(const io::TiffStack& stack, Grid& grid) {
   if (stack.description.rfind("ImageJ=", 0) != 0) return;
-  // Beyond 4 GiB ImageJ writes one image and appends the others without a directory.
-  const std::string images = imagej_value(stack.description, "images");
-  if (!images.empty() && images != std::to_string(stack.images))
-    throw FileError(fmt::format("{}: ImageJ wrote {} images, {} are listed; save it as a folder of slices",
-                                name, images, stack.images));
   const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
   if (positive(stack.pixels_per_unit_x)) grid.spacing[0] = 1 / stack.pixels_per_unit_x;
   if (positive(stack.pixels_per_unit_y)) grid.spacing[1] = 1 / stack.pixels_per_unit_y;
-  if (const double z = std::strtod(imagej_value(stack.description, "spacing").c_str(), nullptr); positive(z))
-    grid.spacing[2] = z;
-  if (const std::string unit = imagej_value(stack.description, "unit"); !unit.empty()) grid.unit = unit;
+  if (const auto z = imagej_number(stack, "spacing"); z && *z > 0) grid.spacing[2] = *z;
+  // ImageJ's origin is the pixel that lies at zero.
+  constexpr std::array<const char*, 3> origins{"xorigin", "yorigin", "zorigin"};
+  for (std::size_t a = 0; a < 3; ++a)
+    if (const auto pixel = imagej_number(stack, origins[a]); pixel && *pixel != 0)
+      grid.origin[a] = -*pixel * grid.spacing[a];
+  if (const std::string unit = io::imagej_value(stack.description, "unit"); !unit.empty()) grid.unit = unit;
 }
 
-void check_slice(const std::string& name, const Grid& grid, const io::TiffImage& image) {
-  if (image.columns != grid.cells[0] + 1 || image.rows != grid.cells[1] + 1)
-    throw FileError(fmt::format("{}: has {} x {} pixels, the first slice has {} x {}", name, image.columns,
-                                image.rows, grid.cells[0] + 1, grid.cells[1] + 1));
-}
-
-Volume read_tiff_folder(const fs::path& folder, std::uint64_t max_memory_bytes) {
-  const auto files = tiff_files(folder);
-  Volume volume;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const io::TiffImage image = io::read_tiff(files[i], max_memory_bytes);
-    if (i == 0)
-      volume =
-          empty_volume(folder.string(), {image.columns, image.rows, static_cast<std::int64_t>(files.size())},
-                       max_memory_bytes);
-    check_slice(files[i].string(), volume.grid, image);
-    append_samples(files[i].string(), volume, image.samples);
+Volume read_slices(const fs::path& path, std::vector<fs::path> files, const VolumeLimits& limits) {
+  io::TiffSeries series(std::move(files), limits.max_memory_bytes);
+  const io::TiffStack& s = series.stack();
+  io::VolumeSamples volume(path.string(), {s.columns, s.rows, s.images}, limits.max_memory_bytes,
+                           limits.nan_as);
+  read_imagej_grid(s, volume.grid());
+  std::vector<double> slice(static_cast<std::size_t>(s.rows * s.columns));
+  for (std::int64_t z = 0; z < s.images; ++z) {
+    series.read(z, slice.data());
+    volume.append(slice);
   }
-  return volume;
+  return volume.take();
 }
 
-Volume read_tiff_pages(const fs::path& path, std::uint64_t max_memory_bytes) {
-  Volume volume;
-  io::TiffStack stack;
-  io::read_tiff_stack(
-      path, max_memory_bytes, [&](const io::TiffStack& s) { stack = s; },
-      [&](std::int64_t index, const io::TiffImage& image) {
-        if (index == 0) {
-          volume = empty_volume(path.string(), {image.columns, image.rows, stack.images}, max_memory_bytes);
-          read_imagej_grid(path.string(), stack, volume.grid);
-        }
-        check_slice(fmt::format("{}, image {}", path.string(), index), volume.grid, image);
-        append_samples(path.string(), volume, image.samples);
-      });
-  return volume;
+/// What integers stand for, where they are an export's: value = offset + scale * integer.
+std::pair<double, double> read_hdf5_scale(const io::hdf5::Reader& file, const std::string& dataset,
+                                          const std::string& name) {
+  const auto scale = file.find_reals(dataset, "scale", 1), offset = file.find_reals(dataset, "offset", 1);
+  if (!scale || !offset) return {1, 0};
+  if (!std::isfinite(scale->front()) || !std::isfinite(offset->front()) || scale->front() == 0)
+    throw FileError(fmt::format("{}: scale {} and offset {}; both must be finite, the scale not 0", name,
+                                scale->front(), offset->front()));
+  return {scale->front(), offset->front()};
 }
 
-Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
+Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, const VolumeLimits& limits) {
   const io::hdf5::Reader file(path, io::hdf5::Links::within_folder);
   io::hdf5::Dataset data = file.numeric_dataset(dataset);
   data.may_be_sparse = true;
   const auto shape = data.extents();
   if (shape.size() != 3)
     throw FileError(fmt::format("{}: has {} axes; a volume has three (z, y, x)", data.name, shape.size()));
-  Volume volume = empty_volume(data.name, {shape[2], shape[1], shape[0]}, max_memory_bytes);
-  read_hdf5_grid(file, dataset, data.name, volume.grid);
+  io::VolumeSamples volume(data.name, {shape[2], shape[1], shape[0]}, limits.max_memory_bytes, limits.nan_as);
+  read_hdf5_grid(file, dataset, data.name, volume.grid());
+  const auto [scale, offset] = read_hdf5_scale(file, dataset, data.name);
   const std::array<std::int64_t, 2> plane{shape[1], shape[2]};
   const std::uint64_t plane_bytes = io::checked_bytes(plane, sizeof(double), data.name);
   // Slabs, so that a compressed chunk many slices deep is not inflated once a slice.
@@ -172,16 +129,18 @@ Volume read_hdf5_dataset(const fs::path& path, const std::string& dataset, std::
       std::clamp<std::int64_t>(static_cast<std::int64_t>(kSlabBytes / plane_bytes), 1, shape[0]);
   const std::array<std::int64_t, 3> slab_shape{depth, shape[1], shape[2]};
   const std::uint64_t bytes = io::checked_bytes(slab_shape, sizeof(double), data.name);
-  io::require_memory(bytes, max_memory_bytes, data.name);
+  io::require_memory(bytes, limits.max_memory_bytes, data.name);
   std::vector<double> slab(bytes / sizeof(double));
   for (std::int64_t z = 0; z < shape[0]; z += depth) {
     const std::array<std::int64_t, 3> start{z, 0, 0},
         count{std::min(depth, shape[0] - z), shape[1], shape[2]};
     slab.resize(static_cast<std::size_t>(count[0] * count[1] * count[2]));
     data.read(start, count, slab.data());
-    append_samples(data.name, volume, slab);
+    if (scale != 1 || offset != 0)
+      for (double& value : slab) value = offset + scale * value;
+    volume.append(slab);
   }
-  return volume;
+  return volume.take();
 }
 
 }  // namespace
@@ -209,15 +168,15 @@ bool is_tiff_folder(const fs::path& path) {
   return fs::is_directory(path, error) && !fs::exists(path / "scan.json", error) && !tiff_files(path).empty();
 }
 
-Volume read_hdf5_volume(const fs::path& path, const std::string& dataset, std::uint64_t max_memory_bytes) {
-  io::rehearse(path, max_memory_bytes,
-               [&] { static_cast<void>(read_hdf5_dataset(path, dataset, max_memory_bytes)); });
-  return read_hdf5_dataset(path, dataset, max_memory_bytes);
+Volume read_hdf5_volume(const fs::path& path, const std::string& dataset, const VolumeLimits& limits) {
+  io::rehearse(path, limits.max_memory_bytes,
+               [&] { static_cast<void>(read_hdf5_dataset(path, dataset, limits)); });
+  return read_hdf5_dataset(path, dataset, limits);
 }
 
-Volume read_tiff_volume(const fs::path& path, std::uint64_t max_memory_bytes) {
-  return is_tiff_path(path) && !is_tiff_folder(path) ? read_tiff_pages(path, max_memory_bytes)
-                                                     : read_tiff_folder(path, max_memory_bytes);
+Volume read_tiff_volume(const fs::path& path, const VolumeLimits& limits) {
+  const bool is_folder = is_tiff_folder(path);
+  return read_slices(path, is_folder ? tiff_files(path) : std::vector{path}, limits);
 }
 
 }  // namespace vdvr

@@ -133,7 +133,10 @@ void State::take_host(std::uint64_t bytes, const std::string& what) {
 }
 
 void State::keep_pace(cl::Event latest) {
-  if (!info.is_cpu) return;
+  // The CPU is busy with one kernel. A GPU must not run dry while the host prepares the next: there every
+  // eighth is waited for, when eight more are enqueued.
+  static std::atomic<unsigned> launched{0};
+  if (!info.is_cpu && ++launched % 8 != 0) return;
   cl::Event before;
   {
     const std::lock_guard guard(pace_lock_);
@@ -147,15 +150,27 @@ void State::keep_pace(cl::Event latest) {
 
 namespace {
 
-using Found = std::vector<std::pair<cl::Device, DeviceInfo>>;
+struct FoundDevice {
+  cl::Device device;
+  DeviceInfo info;
+  std::string trouble;  // a call that failed while it was described; empty where none did
+};
+using Found = std::vector<FoundDevice>;
 
-bool has_linear_image(const cl::Device& device, cl_channel_type type) {
+// Which 3D images can be read with the linear filter. Opens a context, and so is asked of few.
+void ask_image_formats(const cl::Device& device, DeviceInfo& d) {
+  if (!d.images) return;
   const cl::Context context(device);
   std::vector<cl::ImageFormat> formats;
   context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
-  return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
-    return f.image_channel_order == CL_R && f.image_channel_data_type == type;
-  });
+  const auto has = [&](cl_channel_type type) {
+    return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
+      return f.image_channel_order == CL_R && f.image_channel_data_type == type;
+    });
+  };
+  d.linear_float_image = has(CL_FLOAT);
+  d.linear_u16_image = has(CL_UNORM_INT16);
+  d.linear_u8_image = has(CL_UNORM_INT8);
 }
 
 std::string trimmed(std::string s) {
@@ -163,9 +178,8 @@ std::string trimmed(std::string s) {
   return s;
 }
 
-DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int index) {
-  DeviceInfo d;
-  d.index = index;
+// What is known before a call fails stays.
+void describe(const cl::Platform& platform, const cl::Device& device, DeviceInfo& d) {
   d.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
   d.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
   d.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
@@ -185,13 +199,10 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int 
     d.image3d_max[0] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_WIDTH>();
     d.image3d_max[1] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_HEIGHT>();
     d.image3d_max[2] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_DEPTH>();
-    d.linear_float_image = has_linear_image(device, CL_FLOAT);
-    d.linear_u16_image = has_linear_image(device, CL_UNORM_INT16);
-    d.linear_u8_image = has_linear_image(device, CL_UNORM_INT8);
   }
-  return d;
 }
 
+// A platform or a device that fails a call ends nobody's work: it keeps its number, with its trouble.
 Found enumerate() {
   Found found;
   std::vector<cl::Platform> platforms;
@@ -208,8 +219,16 @@ Found enumerate() {
       continue;
     }
     for (const auto& device : devices) {
-      if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
-      found.emplace_back(device, describe(platform, device, static_cast<int>(found.size())));
+      FoundDevice one{device, {}, ""};
+      one.info.index = static_cast<int>(found.size());
+      try {
+        if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
+        describe(platform, device, one.info);
+      } catch (const cl::Error& e) {
+        one.trouble = fmt::format("{}: {}", e.what(), opencl::code_name(e.err()));
+        if (one.info.name.empty()) one.info.name = "a device without a name";
+      }
+      found.push_back(std::move(one));
     }
   }
   return found;
@@ -235,38 +254,52 @@ bool matches(const DeviceInfo& d, const std::string& selector) {
 
 std::vector<DeviceInfo> Device::list() {
   std::vector<DeviceInfo> infos;
-  for (const auto& [device, info] : enumerate()) infos.push_back(info);
+  for (FoundDevice& found : enumerate()) {
+    if (!found.trouble.empty()) continue;
+    try {
+      ask_image_formats(found.device, found.info);
+    } catch (const cl::Error&) {
+      continue;  // whoever opens it is told
+    }
+    infos.push_back(found.info);
+  }
   return infos;
 }
 
 Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
     : state_(std::make_shared<opencl::State>()) {
-  const Found found = enumerate();
-  if (found.empty()) {
+  Found found = enumerate();
+  if (found.empty())
     throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
-  }
   auto chosen = found.end();
   if (selector.empty()) {
-    chosen = std::find_if(found.begin(), found.end(), [](const auto& f) { return f.second.is_gpu; });
+    const auto is_well = [](const FoundDevice& f) { return f.trouble.empty(); };
+    chosen = std::find_if(found.begin(), found.end(),
+                          [&](const FoundDevice& f) { return is_well(f) && f.info.is_gpu; });
+    if (chosen == found.end()) chosen = std::find_if(found.begin(), found.end(), is_well);
     if (chosen == found.end()) chosen = found.begin();
   } else {
-    chosen =
-        std::find_if(found.begin(), found.end(), [&](const auto& f) { return matches(f.second, selector); });
+    chosen = std::find_if(found.begin(), found.end(),
+                          [&](const FoundDevice& f) { return matches(f.info, selector); });
   }
   if (chosen == found.end()) {
     std::string names;
-    for (const auto& [device, info] : found)
-      names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
+    for (const FoundDevice& f : found)
+      names += fmt::format("\n  {}: {} ({})", f.info.index, f.info.name, f.info.platform);
     throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
   }
+  if (!chosen->trouble.empty())
+    throw DeviceError(fmt::format("device {}, '{}', cannot be used: {}; choose another `device`",
+                                  chosen->info.index, chosen->info.name, chosen->trouble));
   try {
-    state_->device = chosen->first;
-    state_->info = chosen->second;
+    ask_image_formats(chosen->device, chosen->info);
+    state_->device = chosen->device;
+    state_->info = chosen->info;
     state_->context = cl::Context(state_->device);
     state_->queue = cl::CommandQueue(state_->context, state_->device);
   } catch (const cl::Error& e) {
     throw DeviceError(
-        fmt::format("cannot open '{}': {} {}", chosen->second.name, e.what(), opencl::code_name(e.err())));
+        fmt::format("cannot open '{}': {} {}", chosen->info.name, e.what(), opencl::code_name(e.err())));
   }
   const std::uint64_t device_memory = state_->info.global_memory;
   state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));

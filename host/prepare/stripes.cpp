@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "host/prepare/view_filters.hpp"
@@ -87,6 +88,47 @@ std::vector<double> unrest(const Sinogram& s) {
   return sum;
 }
 
+// Whether at least half of a column's unrest are errors that differ from view to view: of such of mean
+// magnitude m, second differences have sqrt(6) m. What moves on from view to view has next to none.
+std::vector<bool> mostly_noise(const Sinogram& s, const std::vector<double>& own) {
+  std::vector<double> sum(at(s.columns), 0.0);
+  for (std::int64_t k = 0; k < s.views; ++k) {
+    const double *before = s.row(mirrored(k - 1, s.views)), *after = s.row(mirrored(k + 1, s.views)),
+                 *row = s.row(k);
+    for (std::int64_t c = 0; c < s.columns; ++c)
+      sum[at(c)] += std::abs(before[c] - 2 * row[c] + after[c]) / std::sqrt(6.0);
+  }
+  std::vector<bool> noisy(at(s.columns));
+  for (std::size_t c = 0; c < noisy.size(); ++c) noisy[c] = sum[c] > 0 && 2 * sum[c] >= own[c];
+  return noisy;
+}
+
+// Of the columns found those in runs, up to half of `window` wide, that end abruptly on both sides: dead ones
+// at a quarter of their neighbours, fluctuating ones at twice these, and at least half of it by errors that
+// differ from view to view. The limb of an object rises on one side only, or moves on from view to view.
+std::vector<bool> ending_abruptly(const std::vector<bool>& found, const std::vector<double>& own,
+                                  const Sinogram& s, int window) {
+  const std::vector<bool> noisy = mostly_noise(s, own);
+  const std::size_t n = own.size(), widest = static_cast<std::size_t>(window / 2);
+  std::vector<bool> stripe(n, false);
+  for (std::size_t first = 0; first < n; ++first)
+    for (std::size_t last = first; last < n && found[last] && last - first < widest; ++last) {
+      std::vector<double> beside;
+      if (first > 0) beside.push_back(own[first - 1]);
+      if (last + 1 < n) beside.push_back(own[last + 1]);
+      if (beside.empty()) continue;
+      const auto [low, high] = std::minmax_element(beside.begin(), beside.end());
+      bool dead = true, fluctuating = true;
+      for (std::size_t c = first; c <= last; ++c) {
+        dead = dead && 4 * own[c] <= *low;
+        fluctuating = fluctuating && own[c] >= 2 * *high && noisy[c];
+      }
+      if (dead || fluctuating)
+        for (std::size_t c = first; c <= last; ++c) stripe[c] = true;
+    }
+  return stripe;
+}
+
 void interpolate_columns(Sinogram& s, const std::vector<bool>& bad) {
   for (std::int64_t c = 0; c < s.columns; ++c) {
     if (!bad[at(c)]) continue;
@@ -101,6 +143,23 @@ void interpolate_columns(Sinogram& s, const std::vector<bool>& bad) {
       row[c] = (1 - share) * row[left] + share * row[right];
     }
   }
+}
+
+// One offset that values share: their median, if their middle half lies within half of it; else 0.
+double shared_offset(std::vector<double>& values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  const double middle = values[n / 2];
+  return values[n - 1 - n / 4] - values[n / 4] < std::abs(middle) ? middle : 0;
+}
+
+// By how much column c lies above its two neighbours, in most views.
+double median_above_neighbours(const Sinogram& s, std::int64_t c, std::vector<double>& values) {
+  for (std::int64_t k = 0; k < s.views; ++k)
+    values[at(k)] =
+        s.row(k)[c] - 0.5 * (s.row(k)[mirrored(c - 1, s.columns)] + s.row(k)[mirrored(c + 1, s.columns)]);
+  std::nth_element(values.begin(), values.begin() + s.views / 2, values.end());
+  return values[at(s.views / 2)];
 }
 
 // Means of consecutive views: bin b of n those from b views / n.
@@ -136,7 +195,7 @@ Sinogram lasting_differences(const Sinogram& binned, int window) {
 
 }  // namespace
 
-std::vector<bool> outstanding(const std::vector<double>& values, double ratio, double scale) {
+std::vector<bool> outstanding(const std::vector<double>& values, double ratio, double least_rise) {
   const std::size_t n = values.size();
   std::vector<bool> mask(n, false);
   if (n < 8) return mask;
@@ -154,7 +213,7 @@ std::vector<bool> outstanding(const std::vector<double>& values, double ratio, d
   }
   const double slope = xy / xx, low = mean_y - slope * mean_x,
                high = mean_y + slope * (static_cast<double>(n - 1) - mean_x),
-               noise = std::max(high - low, 1e-6 * scale);
+               noise = std::max(high - low, least_rise);
   if (!(noise > 0)) return mask;
   const bool above = sorted.back() - high >= ratio * noise, below = low - sorted.front() >= ratio * noise;
   // Half the distance from there on: what belongs to a stripe that was found need not stand out alone.
@@ -166,13 +225,18 @@ std::vector<bool> outstanding(const std::vector<double>& values, double ratio, d
 
 std::int64_t remove_dead_stripes(Sinogram& s, double ratio, int window) {
   const std::vector<double> own = unrest(s), around = median_along(own.data(), s.columns, window);
-  // As a logarithm (the paper: the quotient): a dead column is as far from 1 as a fluctuating one.
+  // As a logarithm (the paper: the quotient): a dead column is as far from 1 as a fluctuating one. What is
+  // within the rounding of the largest value is no unrest: of noise-free data beside the object both are 0.
   constexpr double least = 1e-3;
+  const double rounding = 1e-6 * largest_magnitude(s) * static_cast<double>(s.views);
   std::vector<double> share(own.size(), 0.0);
   for (std::size_t c = 0; c < own.size(); ++c)
-    if (around[c] > 0) share[c] = std::log(std::max(own[c] / around[c], least));
-  const std::vector<bool> found = outstanding(share, ratio, 1);
-  std::vector<bool> bad = widened(found);
+    if (around[c] > rounding) share[c] = std::log(std::max(own[c] / around[c], least));
+  // The middle half of normal numbers of deviation d is a line that rises by 2.7 d, and the mean magnitude of
+  // n errors has a deviation of sqrt(pi / 2 - 1) / sqrt(n): columns of pure noise differ by that.
+  const double chance = 2.7 * std::sqrt((0.5 * std::numbers::pi - 1) / static_cast<double>(s.views));
+  const std::vector<bool> found = ending_abruptly(outstanding(share, ratio, chance), own, s, window),
+                          bad = widened(found);
   if (std::find(bad.begin(), bad.end(), false) == bad.end()) return 0;
   interpolate_columns(s, bad);
   return std::count(found.begin(), found.end(), true);
@@ -186,7 +250,7 @@ std::int64_t remove_lasting_stripes(Sinogram& s, double ratio, int window) {
   for (std::int64_t b = 0; b < bins; ++b)
     for (std::int64_t c = 0; c < s.columns; ++c)
       most[at(c)] = std::max(most[at(c)], std::abs(lasting.row(b)[c]));
-  const std::vector<bool> found = outstanding(most, ratio, largest_magnitude(s)), bad = widened(found);
+  const std::vector<bool> found = outstanding(most, ratio, 1e-6 * largest_magnitude(s)), bad = widened(found);
   for (std::int64_t k = 0; k < s.views; ++k) {
     const std::int64_t b = std::min(bins - 1, k * bins / s.views);
     for (std::int64_t c = 0; c < s.columns; ++c)
@@ -198,7 +262,17 @@ std::int64_t remove_lasting_stripes(Sinogram& s, double ratio, int window) {
 void remove_small_stripes(Sinogram& s, int window) {
   const Sorted sorted = sorted_columns(s);
   const Sinogram smooth = smoothed_ranks(sorted.ranks, window);
-  for (std::int64_t c = 0; c < s.columns; ++c) put_back(s, sorted, smooth, c);
+  std::vector<double> values(at(s.views));
+  // In noise all columns; else what is left of clean ones would be the difference between an object's ranks.
+  std::vector<bool> stripe = mostly_noise(s, unrest(s));
+  for (std::int64_t c = 0; c < s.columns; ++c) {
+    for (std::int64_t r = 0; r < s.views; ++r) values[at(r)] = sorted.ranks.row(r)[c] - smooth.row(r)[c];
+    const double offset = shared_offset(values);
+    if (!stripe[at(c)] && offset != 0)
+      stripe[at(c)] = 2 * median_above_neighbours(s, c, values) / offset >= 1;
+  }
+  for (std::int64_t c = 0; c < s.columns; ++c)
+    if (stripe[at(c)]) put_back(s, sorted, smooth, c);
 }
 
 }  // namespace vdvr

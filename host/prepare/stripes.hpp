@@ -20,8 +20,8 @@ struct Sinogram {
 
 /// Columns whose value stands out (algorithm 4): sorted, the values' middle half is a line; its rise is the
 /// noise, and what lies beyond its ends by more than `ratio` times that is marked. At least 8 values, or none
-/// is. `scale`: a rise below 1e-6 of it counts as that.
-std::vector<bool> outstanding(const std::vector<double>& values, double ratio, double scale);
+/// is. A rise below `least_rise` counts as that.
+std::vector<bool> outstanding(const std::vector<double>& values, double ratio, double least_rise);
 /// Dead and fluctuating columns (algorithm 6), between their nearest sound neighbours afterwards. Returns how
 /// many there were.
 std::int64_t remove_dead_stripes(Sinogram& sinogram, double ratio, int window);

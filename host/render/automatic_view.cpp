@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <unordered_map>
+#include <utility>
 
 #include "vdvr/error.hpp"
 #include "vdvr/framing.hpp"
@@ -48,7 +50,9 @@ std::size_t quantile_bin(const Histogram& histogram, double q) {
   return bin;
 }
 
-Vec3 centroid_above(const Grid& grid, const std::vector<float>& base, double threshold) {
+/// Of the samples for which `counts` is true.
+template <class Counts>
+Vec3 centroid_of(const Grid& grid, const std::vector<float>& base, Counts&& counts) {
   const Index3 n = grid.samples();
   std::array<double, 3> sum{};
   double count = 0;
@@ -56,7 +60,7 @@ Vec3 centroid_above(const Grid& grid, const std::vector<float>& base, double thr
   for (std::int64_t z = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
       for (std::int64_t x = 0; x < n[0]; ++x, ++i) {
-        if (!(static_cast<double>(base[i]) >= threshold)) continue;
+        if (!counts(static_cast<double>(base[i]))) continue;
         const Vec3 p = grid.position({x, y, z});
         for (std::size_t a = 0; a < 3; ++a) sum[a] += p[a];
         count += 1;
@@ -65,33 +69,165 @@ Vec3 centroid_above(const Grid& grid, const std::vector<float>& base, double thr
   return {sum[0] / count, sum[1] / count, sum[2] / count};
 }
 
+// --- masks and label maps ---
+
+/// The value that most samples of the grid's faces have: what lies around the object, where many have one.
+float commonest_on_faces(const Grid& grid, const std::vector<float>& base) {
+  const Index3 n = grid.samples();
+  std::unordered_map<float, std::int64_t> count;
+  std::pair<std::int64_t, float> most{0, 0.0f};
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y) {
+      // Of rows within the volume the ends alone.
+      const bool on_face = z == 0 || z == n[2] - 1 || y == 0 || y == n[1] - 1;
+      for (std::int64_t x = 0; x < n[0]; x += on_face ? 1 : n[0] - 1) {
+        const float value = base[static_cast<std::size_t>((z * n[1] + y) * n[0] + x)];
+        // What is 0 with either sign is one value.
+        most = std::max(most, std::pair{++count[value == 0.0f ? 0.0f : value], value});
+      }
+    }
+  return most.second;
+}
+
+/// Whether most neighbours along x that are not `background` have equal values. Measured and reconstructed
+/// densities differ from sample to sample; labels do not.
+bool holds_labels(const Grid& grid, const std::vector<float>& base, float background) {
+  const std::size_t row = static_cast<std::size_t>(grid.samples()[0]);
+  std::int64_t pairs = 0, equal = 0, alone = 0;
+  for (std::size_t first = 0; first < base.size(); first += row)
+    for (std::size_t i = first; i + 1 < first + row; ++i) {
+      const bool here = base[i] != background, next = base[i + 1] != background;
+      pairs += here && next;
+      equal += here && next && base[i] == base[i + 1];
+      alone += here != next;
+    }
+  // Specks of a sample have no such neighbours.
+  return pairs > 0 ? 2 * equal > pairs : alone > 0;
+}
+
+struct Values {
+  double least, largest;  ///< of all samples
+};
+
+/// Labels around which lies `background`: all of them show, parted where they part.
+Brightness brightness_of_labels(const Grid& grid, const std::vector<float>& base, const Values& all,
+                                double background) {
+  std::int64_t above = 0, below = 0;
+  for (const float s : base) {
+    above += static_cast<double>(s) > background;
+    below += static_cast<double>(s) < background;
+  }
+  // Seen from the background the object's values grow; below it they are mirrored.
+  const double sign = below > above ? -1 : 1;
+  const double from = sign * background, to = sign > 0 ? all.largest : -all.least;
+  Histogram histogram{};
+  std::array<Values, kBins> bins{};
+  double faintest = to;
+  const double scale = (kBins - 1) / (to - from);
+  for (const float s : base) {
+    const double value = sign * static_cast<double>(s);
+    if (!(value > from)) continue;
+    const auto bin = static_cast<std::size_t>((value - from) * scale);
+    Values& range = bins[bin];
+    range = histogram[bin] == 0 ? Values{value, value}
+                                : Values{std::min(range.least, value), std::max(range.largest, value)};
+    histogram[bin] += 1;
+    faintest = std::min(faintest, value);
+  }
+  const double soft = 0.5 * (from + faintest);
+  double threshold = soft;
+  if (faintest < to) {
+    const std::size_t split = otsu_bin(histogram, kBins);
+    double low = faintest, high = to;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      if (histogram[i] == 0) continue;
+      if (i <= split) low = std::max(low, bins[i].largest);
+      else high = std::min(high, bins[i].least);
+    }
+    threshold = 0.5 * (low + high);
+  }
+  Brightness b{std::min(sign * from, sign * to), std::max(sign * from, sign * to)};
+  b.grey_lo = all.least;
+  b.grey_hi = all.largest;
+  b.threshold = sign * threshold;
+  b.soft = sign * soft;
+  b.dense_is_low = sign < 0;
+  b.dense_center = centroid_of(grid, base, [&](double value) { return sign * value >= threshold; });
+  return b;
+}
+
+// --- densities ---
+
+constexpr double kLeastQuantile = 0.005, kMostQuantile = 0.999;
+
+struct Bulk {
+  Histogram histogram{};
+  double from = 0, scale = 1;
+  [[nodiscard]] double value(std::size_t bin) const {
+    return from + (static_cast<double>(bin) + 0.5) / scale;
+  }
+};
+
+/// Bins over all values; over those of the bulk where a few outliers leave it a handful of bins. What lies
+/// beyond is counted in the outermost.
+Bulk bulk_of(const std::vector<float>& base, Values range) {
+  constexpr std::size_t least_bins = 16;
+  constexpr int most_rounds = 8;  // each narrows the range by 50 at least, so float has no more
+  for (int round = 1;; ++round) {
+    Bulk bulk{{}, range.least, (kBins - 1) / (range.largest - range.least)};
+    // Exact zeros are what was not covered, not part of the picture.
+    for (const float s : base)
+      if (s != 0.0f)
+        bulk.histogram[static_cast<std::size_t>(std::clamp(
+            (static_cast<double>(s) - range.least) * bulk.scale, 0.0, static_cast<double>(kBins - 1)))] += 1;
+    const std::size_t first = quantile_bin(bulk.histogram, kLeastQuantile),
+                      last = quantile_bin(bulk.histogram, kMostQuantile);
+    const Values narrow{range.least + static_cast<double>(first) / bulk.scale,
+                        range.least + static_cast<double>(last + 1) / bulk.scale};
+    const bool is_narrow = last - first < least_bins;
+    if (!is_narrow || round == most_rounds || !(narrow.largest > narrow.least)) return bulk;
+    range = narrow;
+  }
+}
+
 }  // namespace
 
 Brightness brightness_of(const MixedVolume& volume) {
   const std::vector<float> base = on_grid(volume).samples;
   const auto [least, largest] = std::minmax_element(base.begin(), base.end());
-  const double lo = static_cast<double>(*least), hi = static_cast<double>(*largest);
+  const Values all{static_cast<double>(*least), static_cast<double>(*largest)};
+  const double lo = all.least, hi = all.largest;
   Brightness b{lo, hi, lo, hi, 0.5 * (lo + hi), lo, {}};
   if (hi > lo) {
-    // Exact zeros are what was not covered, not part of the picture.
-    Histogram histogram{};
-    const double scale = (kBins - 1) / (hi - lo);
-    for (const float s : base)
-      if (s != 0.0f) histogram[static_cast<std::size_t>((static_cast<double>(s) - lo) * scale)] += 1;
-    const auto value = [&](std::size_t bin) { return lo + (static_cast<double>(bin) + 0.5) / scale; };
-    const std::size_t dense = otsu_bin(histogram, kBins);
-    b.threshold = value(dense);
-    b.soft = value(otsu_bin(histogram, dense + 1));
-    b.lo = b.grey_lo = value(quantile_bin(histogram, 0.005));
-    b.hi = std::max(value(quantile_bin(histogram, 0.999)), b.threshold);
-    b.grey_hi = std::max(value(quantile_bin(histogram, 0.99)), b.soft);
+    const float background = commonest_on_faces(volume.grid, base);
+    if (holds_labels(volume.grid, base, background))
+      return brightness_of_labels(volume.grid, base, all, static_cast<double>(background));
+    const Bulk bulk = bulk_of(base, all);
+    const std::size_t dense = otsu_bin(bulk.histogram, kBins);
+    b.threshold = bulk.value(dense);
+    b.soft = bulk.value(otsu_bin(bulk.histogram, dense + 1));
+    b.lo = b.grey_lo = bulk.value(quantile_bin(bulk.histogram, kLeastQuantile));
+    b.hi = std::max(bulk.value(quantile_bin(bulk.histogram, kMostQuantile)), b.threshold);
+    b.grey_hi = std::max(bulk.value(quantile_bin(bulk.histogram, 0.99)), b.soft);
     if (!(b.grey_hi > b.grey_lo)) b.grey_hi = hi;
+    // A bin is wider than what lies in it.
+    b.lo = std::min(b.lo, b.soft);
+    b.grey_lo = std::min(b.grey_lo, b.grey_hi);
   }
-  b.dense_center = centroid_above(volume.grid, base, b.threshold);
+  b.dense_center = centroid_of(volume.grid, base, [&](double value) { return value >= b.threshold; });
   return b;
 }
 
 TransferFunction two_material_transfer(const Brightness& b) {
+  if (b.dense_is_low) {
+    Brightness mirrored{-b.hi, -b.lo};
+    mirrored.threshold = -b.threshold;
+    mirrored.soft = -b.soft;
+    TransferFunction f = two_material_transfer(mirrored);
+    for (TransferPoint& p : f.points) p.value = -p.value;
+    std::reverse(f.points.begin(), f.points.end());
+    return f;
+  }
   const double veil = b.threshold - b.soft, dense = b.hi - b.threshold;
   return {"two materials",
           {{b.lo, {0.30, 0.50, 0.70}, 0},

@@ -43,6 +43,12 @@ RawScan open_raster_stack(const std::filesystem::path& path, std::uint64_t max_m
   RawScan scan;
   const auto samples = std::make_shared<RasterSamples>(read_raster_header(path), max_memory_bytes);
   const RasterHeader& header = samples->header();
+  if (!header.axes.are_plain())
+    throw FileError(
+        path.string() +
+        ": its axes are turned or mirrored, which a stack of projections cannot be; write it "
+        "with its columns "
+        "projections cannot be; write columns first, rows second and views third, without directions");
   scan.format = header.format;
   scan.columns = header.samples[0];
   scan.rows = header.samples[1];

@@ -34,30 +34,33 @@ std::set<std::string> known_members() {
   return known;
 }
 
-// TIFF files as frames, all of one size.
-Frames tiff_frames(const fs::path& folder, const std::vector<std::string>& names, const RawScan& scan) {
-  const std::int64_t rows = scan.rows, columns = scan.columns;
+// TIFF files, of one image or several each, as frames of the scan's size.
+Frames tiff_frames(const Description& about, const std::vector<std::string>& names, const RawScan& scan,
+                   const std::shared_ptr<TiffSeries>& series) {
+  const TiffStack& stack = series->stack();
+  if (stack.rows != scan.rows || stack.columns != scan.columns)
+    throw FileError(fmt::format("{}: {} rows x {} columns, but the first projection has {} x {}",
+                                (about.folder() / names.front()).string(), stack.rows, stack.columns,
+                                scan.rows, scan.columns));
   Frames frames;
-  frames.count = static_cast<std::int64_t>(names.size());
-  const auto list = std::make_shared<const std::vector<std::string>>(names);
-  frames.name = [folder, list](std::int64_t k) {
-    return (folder / (*list)[static_cast<std::size_t>(k)]).string();
-  };
-  frames.read = [folder, list, rows, columns](std::int64_t first, std::int64_t n, double* out) {
-    for (std::int64_t k = 0; k < n; ++k) {
-      const fs::path path = folder / (*list)[static_cast<std::size_t>(first + k)];
-      const TiffImage image = read_tiff(path);
-      if (image.rows != rows || image.columns != columns)
-        throw FileError(fmt::format("{}: {} rows x {} columns, but the first projection has {} x {}",
-                                    path.string(), image.rows, image.columns, rows, columns));
-      std::copy(image.samples.begin(), image.samples.end(), out + k * rows * columns);
-    }
+  frames.count = stack.images;
+  frames.name = [series](std::int64_t k) { return series->name(k); };
+  frames.read = [series, size = scan.rows * scan.columns](std::int64_t first, std::int64_t n, double* out) {
+    for (std::int64_t k = 0; k < n; ++k) series->read(first + k, out + k * size);
   };
   return frames;
 }
 
+std::shared_ptr<TiffSeries> open_series(const Description& about, const std::vector<std::string>& names,
+                                        std::uint64_t max_memory_bytes) {
+  std::vector<fs::path> files;
+  for (const auto& name : names) files.push_back(about.folder() / name);
+  return std::make_shared<TiffSeries>(std::move(files), max_memory_bytes);
+}
+
 // Frames of `key`, and their files into the hash.
-Frames listed_frames(const Description& about, const char* key, RawScan& scan) {
+Frames listed_frames(const Description& about, const char* key, RawScan& scan,
+                     std::uint64_t max_memory_bytes) {
   if (!about.has(key))
     about.fail(fmt::format(
         "'{}' is missing; counts need flats and darks (line integrals say so with \"description\": "
@@ -65,7 +68,7 @@ Frames listed_frames(const Description& about, const char* key, RawScan& scan) {
         key));
   const auto names = about.matches(key);
   for (const auto& name : names) use_file(scan, about, name);
-  return tiff_frames(about.folder(), names, scan);
+  return tiff_frames(about, names, scan, open_series(about, names, max_memory_bytes));
 }
 
 // Frames that all hold one number: the flats and darks of scanners that give a level for them.
@@ -80,7 +83,8 @@ Frames level_frame(double level, const RawScan& scan, const std::string& name) {
 }
 
 // Flats and darks, unless the values are line integrals.
-void set_counts(const Description& about, const std::optional<NikonScan>& nikon, RawScan& scan) {
+void set_counts(const Description& about, const std::optional<NikonScan>& nikon, RawScan& scan,
+                std::uint64_t max_memory_bytes) {
   scan.counts = true;
   if (about.has("description")) {
     if (about.text("description") != "line integrals")
@@ -93,18 +97,21 @@ void set_counts(const Description& about, const std::optional<NikonScan>& nikon,
     scan.darks = level_frame(0, scan, nikon->path.string() + ": the dark level");
     return;
   }
-  scan.flats = listed_frames(about, "flats", scan);
-  scan.darks = listed_frames(about, "darks", scan);
+  scan.flats = listed_frames(about, "flats", scan, max_memory_bytes);
+  scan.darks = listed_frames(about, "darks", scan, max_memory_bytes);
 }
 
+// `file_of_view`: by view the number of its name.
 RawScan open_tiffs(const Description& about, const std::vector<std::string>& names,
-                   std::uint64_t max_memory_bytes) {
+                   std::uint64_t max_memory_bytes, std::vector<std::size_t>& file_of_view) {
   RawScan scan;
-  const TiffImage first = read_tiff(about.folder() / names.front(), max_memory_bytes);
-  scan.rows = first.rows;
-  scan.columns = first.columns;
-  scan.integer = first.is_integer;
-  scan.projections = tiff_frames(about.folder(), names, scan);
+  const auto series = open_series(about, names, max_memory_bytes);
+  const TiffStack& stack = series->stack();
+  scan.rows = stack.rows;
+  scan.columns = stack.columns;
+  scan.integer = stack.is_integer;
+  scan.projections = tiff_frames(about, names, scan, series);
+  for (std::int64_t k = 0; k < stack.images; ++k) file_of_view.push_back(series->file_of(k));
   return scan;
 }
 
@@ -188,16 +195,17 @@ RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes,
     about.fail("needs one of 'projections' and 'hdf5'");
   const bool distances = wants_distances(about, beam);
   RawScan scan;
-  std::vector<std::string> names;  // of the projections, one file each; empty for one file of all
+  std::vector<std::string> names;         // of the projections' TIFF files; empty for one file of all
+  std::vector<std::size_t> file_of_view;  // a name's number
   if (about.has("hdf5")) {
     scan = open_hdf5(about, follow_links, distances);
   } else {
     names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
     const bool stack = names.size() == 1 && is_raster_file(folder / names.front());
     scan = stack ? open_stack(about, names.front(), max_memory_bytes)
-                 : open_tiffs(about, names, max_memory_bytes);
+                 : open_tiffs(about, names, max_memory_bytes, file_of_view);
     if (stack) names.clear();
-    set_counts(about, nikon, scan);
+    set_counts(about, nikon, scan, max_memory_bytes);
   }
   scan.format = "scan.json";
   use_file(scan, about, "scan.json");
@@ -209,8 +217,12 @@ RawScan open_scan_folder(const fs::path& folder, std::uint64_t max_memory_bytes,
   const auto [first, end] = about.has("use") ? about.half_open("use", count, "projections")
                                              : std::pair<std::int64_t, std::int64_t>(0, count);
   if (about.has("use")) select_views(scan, first, end);
-  for (std::int64_t k = first; !names.empty() && k < end; ++k)
-    use_file(scan, about, names[static_cast<std::size_t>(k)]);
+  // Each file whose views are used, once.
+  for (std::int64_t k = first; !names.empty() && k < end; ++k) {
+    const std::size_t file = file_of_view[static_cast<std::size_t>(k)];
+    if (k == first || file != file_of_view[static_cast<std::size_t>(k - 1)])
+      use_file(scan, about, names[file]);
+  }
   return scan;
 }
 

@@ -21,8 +21,13 @@ struct Brightness {
   double threshold = 0;        ///< between the densest material and the rest (Otsu's criterion)
   double soft = 0;             ///< within the rest, between background and soft material
   Vec3 dense_center{0, 0, 0};  ///< centroid of what lies above the threshold
+  /// Of masks and label maps whose object has lower values than what lies around it: it shows below `soft`,
+  /// and is dense below `threshold`.
+  bool dense_is_low = false;
 };
-/// Host only. Cost: a few passes over the samples on the grid; memory: a float of each.
+/// Masks and label maps, whose neighbouring samples mostly have equal values, show all that differs from the
+/// value which most samples on the grid's faces have; of other volumes exact zeros do not count, which mean
+/// not covered. Host only. Cost: a few passes over the samples on the grid; memory: a float of each.
 VDVR_API Brightness brightness_of(const MixedVolume& volume);
 
 /// Background clear, soft material a veil, dense material solid, each where the volume's own samples part.

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,6 +66,29 @@ VDVR_API std::vector<std::filesystem::path> export_outputs(const std::filesystem
 /// than an export), ResourceError (memory, disk), FileError, Interrupted.
 VDVR_API ExportResult export_volume(const VdvrFile& file, const std::filesystem::path& path,
                                     const ExportOptions& options, const Progress& progress = {});
+
+/// What UniformWriter refuses for its options or for what lies in the way, before anything is computed.
+VDVR_API void check_uniform_output(const std::filesystem::path& path, const ExportOptions& options);
+
+/// A uniform volume whose planes come one after the other, in any of these formats but vtm, by the same code.
+/// Of OME-Zarr there is one level. Memory: up to 64 MiB, or one plane.
+class VDVR_API UniformWriter {
+ public:
+  /// `oversampling` is 1; integers need a `range`. Throws as check_uniform_output and export_volume.
+  UniformWriter(const std::filesystem::path& path, const Grid& grid, const ExportOptions& options);
+  ~UniformWriter();
+  UniformWriter(const UniformWriter&) = delete;
+  UniformWriter& operator=(const UniformWriter&) = delete;
+  /// The next samples, x fastest. Runs on all cores.
+  void append(std::span<const float> samples);
+  /// Puts files in place, whole; without it nothing appears. Throws InputError unless all samples have come,
+  /// ResourceError, Interrupted.
+  ExportResult commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// log2 of samples per cell along x, y, z of the finest brick: what makes uniform samples hold all of V.
 VDVR_API std::array<int, 3> finest_per_cell(const MixedVolume& volume);

@@ -19,6 +19,8 @@
 #define VEC float8
 #define LOAD(p) vload8(0, p)
 #define STORE(v, p) vstore8(v, 0, p)
+#elif VDVR_LANES != 16
+#error "VDVR_LANES must be 1, 4, 8 or 16"
 #else
 #define VEC float16
 #define LOAD(p) (*(__global const float16*)(p))

@@ -47,7 +47,7 @@
 #endif
 
 // Positive floats order as their bits do. Most do not raise the maximum: a plain read spares them the atomic.
-inline void raise(volatile __global int* target, float v) {
+static inline void raise(volatile __global int* target, float v) {
   if (as_int(v) > *target) atomic_max(target, as_int(v));
 }
 
@@ -65,9 +65,10 @@ typedef struct {
 } Place;
 
 // False where there is no such brick, or nobody wants it.
-inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold,
-                       __global const float* margin, __global const uint* bricks, VdvrGrid grid,
-                       __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s) {
+static inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold,
+                              __global const float* margin, __global const uint* bricks, VdvrGrid grid,
+                              __global const int4* first_brick, __global const uchar* selected,
+                              VdvrGoldShape s) {
   p->block = layer / s.bricks_z;
   p->x = x;
   p->y = y;
@@ -101,7 +102,7 @@ typedef struct {
   int per_interval;
   float interval;
 } Column;
-inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
+static inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
   const int g = grid.granularity;
   const float to_cells = inverse_of_power(rate), cx = (float)(p->bx * g) + (float)ix * to_cells,
               cy = (float)(p->by * g) + (float)iy * to_cells;
@@ -112,7 +113,7 @@ inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate)
   c.interval = inverse_of_power(c.per_interval);
   return c;
 }
-inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
+static inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
   // The last node belongs to the interval below it.
   const int index = k < p->last_z ? k / c->per_interval : (p->last_z - 1) / c->per_interval;
   return vdvr_lerp(vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index),
@@ -123,8 +124,8 @@ inline float field_at(const Place* p, const Column* c, __global const uchar* sam
 #if VDVR_LANES > 1
 // V at VDVR_LANES + 1 nodes from `begin` on, interval by interval: two planes serve all nodes between them.
 // Beyond the last node anything finite. `out` has room for eight more.
-inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples,
-                                      int begin, float* out) {
+static inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples,
+                                             int begin, float* out) {
   const int end = min(begin + VDVR_LANES, p->last_z), per = c->per_interval;
   int index = min(begin, p->last_z - 1) / per;
   float low = vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index);
@@ -159,7 +160,7 @@ typedef struct {
   float8 high_0, high_1, high_2;  // and begin + 1 .. 8
 } Planes;
 
-inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
+static inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
   const int8 second = from_plane >= per;
   const float8 t = convert_float8(from_plane - (second ? (int8)per : (int8)0)) * inverse_of_power(per);
   const float8 none = (float8)(0.0f);
@@ -168,7 +169,7 @@ inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 fr
   *w2 = second ? t : none;
 }
 
-inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, int begin) {
+static inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, int begin) {
   Planes f;
   f.per_x = (rate << grid.coarse_x) >> p->brick.level_x;
   f.per_y = (rate << grid.coarse_y) >> p->brick.level_y;
@@ -185,14 +186,14 @@ inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, i
   return f;
 }
 
-inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
+static inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
   if (VDVR_HOLDS(*b, VDVR_F32)) return ((__global const float*)samples)[i];
   const float code =
       VDVR_HOLDS(*b, VDVR_U16) ? (float)((__global const ushort*)samples)[i] : (float)samples[i];
   return code * b->scale + b->bias;
 }
-inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples, const VdvrBrick* b,
-                                      size_t i) {
+static inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples,
+                                             const VdvrBrick* b, size_t i) {
   return (float4)(stored(samples, b, i), stored(samples, b, i + f->to_1), stored(samples, b, i + f->to_2),
                   0.0f);
 }
@@ -217,7 +218,7 @@ typedef struct {
   FOR_PARTS(DECLARE)
 } Corners;
 #define LARGER(part) out.part = MORE(a.part, b.part);
-inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
+static inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
   Corners out;
   FOR_PARTS(LARGER)
   return out;
@@ -227,7 +228,7 @@ inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
 typedef struct {
   VEC low, high;
 } Ends;
-inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
+static inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
   Ends e;
   e.low = READ(c);
   e.high = READ(c + 1);
@@ -235,7 +236,8 @@ inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
 }
 
 // Of both ends of edges along z from node z of a column on, between the columns before and after it in x.
-inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after, int to_y) {
+static inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after,
+                                            int to_y) {
   const VEC low2 = 2.0f * here.low, high2 = 2.0f * here.high;
   const VEC x0 = before.low + after.low - low2, x1 = before.high + after.high - high2,
             y0 = READ(c - to_y) + READ(c + to_y) - low2, y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - high2,
@@ -254,8 +256,8 @@ inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends 
   return out;
 }
 // V - gold there.
-inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends gold, INT low_tested,
-                                     INT high_tested) {
+static inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends gold, INT low_tested,
+                                            INT high_tested) {
   const VEC unlimited = (VEC)(INFINITY);
   VEC e0 = low_v - gold.low, e1 = high_v - gold.high;
   // NaN would drop out of a maximum.
@@ -266,7 +268,7 @@ inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends g
 }
 
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
-inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
+static inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
 // One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at
 // which its test fails.

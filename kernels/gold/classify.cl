@@ -66,12 +66,12 @@ __kernel void level_error(volatile __global int* error, __global const int4* bri
 // the gold rate: the largest of interpolant - gold and of gold - interpolant. errors[brick i][axis x, y,
 // z][level of most_levels][sign], starting at 0. A node that is no sample of the
 // finest level is the middle of a cell of exactly one level.
-inline void raise_pair(volatile __global int* to, float plus, float minus) {
+static inline void raise_pair(volatile __global int* to, float plus, float minus) {
   if (plus > 0.0f && as_int(plus) > to[0]) atomic_max(to, as_int(plus));
   if (minus > 0.0f && as_int(minus) > to[1]) atomic_max(to + 1, as_int(minus));
 }
 // The level whose cells have their middles at node i; `levels` where i is a base sample.
-inline int level_of_middle(int i, int levels) {
+static inline int level_of_middle(int i, int levels) {
   int level = levels;
   for (int bit = 0; bit < levels; ++bit)
     if (i & ((1 << (bit + 1)) - 1)) {
@@ -81,7 +81,7 @@ inline int level_of_middle(int i, int levels) {
   return level;
 }
 // Half the spacing of that level, in nodes; at a base sample that of the finest, which is read and not used.
-inline int half_of(int level, int levels) { return 1 << max(levels - 1 - level, 0); }
+static inline int half_of(int level, int levels) { return 1 << max(levels - 1 - level, 0); }
 __kernel void axis_errors(volatile __global int* errors, __global const int4* bricks, int count,
                           __global const float* gold, __global const float* margin, VdvrGoldShape s,
                           int levels_x, int levels_y, int levels_z, int most_levels) {

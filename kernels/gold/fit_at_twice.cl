@@ -47,8 +47,8 @@
 #endif
 
 // Whether a step reads the targets of a column of nodes: one beside a sample's that is fitted.
-inline bool is_fitted_to(__global const int* last, int block, int gx, int gy, VdvrGoldBlocks g,
-                         VdvrLattice l) {
+static inline bool is_fitted_to(__global const int* last, int block, int gx, int gy, VdvrGoldBlocks g,
+                                VdvrLattice l) {
   const int from_x = gx - g.halo + 2 * l.reach_x, from_y = gy - g.halo + 2 * l.reach_y;
   for (int y = max(from_y / 2, 0); y <= min((from_y + 1) / 2, l.cy - 1); ++y)
     for (int x = max(from_x / 2, 0); x <= min((from_x + 1) / 2, l.cx - 1); ++x)

@@ -15,7 +15,7 @@
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 
-inline bool has_run(uint runs, int z) { return runs >> min(z / 16, 31) & 1u; }
+static inline bool has_run(uint runs, int z) { return runs >> min(z / 16, 31) & 1u; }
 
 // The lattice as gold has it.
 __kernel void take_lattice(__global float* lattice, __global const float* gold,

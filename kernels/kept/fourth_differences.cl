@@ -15,7 +15,7 @@
         fmax(largest, select((float8)(0.0f), select((float8)(INFINITY), size, size <= FLT_MAX), inside)); \
   }
 
-inline float largest_of(float8 v) {
+static inline float largest_of(float8 v) {
   const float4 a = fmax(v.lo, v.hi);
   const float2 b = fmax(a.lo, a.hi);
   return fmax(b.x, b.y);

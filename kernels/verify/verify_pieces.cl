@@ -16,14 +16,14 @@
 
 // --- |V - F| at nodes ---
 
-inline __global const float* field_column(__global const float* field, int4 item, int4 first, int x, int y,
-                                          int cells, int nx, int ny, int z_padded) {
+static inline __global const float* field_column(__global const float* field, int4 item, int4 first, int x,
+                                                 int y, int cells, int nx, int ny, int z_padded) {
   const int bx = (item.x - first.x) * cells + x + RADIUS, by = (item.y - first.y) * cells + y + RADIUS;
   return field + (((size_t)item.w * ny + by) * nx + bx) * z_padded + (item.z - first.z) * cells + RADIUS;
 }
 
 // The last node of a piece along an axis where the grid has `all` gold cells.
-inline int last_node(int piece, int cells, int all) { return min(cells, all - piece * cells); }
+static inline int last_node(int piece, int cells, int all) { return min(cells, all - piece * cells); }
 
 __kernel void verify_errors(__global float* error, __global const float* field, __global const uchar* samples,
                             __global const uint* bricks, VdvrGrid grid, __global const int4* items,
@@ -70,16 +70,16 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
 
 // --- fourth differences ---
 
-inline float16 second(__global const float* p, int stride) {
+static inline float16 second(__global const float* p, int stride) {
   const float16 c = vload16(0, p);
   return (vload16(0, p - stride) - c) + (vload16(0, p + stride) - c);
 }
-inline float16 fourth(__global const float* p, int stride) {
+static inline float16 fourth(__global const float* p, int stride) {
   const float16 c = vload16(0, p), low = vload16(0, p - stride), high = vload16(0, p + stride);
   return ((vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high)) -
          3.0f * ((low - c) + (high - c));
 }
-inline float16 mixed(__global const float* p, int a, int b) {
+static inline float16 mixed(__global const float* p, int a, int b) {
   const float16 c = second(p, a);
   return (second(p - b, a) - c) + (second(p + b, a) - c);
 }
@@ -130,7 +130,7 @@ __kernel void verify_fourth(__global float8* out, __global const float* field, _
 // --- cells ---
 
 // h^2 times the second derivative: the second difference less `correction` twelfths of the fourth.
-inline float16 curvature(__global const float* p, int stride, float correction) {
+static inline float16 curvature(__global const float* p, int stride, float correction) {
   const float16 c = vload16(0, p), low = vload16(0, p - stride), high = vload16(0, p + stride);
   const float16 outer = (vload16(0, p - 2 * stride) - low) + (vload16(0, p + 2 * stride) - high),
                 inner = (low - c) + (high - c);

@@ -1,12 +1,16 @@
 #define BOOST_TEST_MODULE stripes
 #include "host/prepare/stripes.hpp"
 
+#include <algorithm>
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <functional>
 #include <random>
 
 #include "tests/support/scans.hpp"
+#include "vdvr/exact_field.hpp"
+#include "vdvr/preparation.hpp"
 
 using namespace vdvr;
 
@@ -102,6 +106,64 @@ BOOST_AUTO_TEST_CASE(sinogram_without_stripes_is_hardly_changed) {
   BOOST_TEST(share <= most_changed);
 }
 
+// Noise-free data without stripes: medians and quartiles of what tells stripes are about 0 there.
+BOOST_AUTO_TEST_CASE(clean_slices_change_by_less_than_half_a_percent) {
+  // X, Y, Z, radius and density, as shares of half the detector's width.
+  struct Ball {
+    double x, y, z, radius, density;
+  };
+  const std::vector<std::vector<Ball>> objects{{{0.1, -0.05, 0, 0.6, 1},
+                                                {0.35, 0.1, 0.15, 0.14, 1.5},
+                                                {-0.25, 0.3, -0.1, 0.1, -0.6},
+                                                {-0.1, -0.4, 0.25, 0.12, 0.9}},
+                                               {{0, 0, 0, 0.6, 1}},
+                                               {{0.01, 0, 0, 0.6, 1}},
+                                               {{0.05, 0.02, 0, 0.5, 1}, {0.3, 0.3, 0, 0.02, 5}}};
+  // As docs/preparation.md says: of a slice's range, root mean square.
+  constexpr double most = 0.005;
+  for (const auto& [views, columns] : {std::pair<std::int64_t, std::int64_t>{120, 65}, {180, 129}, {60, 101}})
+    for (std::size_t o = 0; o < objects.size(); ++o)
+      for (const double height : {-0.06, 0.0, 0.06}) {
+        ProjectionSet scan = vdvr::testing::empty_scan(views, 1, columns);
+        const double half = 0.5 * static_cast<double>(columns - 1);
+        for (std::int64_t k = 0; k < views; ++k) {
+          const double theta = scan.geometry.theta_rad[static_cast<std::size_t>(k)];
+          for (std::int64_t i = 0; i < columns; ++i) {
+            double sum = 0;
+            for (const Ball& b : objects[o]) {
+              const double u =
+                  static_cast<double>(i) / half - 1 - b.x * std::cos(theta) - b.y * std::sin(theta);
+              sum += 2 * b.density *
+                     std::sqrt(std::max(0.0, b.radius * b.radius - u * u - (height - b.z) * (height - b.z)));
+            }
+            scan.data[static_cast<std::size_t>(k * columns + i)] = static_cast<float>(0.03 * sum);
+          }
+        }
+        Sinogram before{views, columns, std::vector<double>(scan.data.begin(), scan.data.end())};
+        Preparation windows;
+        windows.stripes.emplace();
+        const Stripes used = *for_columns(windows, columns).stripes;
+        Sinogram after = before;
+        remove_dead_stripes(after, used.ratio, used.large);
+        remove_lasting_stripes(after, used.ratio, used.small);
+        remove_small_stripes(after, used.small);
+        ProjectionSet changed = scan;
+        for (std::size_t i = 0; i < after.data.size(); ++i)
+          changed.data[i] = static_cast<float>(after.data[i]);
+        std::vector<Vec3> points;
+        for (double y = -0.9; y <= 0.9; y += 0.06)
+          for (double x = -0.9; x <= 0.9; x += 0.06)
+            if (x * x + y * y <= 0.81) points.push_back({x * half, y * half, 0});
+        const std::vector<double> f = ExactField(scan, {}).at(points), g = ExactField(changed, {}).at(points);
+        const auto [low, high] = std::minmax_element(f.begin(), f.end());
+        double squares = 0;
+        for (std::size_t i = 0; i < f.size(); ++i) squares += (g[i] - f[i]) * (g[i] - f[i]);
+        const double share = std::sqrt(squares / static_cast<double>(f.size())) / (*high - *low);
+        BOOST_TEST_MESSAGE(views << " views, " << columns << " columns, object " << o << ": " << share);
+        BOOST_TEST(share <= most);
+      }
+}
+
 BOOST_AUTO_TEST_CASE(each_kind_of_stripe_is_removed) {
   const std::vector<std::pair<const char*, Spoil>> kinds{{"full", full_stripe},
                                                          {"partial", partial_stripe},
@@ -113,6 +175,16 @@ BOOST_AUTO_TEST_CASE(each_kind_of_stripe_is_removed) {
       BOOST_TEST_MESSAGE(name << ": " << left << " of the energy is left");
       BOOST_TEST(left <= most_left);
     }
+}
+
+// At the detector's edge there are neighbours on one side only.
+BOOST_AUTO_TEST_CASE(dead_columns_at_the_edge_are_found) {
+  Sinogram s = clean_sinogram();
+  std::mt19937 random(1);
+  dead_stripe(s, 0, random);
+  dead_stripe(s, s.columns - 1, random);
+  dead_stripe(s, s.columns - 2, random);
+  BOOST_TEST(remove_dead_stripes(s, 3, 51) == 3);
 }
 
 BOOST_AUTO_TEST_CASE(all_kinds_together_are_removed) {

@@ -1,7 +1,9 @@
 #define BOOST_TEST_MODULE volume_file
+#include "host/io/tiff.hpp"
 #include "vdvr/volume_file.hpp"
 
 #include <hdf5.h>
+#include <fmt/format.h>
 #include <tiffio.h>
 #include <zlib.h>
 
@@ -224,20 +226,72 @@ BOOST_AUTO_TEST_CASE(truncated_volume_is_refused_at_every_length) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(turned_or_mirrored_axes_are_refused) {
+BOOST_AUTO_TEST_CASE(axes_in_any_order_and_direction_leave_samples_where_they_are) {
   const TemporaryFolder folder;
+  // In the file 3 x 2 x 4 samples; axis 0 runs along y backwards, axis 1 along z, axis 2 along x.
+  std::string bytes;
+  for (char i = 0; i < 24; ++i) bytes += i;
+  const std::string mha = mha_start +
+                          "DimSize = 3 2 4\nElementSpacing = 2 5 7\nOffset = 100 200 300\n"
+                          "TransformMatrix = 0 -1 0 0 0 1 1 0 0\nElementType = MET_UCHAR\n"
+                          "ElementDataFile = LOCAL\n" +
+                          bytes;
+  const std::string nrrd =
+      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 2 4\nencoding: raw\nspace dimension: 3\n"
+      "space directions: (0,-2,0) (0,0,5) (7,0,0)\nspace origin: (100,200,300)\n\n" +
+      bytes;
+  for (const auto& path : {folder.file("v.mha", mha), folder.file("v.nrrd", nrrd)}) {
+    const Volume v = read_volume(path);
+    BOOST_TEST((v.grid.cells == Index3{3, 2, 1}));
+    BOOST_TEST((v.grid.spacing == Vec3{7, 2, 5}));
+    BOOST_TEST((v.grid.origin == Vec3{100, 196, 300}));
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 2; ++j)
+        for (int k = 0; k < 4; ++k)
+          BOOST_TEST(v.samples[static_cast<std::size_t>((j * 3 + (2 - i)) * 4 + k)] ==
+                     static_cast<float>((k * 2 + j) * 3 + i));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(directions_are_straight_where_no_sample_is_off_by_a_thousandth_of_the_spacing) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& first) {
+    return message_of(folder.file("v.nrrd", nrrd_start + "type: uint8\nencoding: raw\nspace dimension: 3\n" +
+                                                "space directions: " + first +
+                                                " (0,2,0) (0,0,1)\n\nabcdefgh"));
+  };
+  BOOST_TEST(with("(1,1.9e-3,0)") == "accepted");  // of a spacing of 2
+  BOOST_TEST(with("(1,0,-1e-12)") == "accepted");
+  BOOST_TEST(with("(1,2.1e-3,0)").find("oblique") != std::string::npos);
+  BOOST_TEST(with("(1,0,-1.1e-3)").find("oblique") != std::string::npos);
+  BOOST_TEST(with("(0,1,0)").find("oblique") != std::string::npos);
+  BOOST_TEST(with("(0,0,0)").find("no direction") != std::string::npos);
+  BOOST_TEST(with("(nan,0,0)").find("not a number") != std::string::npos);
   const std::string rest = "DimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nabcdefgh";
-  BOOST_TEST(message_of(folder.file("a.mha", mha_start + "TransformMatrix = -1 0 0 0 1 0 0 0 1\n" + rest))
-                 .find("TransformMatrix") != std::string::npos);
+  const auto matrix = [&](const std::string& m) {
+    return message_of(folder.file("v.mha", mha_start + "TransformMatrix = " + m + "\n" + rest));
+  };
+  BOOST_TEST(matrix("1 0 0 0 0.999999999999 0 0 6.1e-17 1") == "accepted");
+  BOOST_TEST(matrix("1 0 0 0 0.99 0 0 0 1").find("TransformMatrix") != std::string::npos);
   BOOST_TEST(
       message_of(folder.file("b.mha", mha_start + "ElementSpacing = 1 0 1\n" + rest)).find("spacing") !=
       std::string::npos);
-  const std::string nrrd = nrrd_start + "type: uint8\nencoding: raw\nspace dimension: 3\n";
+}
+
+BOOST_AUTO_TEST_CASE(what_nrrd_does_not_know_is_a_pixel_and_lines_are_skipped) {
+  const TemporaryFolder folder;
+  const std::string start = nrrd_start + "type: uint8\nencoding: raw\n";
+  const Volume v = read_volume(folder.file("v.nrrd", start + "spacings: nan 3 NaN\n\nabcdefgh"));
+  BOOST_TEST((v.grid.spacing == Vec3{1, 3, 1}));
+  BOOST_TEST(read_volume(folder.file("w.nrrd", start + "line skip: 2\n\none\ntwo\nabcdefgh")).samples[0] ==
+             'a');
+  BOOST_TEST(read_volume(folder.file("x.nrrd", start + "line skip: 1\nbyte skip: 2\n\none\n..abcdefgh"))
+                 .samples[0] == 'a');
   BOOST_TEST(
-      message_of(folder.file("a.nrrd", nrrd + "space directions: (1,0,0) (0,-1,0) (0,0,1)\n\nabcdefgh"))
-          .find("space directions") != std::string::npos);
-  BOOST_TEST(message_of(folder.file(
-                 "ok.nrrd", nrrd + "space directions: (1,0,0) (0,2,0) (0,0,1)\n\nabcdefgh")) == "accepted");
+      message_of(folder.file("y.nrrd", start + "line skip: 3\n\none\ntwo\nabcdefgh")).find("line skip") !=
+      std::string::npos);
+  BOOST_TEST(message_of(folder.file("z.nrrd", start + "line skip: -1\n\nabcdefgh")).find("line skip") !=
+             std::string::npos);
 }
 
 BOOST_AUTO_TEST_CASE(one_sample_axis_is_refused_with_the_reason) {
@@ -252,7 +306,19 @@ BOOST_AUTO_TEST_CASE(samples_that_are_not_finite_floats_are_refused) {
   Volume volume = ramp();
   volume.samples[5] = std::numeric_limits<float>::quiet_NaN();
   write_volume(folder / "v.mha", volume);
-  BOOST_TEST(message_of(folder / "v.mha").find("sample 5") != std::string::npos);
+  volume.samples[7] = std::numeric_limits<float>::infinity();
+  write_volume(folder / "v.mha", volume);
+  const std::string message = message_of(folder / "v.mha"), all = std::to_string(volume.samples.size());
+  BOOST_TEST(message.find("2 of " + all + " samples") != std::string::npos, message);
+  const Index3 n = volume.grid.samples();
+  BOOST_TEST(message.find(fmt::format("column {}, row {}, slice {}", 5 % n[0], 5 / n[0] % n[1],
+                                      5 / n[0] / n[1])) != std::string::npos,
+             message);
+  BOOST_TEST(message.find("`nan_as`") != std::string::npos);
+  const Volume back = read_volume(folder / "v.mha", 0, -2.0);
+  volume.samples[5] = volume.samples[7] = -2;
+  BOOST_TEST(back.samples == volume.samples);
+  BOOST_CHECK_THROW(static_cast<void>(read_volume(folder / "v.mha", 0, std::nan(""))), InputError);
 }
 
 BOOST_AUTO_TEST_CASE(hostile_headers_are_refused) {
@@ -425,5 +491,78 @@ BOOST_AUTO_TEST_CASE(tiff_files_of_several_images_are_read_with_the_tags_of_imag
   write_tiff(folder / "v.tif", 0, 1);
   BOOST_TEST(message_of(folder / "v.tif").find("at least two") != std::string::npos);
   write_tiff(folder / "v.tif", 0, 1, "w", "ImageJ=1.53\nimages=4000\n");
-  BOOST_TEST(message_of(folder / "v.tif") != "accepted");
+  BOOST_TEST(message_of(folder / "v.tif").find("truncated") != std::string::npos);
+  for (const char* count : {"0", "-3", "nan", "1e300", "x"}) {
+    write_tiff(folder / "v.tif", 0, 1, "w", std::string("ImageJ=1.53\nimages=") + count + "\n");
+    BOOST_TEST(message_of(folder / "v.tif").find("images=") != std::string::npos);
+  }
+  write_tiff(folder / "v.tif", 0, 4, "w", "ImageJ=1.53\nimages=4\nchannels=2\nslices=2\n");
+  BOOST_TEST(message_of(folder / "v.tif").find("2 channels") != std::string::npos);
+  write_tiff(folder / "v.tif", 0, 4, "w", "ImageJ=1.53\nimages=4\nslices=2\nframes=2\n");
+  BOOST_TEST(message_of(folder / "v.tif").find("2 time points") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(one_directory_of_imagej_holds_images_behind_each_other) {
+  const TemporaryFolder folder;
+  for (const char* mode : {"wl", "wb"}) {
+    write_tiff(folder / "v.tif", 0, 1, mode,
+               "ImageJ=1.53\nimages=3\nslices=3\nunit=um\nspacing=0.75\nxorigin=4\nyorigin=-2\n");
+    // The first image lies where its strip is, and libtiff puts the directory behind it; ImageJ before.
+    const std::string file = support::bytes_of(folder / "v.tif");
+    std::string head = file, tail;
+    const bool big = mode[1] == 'b';
+    for (int i = 0; i < 18; ++i)
+      tail += big ? std::string{'\0', static_cast<char>(i)} : std::string{static_cast<char>(i), '\0'};
+    // The strip's offset, in the last entry of its kind, is moved to the end of the file.
+    const std::string tag = big ? std::string("\x01\x11\x00\x04\x00\x00\x00\x01", 8)
+                                : std::string("\x11\x01\x04\x00\x01\x00\x00\x00", 8);
+    const auto at = file.find(tag);
+    BOOST_REQUIRE(at != std::string::npos);
+    for (std::size_t b = 0; b < 4; ++b)
+      head[at + 8 + b] = static_cast<char>(file.size() >> (8 * (big ? 3 - b : b)) & 0xff);
+    const Volume volume = read_volume(folder.file("j.tif", head + tail));
+    BOOST_TEST((volume.grid.cells == Index3{2, 1, 2}));
+    BOOST_TEST((volume.grid.spacing == Vec3{0.25, 0.5, 0.75}));
+    BOOST_TEST((volume.grid.origin == Vec3{-1, 1, 0}));
+    check_counting(volume);
+    for (std::size_t less = 1; less < 36; less += 5)
+      BOOST_TEST(message_of(folder.file("cut.tif", head + tail.substr(0, 36 - less))).find("truncated") !=
+                 std::string::npos);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(files_of_one_image_and_of_several_make_one_stack) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "s");
+  write_tiff(folder / "s/a_1.tif", 0, 2);
+  write_tiff(folder / "s/a_2.tif", 12, 1);
+  write_tiff(folder / "s/a_10.tif", 18, 3);
+  const Volume volume = read_volume(folder / "s");
+  BOOST_TEST((volume.grid.cells == Index3{2, 1, 5}));
+  check_counting(volume);
+  io::TiffSeries series({folder / "s/a_1.tif", folder / "s/a_2.tif", folder / "s/a_10.tif"});
+  BOOST_TEST(series.stack().images == 6);
+  std::vector<double> image(6);
+  for (const std::int64_t k : {5, 0, 3, 1, 2, 4}) {  // in any order
+    series.read(k, image.data());
+    for (int p = 0; p < 6; ++p)
+      BOOST_TEST(image[static_cast<std::size_t>(p)] == 6 * static_cast<double>(k) + p);
+  }
+  BOOST_TEST(series.file_of(1) == 0u);
+  BOOST_TEST(series.file_of(2) == 1u);
+  BOOST_TEST(series.file_of(5) == 2u);
+  BOOST_TEST(series.name(2) == (folder / "s/a_2.tif").string());
+  BOOST_TEST(series.name(4) == (folder / "s/a_10.tif").string() + ", image 1");
+  // 6 pixels as double are 48 bytes.
+  BOOST_CHECK_THROW(io::TiffSeries({folder / "s/a_1.tif"}, 47), ResourceError);
+}
+
+BOOST_AUTO_TEST_CASE(what_imagej_calibrates_by_a_line_is_read_as_what_it_stands_for) {
+  const TemporaryFolder folder;
+  write_tiff(folder / "v.tif", 0, 2, "w", "ImageJ=1.53\nimages=2\ncf=0\nc0=-32768.0\nc1=0.5\n");
+  const Volume volume = read_volume(folder / "v.tif");
+  for (std::size_t i = 0; i < volume.samples.size(); ++i)
+    BOOST_TEST(volume.samples[i] == -32768 + 0.5f * static_cast<float>(i));
+  write_tiff(folder / "w.tif", 0, 2, "w", "ImageJ=1.53\nimages=2\ncf=20\nc0=-32768.0\nc1=0.5\n");
+  check_counting(read_volume(folder / "w.tif"));
 }

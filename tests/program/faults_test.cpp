@@ -343,6 +343,21 @@ BOOST_AUTO_TEST_CASE(device_that_refuses_memory_or_is_lost_leaves_no_output) {
   BOOST_TEST(failed >= 12);
 }
 
+BOOST_AUTO_TEST_CASE(device_that_cannot_be_described_ends_no_listing_and_is_named) {
+  const TemporaryFolder folder, streams;
+  Program program(streams.path());
+  program.environment["LD_PRELOAD"] = VDVR_OPENCL_FAULTS;
+  for (const char* call : {"clGetDeviceIDs:1", "clGetDeviceInfo:3", "clCreateContext:1"}) {
+    program.environment["VDVR_FAULTS_FAIL"] = call;
+    const Ended listed = program.run({"devices"});
+    BOOST_TEST(listed.code == 0, call << ": " << listed.err);
+  }
+  program.environment["VDVR_FAULTS_FAIL"] = "clGetDeviceInfo:3";
+  const Words words{"render", inputs().volume, "--size", "64x64", "-o", (folder / "o.png").string()};
+  check_failed(program.run(words), 3, words, {"cannot be used: clGetDeviceInfo"});
+  BOOST_TEST(joined(files_below(folder.path())) == "");
+}
+
 BOOST_AUTO_TEST_CASE(device_with_small_limits_gives_a_certified_volume_or_names_the_limit) {
   const TemporaryFolder folder, streams;
   const fs::path out = folder / "o.vdvr";

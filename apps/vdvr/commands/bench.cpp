@@ -15,6 +15,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/measure_tightness.hpp"
@@ -237,6 +238,7 @@ int bench_render(Arguments& args) {
   args.value("gradient", "auto|central|stored|analytic", "as `render` takes it (default auto)")
       .flag("no-shading", "colours of the transfer function alone, without light");
   add_scan(args);
+  add_volume_input(args);
   add_projection_options(args);
   add_common(args);
   if (!args.parse()) return 0;

@@ -4,6 +4,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/volume_output.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/export_volume.hpp"
 
@@ -14,31 +15,6 @@ namespace {
 
 constexpr const char* default_blocks = "2000";
 
-ExportFormat format_of(const Arguments& args, const fs::path& output) {
-  const auto by_name = export_format_of(output);
-  if (!args.has("format")) {
-    if (by_name) return *by_name;
-    throw InputError(
-        fmt::format("{}: end the name in .mha, .nrrd, .tif, .h5, .npy, .raw, .zarr or .vtm, or say "
-                    "--format (tiff for a folder of slices)",
-                    output.string()));
-  }
-  const std::string text =
-      args.choice("format", {"mha", "nrrd", "tiff", "hdf5", "npy", "raw", "ome-zarr", "vtm"}, "mha");
-  for (const ExportFormat f :
-       {ExportFormat::mha, ExportFormat::nrrd, ExportFormat::tiff, ExportFormat::hdf5, ExportFormat::npy,
-        ExportFormat::raw, ExportFormat::ome_zarr, ExportFormat::vtm})
-    if (text == text_of(f)) {
-      // Their readers, and VTK's, go by the name.
-      const bool by_its_name = f == ExportFormat::mha || f == ExportFormat::nrrd || f == ExportFormat::vtm;
-      if (by_name != f && (by_its_name || by_name))
-        throw InputError(
-            fmt::format("{}: --format {} needs another ending of the name", output.string(), text));
-      return f;
-    }
-  throw InputError("--format: unknown");
-}
-
 /// Options that mean nothing to the format are refused by name.
 void refuse_unused(const Arguments& args, ExportFormat format) {
   const auto only = [&](const char* option, bool used, const char* of) {
@@ -48,38 +24,15 @@ void refuse_unused(const Arguments& args, ExportFormat format) {
   const bool vtm = format == ExportFormat::vtm;
   only("oversampling", !vtm, "uniform samples");
   only("blocks", vtm, "vtm");
-  only("compression", vtm || format == ExportFormat::hdf5 || format == ExportFormat::ome_zarr,
-       "hdf5, ome-zarr and vtm");
 }
 
 ExportOptions options_of(const Arguments& args, const CommonOptions& common, ExportFormat format) {
-  ExportOptions o;
-  o.format = format;
+  ExportOptions o = volume_output_options(args, common, format);
   const char* fallback = format == ExportFormat::ome_zarr ? "4" : "1";
   o.oversampling = std::stoi(args.choice("oversampling", {"1", "2", "4", "8"}, fallback));
-  const std::string samples = args.choice("samples", {"f32", "u16", "u8"}, "f32");
-  o.samples = samples == "u8" ? SampleType::u8 : samples == "u16" ? SampleType::u16 : SampleType::f32;
-  if (const auto range = args.numbers("range", 2)) o.range = {(*range)[0], (*range)[1]};
-  if (args.choice("compression", {"none", "deflate"}, "deflate") == "none") o.compression = Compression::none;
   o.most_blocks =
       static_cast<std::size_t>(args.integer_or("blocks", std::stoi(default_blocks), 1, 10'000'000));
-  o.max_memory_bytes = common.max_memory;
   return o;
-}
-
-/// As check_output, where an output may be a folder too.
-void check_outputs(const fs::path& output, ExportFormat format, bool force, const fs::path& input) {
-  std::error_code ignored;
-  for (const fs::path& path : export_outputs(output, format)) {
-    if (!fs::is_directory(path, ignored)) {
-      check_output(path, force, {input});
-    } else if (format != ExportFormat::tiff && format != ExportFormat::ome_zarr &&
-               (format != ExportFormat::vtm || path == output)) {
-      throw InputError(fmt::format("{}: is a folder, not a file to write", path.string()));
-    } else if (!fs::is_empty(path, ignored) && !force) {
-      throw InputError(fmt::format("{}: exists already; --force overwrites it", path.string()));
-    }
-  }
 }
 
 Json result_json(const fs::path& output, const ExportOptions& o, const ExportResult& r) {
@@ -128,27 +81,23 @@ int export_command(Arguments& args) {
   args.positional("FILE", "the certified volume")
       .value("output,o", "VOL",
              "what to write: .mha .nrrd .tif .h5 .npy .raw .zarr .vtm, or a folder of TIFF slices")
-      .value("format", "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm", "default: by the ending of VOL")
       .value("oversampling", "1|2|4|8",
              "samples per cell of the grid and axis (default 1; of ome-zarr 4, the finest of its levels)")
-      .value(
-          "samples", "f32|u16|u8",
-          "type in tiff, hdf5, npy and raw (default f32); integers span the range of the values, scale and "
-          "offset are recorded")
-      .value("range", "LO,HI", "what integers span instead; values outside become the nearest of them")
-      .value("compression", "none|deflate", "of hdf5, ome-zarr and vtm (default deflate)")
       .value("blocks", "N",
              std::string("vtm: at most about so many .vti files (default ") + default_blocks +
                  "); fewer hold more points")
       .flag("unverified", "export although content and certificate do not match");
+  add_volume_output(
+      args, "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm",
+      "what integers span (default: the range of the values); values outside become the nearest");
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   const auto path = args.path("FILE"), output = args.path("output");
-  const ExportFormat format = format_of(args, output);
+  const ExportFormat format = output_format(args, output);
   refuse_unused(args, format);
   const ExportOptions options = options_of(args, common, format);
-  check_outputs(output, format, common.force, path);
+  check_volume_output(output, format, common.force, {path});
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 

@@ -7,9 +7,9 @@
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_large.hpp"
-#include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -58,8 +58,8 @@ int certified_info(const std::filesystem::path& path, const CommonOptions& commo
   return 0;
 }
 
-int volume_info(const std::filesystem::path& path, const CommonOptions& common) {
-  const Volume volume = read_volume(path, common.max_memory);
+int volume_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
+  const Volume volume = load_volume(path, args);
   const auto range = std::minmax_element(volume.samples.begin(), volume.samples.end());
   const Json json = {{"file", path.string()},
                      {"kind", "volume"},
@@ -98,6 +98,7 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
 int info_command(Arguments& args) {
   args.positional("FILE", "a certified volume, a volume, or projections");
   add_scan(args);
+  add_volume_input(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
@@ -106,7 +107,7 @@ int info_command(Arguments& args) {
     case InputKind::certified:
       return certified_info(path, common);
     case InputKind::volume:
-      return volume_info(path, common);
+      return volume_info(path, args, common);
     case InputKind::scan:
       break;
   }

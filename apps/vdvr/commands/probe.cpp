@@ -10,6 +10,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/certified_points.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"
@@ -17,7 +18,6 @@
 #include "vdvr/error_slice.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/output_file.hpp"
-#include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -125,7 +125,7 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
 
 std::vector<Probe> probe_volume(const std::filesystem::path& path, const Arguments& args,
                                 const std::vector<Vec3>& points) {
-  const MixedVolume volume = as_mixed(read_volume(path, common_options(args).max_memory));
+  const MixedVolume volume = as_mixed(load_volume(path, args));
   std::vector<Probe> probes(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     probes[i].covered = in_box(volume.grid, points[i]);
@@ -198,6 +198,7 @@ int probe_command(Arguments& args) {
       .value("upsampling", "N",
              "with --method d2vr: columns and rows per detector pixel, a power of two (default 1)");
   add_scan(args);
+  add_volume_input(args);
   add_field(args);
   add_common(args);
   if (!args.parse()) return 0;

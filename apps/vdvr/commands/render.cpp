@@ -188,6 +188,28 @@ Json transfer_json(const TransferFunction& f) {
   return {{"name", f.name}, {"range", {f.points.front().value, f.points.back().value}}, {"note", f.note}};
 }
 
+/// What was asked for lies beside the volume, so that the picture shows nothing of it.
+std::vector<std::string> notes_on(const Arguments& args, const RenderOptions& o, const Source& source) {
+  std::vector<std::string> notes;
+  if (o.mode == RenderMode::iso) {
+    const auto [lo, hi] = source.value_range();
+    for (const IsoSurface& s : o.surfaces)
+      if (!(s.value >= static_cast<double>(lo) && s.value <= static_cast<double>(hi)))
+        notes.push_back(fmt::format(
+            "--iso {:.6g} lies outside of the volume's values, {:.6g} to {:.6g}: no surface is there",
+            s.value, lo, hi));
+  }
+  const Grid& g = source.scene().volume.grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double low = g.origin[a], high = low + static_cast<double>(g.cells[a]) * g.spacing[a];
+    if (args.has("clip") && o.clip && !(o.clip->low[a] < high && o.clip->high[a] > low))
+      notes.push_back(
+          fmt::format("--clip lies outside of the volume along {}, {:.6g} to {:.6g}: nothing is there",
+                      "xyz"[a], low, high));
+  }
+  return notes;
+}
+
 /// One picture, or the values behind it.
 RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::filesystem::path& output,
                       OutputKind kind) {
@@ -255,6 +277,7 @@ int render_command(Arguments& args) {
   o.clip = clip_for(args, scene, progress.callback());
   if (certifies) o.clip = certified_clip(args, scene, o, progress.callback());
   const bool comparison = scene.certificate && scene.certificate->comparison;
+  std::vector<std::string> notes = notes_on(args, o, source);
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr" && !comparison;
   o.skip_empty = !args.has("no-skip");
@@ -313,6 +336,7 @@ int render_command(Arguments& args) {
       {"outside_certificate", outside_certificate(o)},
       {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
       {"window", of_integrals ? Json(*o.slice_range) : Json()},
+      {"notes", notes},
       {"method", method},
       {"certificate", ray_certificate.json},
       {"picture_tolerance", ray_certificate.beyond ? tolerance_json(*ray_certificate.beyond) : Json()},
@@ -342,7 +366,8 @@ int render_command(Arguments& args) {
     if (has_transfer)
       fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,
                  o.transfer.points.front().value, o.transfer.points.back().value);
-    if (has_transfer && !o.transfer.note.empty()) print_notes({o.transfer.note});
+    if (has_transfer && !o.transfer.note.empty()) notes.push_back(o.transfer.note);
+    print_notes(notes);
     // Slices count no samples along rays.
     fmt::print("  {}{:.3f} s on {}\n",
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,

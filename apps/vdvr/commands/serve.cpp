@@ -7,6 +7,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/serve/server.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/live_json.hpp"
 #include "vdvr/live_renderer.hpp"
@@ -86,6 +87,7 @@ int serve_command(Arguments& args) {
               "a name by which browsers may call this machine, beside addresses and localhost; may be given "
               "several times")
       .flag("unverified", "show although content and certificate do not match");
+  add_volume_input(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);

@@ -11,9 +11,9 @@
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
+#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
-#include "vdvr/volume_file.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -68,7 +68,7 @@ Setup setup_for(const Arguments& args) {
   Setup setup;
   if (args.has("volume")) {
     setup.name = args.text("volume");
-    setup.volume = centred(read_volume(setup.name, common_options(args).max_memory));
+    setup.volume = centred(load_volume(setup.name, args));
     const Grid& g = setup.volume->grid;
     const double pitch = *std::min_element(g.spacing.begin(), g.spacing.end());
     const double width = std::hypot(static_cast<double>(g.cells[0]) * g.spacing[0],
@@ -175,6 +175,7 @@ Phantom phantom_for(Setup& setup) {
 
 int simulate_command(Arguments& args) {
   add_options(args);
+  add_volume_input(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
