@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "vdvr/safe_sampler.hpp"
+
 namespace vdvr::paper {
 namespace {
 
@@ -71,6 +73,7 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
   c.seconds = since(start);
   c.volume = std::move(built.volume);
   c.certificate = std::move(built.certificate);
+  c.sampler = safe_sampler(device, c.volume, c.certificate).sampler;
   return c;
 }
 

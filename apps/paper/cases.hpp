@@ -38,7 +38,8 @@ struct Case {
   bool epsilon_of_max = false;  ///< what a relative tolerance is of
   MixedVolume volume;
   Certificate certificate;
-  double seconds = 0;  ///< plan and build, in memory
+  SamplerKind sampler = SamplerKind::buffer;  ///< that its certificate allows on the device
+  double seconds = 0;                         ///< plan and build, in memory
 };
 struct CaseOptions {
   Settings settings = Settings::ours;

@@ -62,7 +62,7 @@ RenderOptions lobb_view(const Grid& grid, std::int64_t side) {
 }
 
 RenderResult draw_case(Renderer& renderer, const Case& made, RenderOptions options) {
-  options.sampler = safe_sampler(SamplerKind::automatic, made.certificate);
+  options.sampler = made.sampler;
   return renderer.render(options);
 }
 

@@ -252,11 +252,10 @@ int certificate_exit_code(const std::string& who, const Certificate& certificate
     return 1;
   }
   if (!certificate.holds_image3d || *certificate.holds_image3d) return 0;
-  say(
-      fmt::format("{}: the certificate holds for the sampler 'buffer', but not for 'image3d' of this device; "
-                  "render with "
-                  "--sampler buffer, or ask for a larger epsilon\n",
-                  who));
+  say(fmt::format(
+      "{}: the certificate holds for the sampler 'buffer', with which pictures are drawn, but not "
+      "for 'image3d' of this device, which may err by {:.3g}; a larger epsilon leaves room for it\n",
+      who, certificate.budget.sampler.image3d->value));
   return 1;
 }
 

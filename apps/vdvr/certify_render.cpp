@@ -10,6 +10,7 @@
 #include "apps/vdvr/picture_certificate.hpp"
 #include "apps/vdvr/picture_light.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"
+#include "apps/vdvr/sampler_json.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/explain_pixel.hpp"
 #include "vdvr/hash.hpp"
@@ -128,13 +129,13 @@ void check_pixel(const Arguments& args, const RenderOptions& o) {
                                  (*pixel)[1], o.width, o.height));
 }
 
-std::optional<Explained> explained(const Arguments& args, const Scene& scene, const RenderOptions& o,
-                                   SamplerKind sampler) {
+std::optional<Explained> explained(const Arguments& args, const Scene& scene, const Certificate& certificate,
+                                   const RenderOptions& o, SamplerKind sampler) {
   const auto pixel = args.numbers("explain", 2);
   if (!pixel) return std::nullopt;
   Explained e{static_cast<std::int64_t>((*pixel)[0]), static_cast<std::int64_t>((*pixel)[1]), {}};
-  e.why = explain_pixel(scene.volume, brick_bounds(*scene.certificate, sampler == SamplerKind::image3d), o,
-                        e.x, e.y, scene.certificate->window.has_value());
+  e.why = explain_pixel(scene.volume, brick_bounds(certificate, sampler == SamplerKind::image3d), o, e.x, e.y,
+                        certificate.window.has_value());
   return e;
 }
 
@@ -193,7 +194,7 @@ void write_picture(const Outputs& out, Show& show, CertifiedDrawing& made, const
 int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
         const Outputs& out, const CertifiedDrawing& made, const PictureBound& bound, const Json& json) {
   const Scene& scene = source.scene();
-  const auto why = explained(args, scene, o, made.bounds.sampler);
+  const auto why = explained(args, scene, source.certificate(), o, made.bounds.sampler);
   const std::optional<PixelsBeyond> beyond = pixels_beyond(args, bound);
   Json printed = json;
   printed["output"] = out.picture.string();
@@ -321,7 +322,7 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   const Scene& scene = source.scene();
   check_file(args, scene, o);
   check_pixel(args, o);
-  const Certificate& certificate = *scene.certificate;
+  const Certificate& certificate = source.certificate();
   const Outputs out = outputs_of(output);
   for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
   const Clip covered = covered_clip(args, scene, progress);
@@ -345,17 +346,20 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
   if (!show.slice && !chose_steps(args)) draw_finer(source, o, asked, made, progress);
   o.sampler = made.drawn.sampler;
   const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
-  CertifiedPicture picture{o,
-                           options,
-                           lit,
-                           {covered.radius, {covered.low[2], covered.high[2]}},
-                           certificate.content_sha256,
-                           output.filename().string(),
-                           sha256_of_pixels(made.drawn.image),
-                           "",
-                           source.device().info().name,
-                           source.device().info().driver,
-                           show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
+  CertifiedPicture picture{
+      o,
+      options,
+      lit,
+      {covered.radius, {covered.low[2], covered.high[2]}},
+      certificate.content_sha256,
+      output.filename().string(),
+      sha256_of_pixels(made.drawn.image),
+      "",
+      source.device().info().name,
+      source.device().info().driver,
+      // Slices and light of F are certified on the host.
+      sampler_term_json(certificate, !show.slice && !lit && made.bounds.sampler == SamplerKind::image3d),
+      show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
   io::AtomicFiles files;
   const Outputs parts{files.add(out.picture), files.add(out.bound), files.add(out.certificate), out.values};
   write_picture(parts, show, made, bound, scene, o, overlay);

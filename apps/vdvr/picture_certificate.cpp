@@ -313,6 +313,7 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
            {{"radius", picture.covered.radius},
             {"z", Json::array({picture.covered.z.first, picture.covered.z.second})}}},
           {"sampler", picture.options.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
+          {"sampler_term", picture.sampler_term},
           {"kappa", picture.certify.kappa},
           {"theta", picture.certify.theta},
           {"fast", picture.certify.fast},
@@ -349,6 +350,11 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
     picture.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
     picture.device = j.at("device").get<std::string>();
     picture.driver = j.at("driver").get<std::string>();
+    picture.sampler_term = j.value("sampler_term", Json());
+    if (!picture.sampler_term.is_null()) {  // for the errors of what lacks a member
+      static_cast<void>(picture.sampler_term.at("value").get<double>());
+      static_cast<void>(picture.sampler_term.at("sampler").get<std::string>());
+    }
     picture.certify.kappa = j.at("kappa").get<double>();
     picture.certify.theta = j.at("theta").get<double>();
     picture.certify.fast = j.at("fast").get<bool>();

@@ -8,6 +8,7 @@
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
+#include "apps/vdvr/sampler_json.hpp"
 #include "vdvr/certified_rays.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
@@ -49,6 +50,7 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   picture.pixels_sha256 = sha256_of_pixels(drawn.image);
   picture.device = source.device().info().name;
   picture.driver = source.device().info().driver;
+  picture.sampler_term = sampler_term_json(source.certificate(), false);  // intervals are of the host
   return picture;
 }
 

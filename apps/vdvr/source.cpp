@@ -129,13 +129,26 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
   scene_ = Scene{as_mixed(projections_->samples()), std::nullopt, false};
 }
 
+SafeSampler Source::take_sampler(SamplerKind asked, bool unverified) {
+  // By bricks it is always the buffer.
+  if (paged_ && asked == SamplerKind::automatic) asked = SamplerKind::buffer;
+  // Further devices are of the first one's kind.
+  SafeSampler safe = safe_sampler(*device_, scene_->volume, scene_->certificate, asked, unverified);
+  here_ = safe.certificate;
+  return safe;
+}
+
+const Certificate& Source::certificate() const {
+  if (here_) return *here_;
+  if (!scene_->certificate)
+    throw InputError("--show error: the volume has no certificate to take bounds from");
+  return *scene_->certificate;
+}
+
 RenderResult Source::draw(const RenderOptions& options, const Progress& progress) {
   if (options.output == RenderOutput::error && !bounds_set_) {
-    if (!scene_->certificate)
-      throw InputError("--show error: the volume has no certificate to take bounds from");
-    // By bricks it is always the buffer.
     const bool image3d = renderer_ && renderer_->sampler(options.sampler) == SamplerKind::image3d;
-    const std::vector<float> bounds = brick_bounds(*scene_->certificate, image3d);
+    const std::vector<float> bounds = brick_bounds(certificate(), image3d);
     if (crew_) crew_->set_bounds(bounds);
     else renderer_->set_bounds(bounds);
     bounds_set_ = true;
@@ -146,10 +159,9 @@ RenderResult Source::draw(const RenderOptions& options, const Progress& progress
 PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
                             const Progress& progress) {
   if (paged_)
-    return certify_pixels(*device_, *paged_, brick_bounds(*scene_->certificate, false), options, certify,
-                          progress);
+    return certify_pixels(*device_, *paged_, brick_bounds(certificate(), false), options, certify, progress);
   const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
-  return certify_pixels(*device_, *resident_, brick_bounds(*scene_->certificate, image3d), options, certify,
+  return certify_pixels(*device_, *resident_, brick_bounds(certificate(), image3d), options, certify,
                         progress);
 }
 

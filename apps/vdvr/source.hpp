@@ -12,6 +12,7 @@
 #include "vdvr/paged_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/render_crew.hpp"
+#include "vdvr/safe_sampler.hpp"
 
 namespace vdvr::cli {
 
@@ -38,6 +39,10 @@ class Source {
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
   [[nodiscard]] Device& device() { return *device_; }
+  /// What safe_sampler() says of the device that draws. Bounds are afterwards those of its certificate.
+  SafeSampler take_sampler(SamplerKind asked, bool unverified);
+  /// As take_sampler() found it, else as the file has it; throws InputError where there is none.
+  [[nodiscard]] const Certificate& certificate() const;
   /// `progress` hears of pictures by several devices, or by bricks.
   [[nodiscard]] RenderResult draw(const RenderOptions& options, const Progress& progress = {});
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
@@ -71,6 +76,7 @@ class Source {
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;
+  std::optional<Certificate> here_;  ///< on the devices that draw
   bool bounds_set_ = false;
 };
 

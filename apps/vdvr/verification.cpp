@@ -25,13 +25,19 @@ Json samplers_json(const VerifyResult& m, const Certificate& c) {
   };
   add("buffer", c.holds_buffer, m.total_buffer, m.holds_buffer);
   add("image3d", c.holds_image3d.value_or(false), m.total_image3d, m.holds_image3d);
+  json["image3d"]["of_this_device"] = m.image3d_promised;
   return json;
 }
 
-std::string sampler_text(bool promised, const std::optional<double>& total,
-                         const std::optional<bool>& holds) {
+std::string sampler_text(bool promised, const std::optional<double>& total, const std::optional<bool>& holds,
+                         bool of_this_device = true) {
   if (!total) return promised ? "promised, but this device has no such sampler" : "not on this device";
-  return fmt::format("{:.5g}, {}", *total, !holds ? "not promised" : *holds ? "holds" : "DOES NOT HOLD");
+  return fmt::format("{:.5g}, {}", *total,
+                     !holds           ? "not promised"
+                     : *holds         ? "holds"
+                     : of_this_device ? "DOES NOT HOLD"
+                                      : "does not hold for this device, which did not build it: pictures "
+                                        "here take the buffer");
 }
 
 }  // namespace
@@ -83,9 +89,10 @@ void print_verification(const VerifyResult& m, const Certificate& c) {
   line("|V - F| at nodes", m.measured_max, c.measured_max);
   line("and between them", m.measured_total, c.measured_total);
   line("total", m.total, certified_total(c));
-  fmt::print("    {:<18} {}\n    {:<18} {}\n", "sampler buffer",
-             sampler_text(c.holds_buffer, m.total_buffer, m.holds_buffer), "sampler image3d",
-             sampler_text(c.holds_image3d.value_or(false), m.total_image3d, m.holds_image3d));
+  fmt::print(
+      "    {:<18} {}\n    {:<18} {}\n", "sampler buffer",
+      sampler_text(c.holds_buffer, m.total_buffer, m.holds_buffer), "sampler image3d",
+      sampler_text(c.holds_image3d.value_or(false), m.total_image3d, m.holds_image3d, m.image3d_promised));
   fmt::print("    {:<18} {:>20.5g}\n    worst at           {}\n", "tolerance", m.epsilon_abs,
              vec_text(m.worst_at));
   if (m.points_evaluated > 0)

@@ -11,11 +11,13 @@
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/picture_certificate.hpp"
+#include "apps/vdvr/sampler_json.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/paged_volume.hpp"
 #include "vdvr/render_crew.hpp"
+#include "vdvr/safe_sampler.hpp"
 #include "vdvr/stop.hpp"
 
 namespace vdvr::cli {
@@ -36,9 +38,14 @@ using Field = std::function<std::vector<double>(const std::vector<Vec3>&)>;
 class Shown {
  public:
   Shown(Device& device, const VdvrFile& file, const RenderOptions& o, const std::string& name)
-      : device_(device), file_(file) {
+      : device_(device),
+        certificate_(o.sampler == SamplerKind::image3d ? certificate_on(device, file.volume, file.certificate)
+                                                       : file.certificate) {
     if (file.volume.tiles.empty() || fits(device, file.volume)) {
       whole_.emplace(device, file.volume);
+      if (o.sampler == SamplerKind::image3d && !whole_->has_image3d())
+        throw ResourceError(fmt::format("{}: was drawn with the image3d sampler, which '{}' has not: {}",
+                                        name, device.info().name, whole_->image3d_reason()));
       return;
     }
     if (o.sampler == SamplerKind::image3d)
@@ -55,17 +62,18 @@ class Shown {
   }
   [[nodiscard]] PixelBounds certify(const RenderOptions& o, const CertifyPictureOptions& certify,
                                     const Progress& progress) const {
-    const auto bounds = brick_bounds(file_.certificate, o.sampler == SamplerKind::image3d);
+    const auto bounds = brick_bounds(certificate_, o.sampler == SamplerKind::image3d);
     return whole_ ? certify_pixels(device_, *whole_, bounds, o, certify, progress)
                   : certify_pixels(device_, *by_bricks_, bounds, o, certify, progress);
   }
+  [[nodiscard]] const Certificate& certificate() const { return certificate_; }
   [[nodiscard]] std::pair<float, float> value_range() const {
     return whole_ ? whole_->value_range() : by_bricks_->value_range();
   }
 
  private:
   Device& device_;
-  const VdvrFile& file_;
+  Certificate certificate_;              ///< as it holds on the device
   std::optional<ResidentVolume> whole_;  ///< or
   std::optional<PagedVolume> by_bricks_;
 };
@@ -79,8 +87,16 @@ struct Again {
   SurfaceBounds surface;     ///< of iso
   const MixedVolume* volume = nullptr;
   std::pair<float, float> value_range;
+  Json sampler_term;  ///< as this device charges it
   bool same_device = false;
 };
+/// Whether the intervals are of samples by the texture unit: those of other modes, and of F's light, are made
+/// on the host.
+bool is_by_image3d(const CertifiedPicture& picture) {
+  const RenderOptions& o = picture.options;
+  return o.mode == RenderMode::dvr && !picture.lit && o.sampler == SamplerKind::image3d;
+}
+
 void certify_again(const Shown& shown, const CertifiedPicture& picture, const VdvrFile& file,
                    const Progress& progress, Again& again) {
   const RenderOptions& o = picture.options;
@@ -122,6 +138,7 @@ Again made_again(const CommonOptions& common, const CertifiedPicture& picture, c
   const Shown shown(device, file, picture.options, name);
   Again again;
   again.same_device = device.info().name == picture.device && device.info().driver == picture.driver;
+  again.sampler_term = sampler_term_json(shown.certificate(), is_by_image3d(picture));
   try {
     // As render does: what needs more memory first.
     const bool on_device = picture.options.mode == RenderMode::dvr && !picture.lit;
@@ -309,6 +326,19 @@ PixelBounds narrowed(PixelBounds bounds) {
   return bounds;
 }
 
+/// What was charged for the sampler, where this device charges the same. Files of earlier versions do not
+/// say.
+void compare_sampler(const CertifiedPicture& picture, const Again& again, std::vector<std::string>& wrong) {
+  const Json &said = picture.sampler_term, &found = again.sampler_term;
+  if (said.is_null() || (is_by_image3d(picture) && !again.same_device)) return;
+  const double value = said.at("value").get<double>(), term = found.at("value").get<double>();
+  // Slopes are summed in another order, in double precision.
+  if (said.at("sampler") != found.at("sampler") || !(std::abs(value - term) <= 0x1p-40 * term))
+    wrong.push_back(fmt::format("the term of the sampler is {} of {}, not {} of {}", term,
+                                found.at("sampler").get<std::string>(), value,
+                                said.at("sampler").get<std::string>()));
+}
+
 /// What the file claims and the intervals do not give.
 void compare(const PictureClaims& claims, const PictureBound& bound, const Again& again,
              std::vector<std::string>& wrong) {
@@ -384,6 +414,7 @@ int verify_picture(const Arguments& args, const CommonOptions& common) {
       (!iso && claims.light != text_of(again.bounds.light)))
     wrong.push_back(
         fmt::format("what is proved is not what it says, but: {}", statement_of(mode, again.bounds.light)));
+  compare_sampler(picture, again, wrong);
   if (iso) compare_surface(claims.iso, again.surface, wrong);
   else compare(claims, bound, again, wrong);
   std::optional<RayCheck> rays;

@@ -14,13 +14,13 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/closing/close_boundaries.hpp"
 #include "host/certify/fill_certificate.hpp"
+#include "host/certify/sampler_share.hpp"
 #include "host/closing/raise_levels.hpp"
 #include "host/crew/crew.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/gold/prepared_scan.hpp"
 #include "host/opencl/host_memory.hpp"
-#include "host/sampler/sampler_terms.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
@@ -62,12 +62,22 @@ std::vector<float> fitted_base(opencl::State& state, PreparedScan& from, Plan& p
   return base;
 }
 
+// Of the devices' texture units the worst.
+FilterErrors filters_of(const std::vector<Crew::Kind>& kinds) {
+  FilterErrors worst;
+  for (const Crew::Kind& kind : kinds) {
+    const FilterErrors own = filter_errors(kind.probe);
+    worst = {std::max(worst.u8, own.u8), std::max(worst.u16, own.u16)};
+  }
+  return worst;
+}
+
 // Of integer samples.
 Lattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
-                   StorageChoice storage) {
+                   StorageChoice storage, const FilterErrors& filters) {
   return choose_lattice(base, storage,
                         most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
-                        units.density());
+                        units.density(), filters);
 }
 
 Room room_for(const opencl::State& state, const ProjectionSet& scan, const BuildOptions& options) {
@@ -115,21 +125,6 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const L
   bricks.samples = TileStore(room);
   bricks.samples.resize(count);
   return bricks;
-}
-
-// What a bound holds beside what is measured at nodes: arithmetic and the device's samplers.
-double beside_nodes(const Inputs& in, const SamplerTerms& sampler) {
-  if (in.plan.settings.comparison.terms == Terms::grid) return 0;
-  return in.arithmetic + std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
-}
-
-// The largest |V - gold| + T + P that leaves room for these.
-double node_tolerance(const Inputs& in, double epsilon_abs, const SamplerTerms& sampler) {
-  const double tolerance = epsilon_abs - beside_nodes(in, sampler);
-  if (tolerance > 0) return tolerance;
-  throw ToleranceError(fmt::format("epsilon {:.4g} is out of reach: rounding and samplers alone take {:.4g}",
-                                   to_world(epsilon_abs, in.units),
-                                   to_world(epsilon_abs - tolerance, in.units)));
 }
 
 [[noreturn]] void refuse_slack(const Inputs& in, const ClassifyBricks::Bounds& bounds, float slack,
@@ -321,29 +316,6 @@ void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan)
   host.count(4 * plan.base.samples.size(), "the base samples");
 }
 
-// How often a volume may be brought within a smaller tolerance: each time takes what was measured and a
-// quarter.
-constexpr int most_reserves = 4;
-
-SamplerTerms with_reserve(SamplerTerms terms) {
-  terms.buffer.value *= 1.25;
-  if (terms.image3d) terms.image3d->value *= 1.25;
-  return terms;
-}
-
-// What a sampler may add on the worst of these devices.
-SamplerTerms worst_terms(const std::vector<Crew::Kind>& kinds,
-                         const std::function<SamplerTerms(const Crew::Kind&)>& terms_of) {
-  SamplerTerms worst = terms_of(kinds.front());
-  for (std::size_t i = 1; i < kinds.size(); ++i) {
-    const SamplerTerms other = terms_of(kinds[i]);
-    if (other.buffer.value > worst.buffer.value) worst.buffer = other.buffer;
-    if (other.image3d && (!worst.image3d || other.image3d->value > worst.image3d->value))
-      worst.image3d = other.image3d;
-  }
-  return worst;
-}
-
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
 // much. All but the scan, and what is thrown, in `units`.
 BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
@@ -379,14 +351,14 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const std::string digest = options.journal ? plan_digest(scan, plan) : "";
   const std::vector<float> base = fitted_base(state, *from, plan, settings, selected, others, progress);
   watch.lap("fit");
-  settings.lattice = lattice_of(base, plan, units, options.storage);
+  const std::vector<Crew::Kind> kinds =
+      crew ? crew->kinds() : std::vector<Crew::Kind>{{device.info(), probe_filters(device), 0}};
+  watch.lap("probe");
+  settings.lattice = lattice_of(base, plan, units, options.storage, filters_of(kinds));
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   BlockRecords records(options.journal, options.parts);
   JournalledRates journalled(gold, &records, others);
   watch.lap("bounds");
-  const std::vector<Crew::Kind> kinds =
-      crew ? crew->kinds() : std::vector<Crew::Kind>{{device.info(), probe_filters(device), 0}};
-  watch.lap("probe");
 
   const Room room = room_for(state, scan, options);
   double arithmetic = gold.arithmetic();
@@ -395,50 +367,50 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   std::optional<BrickRefinement> refinement;
   if (options.refinement) refinement.emplace(*options.refinement, units);
   const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
-  const auto sampler_of = [&](const FieldSlopes& of, const auto& atlas) {
-    return worst_terms(kinds, [&](const Crew::Kind& kind) {
-      return sampler_terms(of, plan.grid, kind.probe, atlas(kind.info), epsilon_abs, plan.rates.gold,
-                           from_world(sampler_underflow(kind.info), units));
-    });
-  };
-  // The samplers' share is known only from the stored samples: reserve what the base volume suggests. Where
-  // that was short, bricks rise until the volume leaves room for what it takes, and a reserve.
-  const SamplerTerms reserved = with_reserve(sampler_of(slopes, longest_atlas));
-  const double tolerance = node_tolerance(in, epsilon_abs, reserved);
-  records.begin(journal_head(kinds, scan, plan, digest, options, gold.fine(), tolerance));
-  int times = 0;
+  SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes);
+  records.begin(
+      journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
   bool refined = false;
   const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
-    const SamplerTerms sampler = sampler_of(field_slopes(measured.volume), [&](const DeviceInfo& info) {
-      return atlas_length(info, measured.volume);
-    });
+    const SamplerTerms sampler = samplers.of(measured.volume);
     result.certificate =
         fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
-    refined = refinement && refinement->asks(measured.volume, result.certificate, beside_nodes(in, sampler),
-                                             node_tolerance(in, plan.epsilon_abs, reserved));
+    refined =
+        refinement && refinement->asks(measured.volume, result.certificate, samplers.beside_nodes(sampler),
+                                       samplers.first_tolerance(plan.epsilon_abs));
     if (refined) return std::nullopt;
-    const bool holds = result.certificate.holds_buffer && result.certificate.holds_image3d.value_or(true);
-    if (holds || times++ == most_reserves || result.certificate.comparison) return std::nullopt;
-    const double less = node_tolerance(in, epsilon_abs, with_reserve(sampler));
-    return refinement ? refinement->with_bricks(less) : NodeTolerance(less);
+    const std::optional<double> less = samplers.smaller(result.certificate);
+    if (!less) return std::nullopt;
+    return refinement ? refinement->with_bricks(*less) : NodeTolerance(*less);
   };
   // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
   const auto volume_on = [&](const Lattice& lattice) {
     for (;;) {
-      times = 0;
+      const double tolerance = samplers.begin();
       MixedVolume volume =
           measured_volume(in, base, lattice, refinement ? refinement->with_bricks(tolerance) : tolerance,
                           accept, share)
               .volume;
-      if (!refined) return volume;
+      if (!refined && !samplers.anew()) return volume;
+    }
+  };
+  const auto volume_in_integers_or_not = [&] {
+    try {
+      return volume_on(settings.lattice);
+    } catch (const NoRoomForImage3d&) {
+      throw;
+    } catch (const ToleranceError&) {
+      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
+      if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
+      return volume_on(lattice_of(base, plan, units, StorageChoice::f32, {}));
     }
   };
   try {
-    result.volume = volume_on(settings.lattice);
+    result.volume = volume_in_integers_or_not();
   } catch (const ToleranceError&) {
-    // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-    if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
-    result.volume = volume_on(lattice_of(base, plan, units, StorageChoice::f32));
+    if (!samplers.raised_for_image3d()) throw;
+    samplers.give_up_image3d();
+    result.volume = volume_in_integers_or_not();
   }
   if (crew) {
     result.message_bytes = crew->bytes();

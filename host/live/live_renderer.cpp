@@ -13,6 +13,7 @@
 #include "vdvr/live_events.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/resident_volume.hpp"
+#include "vdvr/safe_sampler.hpp"
 
 namespace vdvr {
 namespace {
@@ -71,7 +72,7 @@ struct LiveRenderer::Impl {
   };
 
   const MixedVolume* volume;
-  const std::optional<Certificate>* certificate;
+  std::optional<Certificate> certificate;  ///< as it holds on the device
   ResidentVolume resident;
   Renderer renderer;
   LiveScene scene;
@@ -80,11 +81,14 @@ struct LiveRenderer::Impl {
 
   Impl(Device& device, const MixedVolume& v, const std::optional<Certificate>& c, double budget)
       : volume(&v),
-        certificate(&c),
         resident(device, v),
         renderer(device, resident),
         scene(live_scene(v, c)),
-        kinds(20, Kind{FramePace(budget), 0}) {}
+        kinds(20, Kind{FramePace(budget), 0}) {
+    SafeSampler safe = safe_sampler(device, v, c);
+    scene.sampler = safe.sampler;
+    certificate = std::move(safe.certificate);
+  }
 
   Kind& kind_of(const LiveView& v) {
     return kinds[4 * static_cast<std::size_t>(v.mode) + (v.shading ? 2 : 0) + (v.bound ? 1 : 0)];
@@ -92,7 +96,7 @@ struct LiveRenderer::Impl {
   [[nodiscard]] bool image3d() const { return renderer.sampler(scene.sampler) == SamplerKind::image3d; }
 
   ErrorSlice bounds_of_slice(const LiveView& v, std::int64_t width, std::int64_t height, bool framed) const {
-    return bound_slice(*volume, **certificate, image3d(),
+    return bound_slice(*volume, *certificate, image3d(),
                        {v.slice_axis, v.slice_position, width, height, framed});
   }
 
@@ -109,7 +113,7 @@ struct LiveRenderer::Impl {
       mix(image, bounds.image, bounds.errors);
       return image;
     }
-    if (!bounds_set) renderer.set_bounds(brick_bounds(**certificate, image3d()));
+    if (!bounds_set) renderer.set_bounds(brick_bounds(*certificate, image3d()));
     bounds_set = true;
     o.output = RenderOutput::error;
     const FloatImage bounds = renderer.render(o).values;

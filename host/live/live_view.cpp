@@ -64,7 +64,7 @@ LiveScene live_scene(const MixedVolume& volume, const std::optional<Certificate>
   const auto [lo, hi] = std::minmax_element(samples.begin(), samples.end());
   scene.range = {static_cast<double>(*lo), static_cast<double>(*hi)};
   scene.histogram = shares(samples, scene.range.first, scene.range.second);
-  scene.sampler = safe_sampler(SamplerKind::automatic, certificate);
+  if (certificate) scene.sampler = SamplerKind::buffer;
   scene.has_bounds = certificate && !certificate->comparison && !certificate->brick_totals.empty();
   if (certificate) scene.epsilon_abs = certificate->epsilon_abs;
   return scene;

@@ -265,12 +265,6 @@ std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densities,
   return surfaces;
 }
 
-SamplerKind safe_sampler(SamplerKind asked, const std::optional<Certificate>& certificate) {
-  const bool automatic = asked == SamplerKind::automatic;
-  if (automatic && certificate && !certificate->holds_image3d.value_or(false)) return SamplerKind::buffer;
-  return asked;
-}
-
 RenderOptions automatic_view(const MixedVolume& volume, const std::optional<Certificate>& certificate) {
   const Brightness bright = brightness_of(volume);
   RenderOptions o;
@@ -280,7 +274,7 @@ RenderOptions automatic_view(const MixedVolume& volume, const std::optional<Cert
   o.slice_position = bright.dense_center[static_cast<std::size_t>(o.slice_axis)];
   o.camera = orbit_camera(frame_view(volume, o, 30, 20), 30, 20, 1);
   o.step_mode = StepMode::adaptive;
-  o.sampler = safe_sampler(o.sampler, certificate);
+  if (certificate) o.sampler = SamplerKind::buffer;
   return o;
 }
 

@@ -96,6 +96,14 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
   return terms;
 }
 
+FilterErrors filter_errors(const SamplerProbe& probe) {
+  const auto beside_f32 = [&](const FilterProbe& p) {
+    if (!probe.image3d || !p.image3d) return 0.0;
+    return 3 * std::max(0.0, p.delta - probe.delta) + std::max(0.0, p.constant_error - probe.constant_error);
+  };
+  return {beside_f32(probe.u8), beside_f32(probe.u16)};
+}
+
 double sampler_underflow(const DeviceInfo& device) {
   // A sample as it is stored and decoded, and two products and a sum on each of three levels of
   // interpolation.

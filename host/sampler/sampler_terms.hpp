@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "host/volume/choose_lattice.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/probe_sampler.hpp"
@@ -32,6 +33,11 @@ FieldSlopes field_slopes(const MixedVolume& volume);
 /// used where bricks meet with integer samples. `underflow`: sampler_underflow() in the units of the samples.
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
                            std::int64_t atlas_length, double node_error, int rate, double underflow = 0);
+
+/// What the filters of integers may err by more than that of float32 (choose_lattice.hpp): three weights, by
+/// the largest differences that there can be, and what is left of it where all samples are alike. An estimate
+/// by which storage is chosen; what samplers are charged is sampler_terms().
+FilterErrors filter_errors(const SamplerProbe& probe);
 
 /// What a sampler may lose below the normal numbers of fp32, in world units, in which it works; on a device
 /// that flushes those to 0, more.

@@ -138,18 +138,29 @@ std::string place_text(const SamplePlace& p) {
       where, p.sample[2], p.sample[1], p.sample[0]);
 }
 
-// Which samplers must hold: those promised that this device has.
-void judge(const Certificate& stored, const SamplerTerms& sampler, VerifyResult& r) {
+bool is_builder(const Device& device, const Certificate& stored) {
+  return device.info().name == stored.device && device.info().driver == stored.driver;
+}
+
+// What is promised of a texture unit is promised of the one on which the file was built: only there can it be
+// wrong. Elsewhere pictures take the buffer where it does not hold (safe_sampler.hpp).
+bool promises_image3d(const Device& device, const Certificate& stored) {
+  return stored.holds_image3d.value_or(false) && is_builder(device, stored);
+}
+
+// Which samplers must hold: those that this device has and that are promised of it.
+void judge(const Device& device, const Certificate& stored, const SamplerTerms& sampler, VerifyResult& r) {
   r.total_buffer = r.measured_total + sampler.buffer.value;
   if (sampler.image3d) r.total_image3d = r.measured_total + sampler.image3d->value;
   r.total = r.total_buffer;
   if (stored.holds_buffer) r.holds_buffer = r.total_buffer <= stored.epsilon_abs;
-  if (stored.holds_image3d.value_or(false) && r.total_image3d) {
+  r.image3d_promised = promises_image3d(device, stored);
+  if (stored.holds_image3d.value_or(false) && r.total_image3d)
     r.holds_image3d = *r.total_image3d <= stored.epsilon_abs;
-    r.total = std::max(r.total, *r.total_image3d);
-  }
-  if (!r.holds_buffer && !r.holds_image3d) r.failure = "the certificate holds for no sampler of this device";
-  else r.holds = r.holds_buffer.value_or(true) && r.holds_image3d.value_or(true);
+  if (r.image3d_promised && r.total_image3d) r.total = std::max(r.total, *r.total_image3d);
+  if (!r.holds_buffer && !(r.image3d_promised && r.holds_image3d))
+    r.failure = "the certificate holds for no sampler of this device";
+  else r.holds = r.holds_buffer.value_or(true) && (!r.image3d_promised || r.holds_image3d.value_or(true));
 }
 
 // The finest gold on which bricks are tested again: its T is a thousandth of that at 2x. Cell coordinates of
@@ -313,11 +324,10 @@ class TestedBricks {
   bool hopeless_ = false;
 };
 
-// What the promised samplers that this device has leave of epsilon for |V - F| itself.
-double left_by_samplers(const Certificate& stored, const SamplerTerms& sampler) {
+// What the samplers that this device has and that are promised of it leave of epsilon for |V - F| itself.
+double left_by_samplers(const Device& device, const Certificate& stored, const SamplerTerms& sampler) {
   double taken = stored.holds_buffer ? sampler.buffer.value : 0;
-  if (stored.holds_image3d.value_or(false) && sampler.image3d)
-    taken = std::max(taken, sampler.image3d->value);
+  if (promises_image3d(device, stored) && sampler.image3d) taken = std::max(taken, sampler.image3d->value);
   return stored.epsilon_abs - taken;
 }
 
@@ -327,8 +337,7 @@ Differences check_samplers(Device& device, const MixedVolume& volume, const Cert
   SamplerProbe ideal;
   ideal.image3d = ideal.u16.image3d = ideal.u8.image3d = true;
   const SamplerTerms least = sampler_terms(slopes, volume.grid, ideal, 1, stored.epsilon_abs, volume.rate);
-  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
-  return compare_samplers(found, least, same_device, stored);
+  return compare_samplers(found, least, is_builder(device, stored), stored);
 }
 
 // Adds what differs to the verdict.
@@ -383,7 +392,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
   TestedBricks tested(
       field, volume, attack,
-      {left_by_samplers(stored, sampler), stored.measured_total + stored.budget.arithmetic.value},
+      {left_by_samplers(device, stored, sampler), stored.measured_total + stored.budget.arithmetic.value},
       stored.window.has_value(), progress);
   tested.sweep(selected, points_of_field.flags(), result);
   tested.settle(result);
@@ -420,7 +429,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   };
   result.worst = place(worst);
   result.worst_at = result.worst.world;
-  judge(stored, sampler, result);
+  judge(device, stored, sampler, result);
   if (!result.holds && result.failure.empty())
     result.failure = fmt::format("|V - F| may reach {:.6g} > epsilon {:.6g} {}", result.total,
                                  stored.epsilon_abs, place_text(result.worst));

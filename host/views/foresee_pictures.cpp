@@ -66,6 +66,7 @@ class Forecast {
         progress_(progress),
         host_(state_),
         coverage_(certified_coverage(scan, plan.field)),
+        filters_(filter_errors(probe_filters(device))),
         rounds_(options, parts_a_cell) {
     host_.count(4 * count(std::ssize(plan.base.samples)) + BrickOutlook::bytes(plan.grid, plan.layout),
                 "pictures foreseen");
@@ -165,7 +166,7 @@ class Forecast {
     const Lattice lattice = choose_lattice(foresight_.stored(), storage,
                                            most_rounding(from_world(plan_.epsilon_abs, foresight_.units()),
                                                          plan_.layout.levels == Levels::anisotropic),
-                                           foresight_.units().density());
+                                           foresight_.units().density(), filters_);
     out.bytes =
         static_cast<std::uint64_t>(out.samples_ratio * static_cast<double>(plan_.grid.sample_count())) *
         bytes_of(lattice.base);
@@ -182,6 +183,7 @@ class Forecast {
   const Progress& progress_;
   HostMemory host_;
   Coverage coverage_;
+  FilterErrors filters_;
   PictureRounds rounds_;
   MixedVolume volume_;  // F at the grid's samples
   PictureViews full_, views_;

@@ -42,14 +42,11 @@ VDVR_API TransferFunction preset_for(const std::string& name, const Brightness& 
 VDVR_API std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densities,
                                               const std::optional<std::vector<double>>& opacities = {});
 
-/// The sampler to render with: `automatic` becomes `buffer` where the certificate does not hold for image3d.
-/// One that was asked for by name stays.
-VDVR_API SamplerKind safe_sampler(SamplerKind asked, const std::optional<Certificate>& certificate);
-
 /// All of it: two materials, an iso-surface at the threshold, the grey window and the middle of the dense
 /// part for slices, all that the transfer function shows seen at azimuth 30 and elevation 20 degrees
-/// (framing.hpp), steps adapted to the picture, the safe sampler. Everything else as RenderOptions has it.
-/// Cost: brightness_of and shown_points.
+/// (framing.hpp), steps adapted to the picture. With a certificate the buffer sampler, for which it holds on
+/// every device; whether a device's own may be taken, safe_sampler() knows (safe_sampler.hpp). Everything
+/// else as RenderOptions has it. Cost: brightness_of and shown_points.
 VDVR_API RenderOptions automatic_view(const MixedVolume& volume,
                                       const std::optional<Certificate>& certificate = {});
 

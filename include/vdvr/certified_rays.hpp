@@ -54,7 +54,8 @@ class VDVR_API CertifiedRays {
  public:
   /// Rays are those within the covered cylinder, the grid and the region of interest. Refers to the volume.
   /// `scan`: the geometry, its projections are not looked at. Throws InputError where the certificate has no
-  /// bounds by brick, or a window.
+  /// bounds by brick, or a window. `image3d`: of samples by the texture unit of the device that `certificate`
+  /// speaks of (safe_sampler.hpp).
   CertifiedRays(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan,
                 bool image3d = false);
   /// The same with the geometry that the certificate notes, and of what lies in `box` ({x0, y0, z0, x1, y1,

@@ -44,8 +44,9 @@ VDVR_API ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const
 /// The same picture from the certificate alone: every pixel shows the bound of |V - F| at the covered points
 /// of its brick (`max_error`, `errors`), or where the file has none by brick the certificate's total; grey
 /// and NaN in bricks that were not tested or lie outside the region of interest. Points that are not covered
-/// cannot be told apart without the projections: the caption says where it holds. Host only. Throws
-/// InputError when the certificate has no total for the sampler, and as above.
+/// cannot be told apart without the projections: the caption says where it holds. Of image3d the certificate
+/// must be that of the device that draws (safe_sampler.hpp). Host only. Throws InputError when the
+/// certificate has no total for the sampler, and as above.
 VDVR_API ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& certificate, bool image3d,
                                 const ErrorSliceOptions& options);
 

@@ -28,6 +28,7 @@ struct LiveScene {
   /// What orbits look at, and from how far at zoom 1: all that the first transfer function shows in a whole
   /// turn of a picture as high as wide; of thin volumes the grid.
   OrbitFrame frame;
+  /// With a certificate the buffer, but in a LiveRenderer's scene what its device may take.
   SamplerKind sampler = SamplerKind::automatic;
   bool has_bounds = false;  ///< there is a certificate, with bounds by brick
   double epsilon_abs = 0;   ///< of it

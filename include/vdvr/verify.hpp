@@ -40,10 +40,13 @@ struct VerifyResult {
   double measured_max = 0;    ///< largest |V - F| at a tested node
   double measured_total = 0;  ///< largest bound of |V - F| over a tested brick, exact interpolation of V
   double arithmetic = 0;      ///< what verify's own computation of F may err; contained in measured_total
-  double total = 0;           ///< measured_total and the worst sampler that the certificate names
+  double total = 0;           ///< measured_total and the worst sampler that is promised of this device
   double total_buffer = 0;
   std::optional<double> total_image3d;              ///< absent where this device has no such sampler
   std::optional<bool> holds_buffer, holds_image3d;  ///< absent where not promised or not on this device
+  /// The certificate holds for the texture unit of this device, which built it. That of another is no part of
+  /// the promise: `holds` does not ask for holds_image3d, without which pictures here take the buffer.
+  bool image3d_promised = false;
   Vec3 worst_at{0, 0, 0};
   SamplePlace worst;  ///< the stored sample nearest to the worst corner of the worst gold cell
   std::int64_t bricks_tested = 0, bricks = 0;
@@ -69,7 +72,7 @@ struct VerifyResult {
 /// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
 /// cell, V through the sampler header, on gold a quarter of a pixel apart; again on finer gold, up to 64x, in
 /// bricks whose bound there exceeds epsilon or the certificate's total. Requires the samplers that `stored`
-/// says hold and that this device has; then computes again what else `stored` says (docs/error-bounds.md,
+/// says hold and that this device has, image3d only on the device that built the volume; then computes again what else `stored` says (docs/error-bounds.md,
 /// "What verify compares"). Does not check hashes: the caller does, from the file. Cost: views * rows *
 /// columns^2 a few times on the host, 7 * views multiply-adds for each node a quarter of a pixel apart across
 /// z on each detector row, as many as there are rows for each gold node (of cone beam 64 * views for each

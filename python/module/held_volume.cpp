@@ -23,19 +23,30 @@ RenderResult HeldVolume::render(const std::shared_ptr<Device>& device, const Ren
   if (device_ != device) {
     renderer_.reset();
     resident_.reset();
+    safe_.clear();
     device_ = device;
   }
+  auto safe = safe_.find(options.sampler);
+  if (safe == safe_.end())
+    safe = safe_
+               .emplace(options.sampler,
+                        safe_sampler(*device_, file_.volume, certificate(), options.sampler, file_.altered))
+               .first;
+  RenderOptions drawn = options;
+  drawn.sampler = safe->second.sampler;
   if (!resident_) resident_.emplace(*device_, file_.volume);
   if (!renderer_) {
     renderer_.emplace(*device_, *resident_);
-    has_bounds_ = false;
+    bounds_of_.reset();
   }
-  if (options.output == RenderOutput::error && !has_bounds_) {
-    renderer_->set_bounds(
-        brick_bounds(file_.certificate, renderer_->sampler(options.sampler) == SamplerKind::image3d));
-    has_bounds_ = true;
+  if (options.output == RenderOutput::error) {
+    const SamplerKind used = renderer_->sampler(drawn.sampler);
+    if (bounds_of_ != used)
+      renderer_->set_bounds(
+          brick_bounds(safe->second.certificate.value_or(file_.certificate), used == SamplerKind::image3d));
+    bounds_of_ = used;
   }
-  return renderer_->render(options);
+  return renderer_->render(drawn);
 }
 
 void HeldVolume::release() {

@@ -1,6 +1,7 @@
 // A certified volume as Python holds it: the file's contents, and what pictures of it keep on a device.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "vdvr/device.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/resident_volume.hpp"
+#include "vdvr/safe_sampler.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::python {
@@ -22,9 +24,9 @@ class HeldVolume {
   /// Made once.
   const Brightness& brightness();
   const CertifiedPoints& points();
-  /// One picture; threads take turns.
+  /// One picture, with the sampler asked for or, of `automatic`, one for which the certificate holds on this
+  /// device; threads take turns. Throws as safe_sampler and Renderer::render.
   RenderResult render(const std::shared_ptr<Device>& device, const RenderOptions& options);
-  [[nodiscard]] SamplerKind sampler(SamplerKind asked) const { return safe_sampler(asked, certificate()); }
   /// None of a comparison, which certifies nothing.
   [[nodiscard]] std::optional<Certificate> certificate() const;
   /// Gives back what pictures keep on the device.
@@ -38,7 +40,8 @@ class HeldVolume {
   std::shared_ptr<Device> device_;
   std::optional<ResidentVolume> resident_;  // before the renderer, which uses it
   std::optional<Renderer> renderer_;
-  bool has_bounds_ = false;
+  std::map<SamplerKind, SafeSampler> safe_;  // by what was asked for, on the device
+  std::optional<SamplerKind> bounds_of_;     // that the renderer has
 };
 
 }  // namespace vdvr::python

@@ -254,7 +254,6 @@ void add_volumes(nb::module_& m) {
           },
           "spacing"_a.none(), "box"_a.none())
       .def("on_lattice", &on_lattice, "lattice"_a, "bounds"_a)
-      .def("sampler", &HeldVolume::sampler, "asked"_a)
       .def("frame_view", &frame_of, "options"_a, "azimuth_deg"_a, "elevation_deg"_a)
       .def("render", &render, "device"_a, "options"_a, "values"_a)
       .def("error_picture", &error_picture, "options"_a, "values"_a)

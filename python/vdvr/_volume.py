@@ -207,7 +207,7 @@ class Volume:
             if len(given) not in (3, 6) or not all(0 <= c <= 1 for c in given):
                 raise _core.InputError(f"background: {background}; give three or six numbers from 0 to 1")
             o.background_top, o.background_bottom = given[:3], given[-3:]
-        o.sampler = self._held.sampler(choice(_core.SamplerKind, sampler, "sampler"))
+        o.sampler = choice(_core.SamplerKind, sampler, "sampler")
         return self._held.render(self._open_device(device), o, values)
 
     def _transfer(self, transfer: TransferLike, window: Optional[Tuple[float, float]]) -> "_core.TransferFunction":

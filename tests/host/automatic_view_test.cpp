@@ -135,13 +135,11 @@ BOOST_AUTO_TEST_CASE(background_is_clear_and_the_dense_material_is_not) {
   BOOST_TEST(*view.slice_position == 11.5);
 }
 
-BOOST_AUTO_TEST_CASE(a_sampler_without_a_certificate_is_taken_only_by_name) {
+BOOST_AUTO_TEST_CASE(a_view_of_a_certified_volume_takes_the_buffer_which_holds_on_every_device) {
   using enum SamplerKind;
-  BOOST_CHECK(safe_sampler(automatic, holding({})) == buffer);
-  BOOST_CHECK(safe_sampler(automatic, holding(false)) == buffer);
-  BOOST_CHECK(safe_sampler(automatic, holding(true)) == automatic);
-  BOOST_CHECK(safe_sampler(image3d, holding(false)) == image3d);
-  BOOST_CHECK(safe_sampler(automatic, {}) == automatic);
+  BOOST_CHECK(automatic_view(three_materials()).sampler == automatic);
+  for (const std::optional<bool> image3d : {std::optional<bool>(), std::optional(false), std::optional(true)})
+    BOOST_CHECK(automatic_view(three_materials(), holding(image3d)).sampler == buffer);
 }
 
 BOOST_AUTO_TEST_CASE(a_volume_of_a_cell_in_z_is_thin) {

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE quantise
-#include "host/volume/quantise.hpp"
+#include "host/volume/choose_lattice.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <algorithm>
@@ -63,6 +63,23 @@ BOOST_AUTO_TEST_CASE(auto_takes_the_smallest_type_whose_half_step_is_allowed) {
   BOOST_TEST((choose_lattice(base, StorageChoice::automatic, 0x1p-16).base == SampleType::u16));
   BOOST_TEST(choose_lattice(base, StorageChoice::automatic, 0x1.fp-17).step == 0.0);
   BOOST_TEST(choose_lattice(base, StorageChoice::f32, 1).step == 0.0);
+}
+
+BOOST_AUTO_TEST_CASE(auto_takes_no_type_whose_filter_errs_by_more_than_rounding_may) {
+  const std::vector<float> base = random_base(0, 1, 5);
+  const auto chosen = [&](double rounding, const FilterErrors& filters) {
+    return choose_lattice(base, StorageChoice::automatic, rounding, 0, filters);
+  };
+  // All that 8 bits of step 2^-7 hold is 255 / 128.
+  const double rounding = 0x1p-8, limit = rounding / (255 * 0x1p-7);
+  BOOST_TEST((chosen(rounding, {limit, 0}).base == SampleType::u8));
+  const Lattice badly = chosen(rounding, {1.01 * limit, 0});
+  BOOST_TEST((badly.base == SampleType::u16));
+  BOOST_TEST((badly.least == SampleType::u16));  // nor do tiles take it
+  BOOST_TEST(badly.base_step() == 0x1p-7);       // the coarsest of which half is allowed
+  BOOST_TEST(chosen(rounding, {1, 1}).step == 0.0);
+  // What is asked for by name is taken.
+  BOOST_TEST((choose_lattice(base, StorageChoice::u8, rounding, 0, {1, 1}).base == SampleType::u8));
 }
 
 BOOST_AUTO_TEST_CASE(a_tile_takes_the_finest_step_that_fits_and_none_coarser_than_the_base) {

@@ -51,6 +51,7 @@ Json filter_json(const FilterProbe& p) {
 
 Json probe_json(const SamplerProbe& p) {
   return {{"image3d", p.image3d},
+          {"f32", filter_json(p)},
           {"u16", filter_json(p.u16)},
           {"u8", filter_json(p.u8)},
           {"weight_error", p.weight_error},
@@ -59,6 +60,14 @@ Json probe_json(const SamplerProbe& p) {
           {"buffer_samples_per_second", p.buffer_rate},
           {"image3d_samples_per_second", p.image3d_rate},
           {"chosen", p.chosen}};
+}
+
+/// A filter's line: what it does to weights and to what is the same all around.
+std::string filter_text(const Json& p) {
+  if (!p["image3d"].get<bool>()) return "no 3D image that can be read with the linear filter";
+  return fmt::format("weights off by {:.3g}, charged {:.3g}; constants off by {:.3g}",
+                     p["weight_error"].get<double>(), p["delta"].get<double>(),
+                     p["constant_error"].get<double>());
 }
 
 void print_device(const Json& d) {
@@ -76,12 +85,10 @@ void print_device(const Json& d) {
   const Json& p = d["probe"];
   fmt::print("  probe        {} chosen; buffer {:.4g} samples/s", p["chosen"].get<std::string>(),
              p["buffer_samples_per_second"].get<double>());
-  if (p["image3d"].get<bool>()) {
-    fmt::print(", image3d {:.4g} samples/s; weights off by {:.3g}, charged {:.3g}; constants off by {:.3g}",
-               p["image3d_samples_per_second"].get<double>(), p["weight_error"].get<double>(),
-               p["delta"].get<double>(), p["constant_error"].get<double>());
-  }
+  if (p["image3d"].get<bool>())
+    fmt::print(", image3d {:.4g} samples/s", p["image3d_samples_per_second"].get<double>());
   fmt::print("\n");
+  for (const char* type : {"f32", "u16", "u8"}) fmt::print("  filter {:<6}{}\n", type, filter_text(p[type]));
 }
 
 }  // namespace

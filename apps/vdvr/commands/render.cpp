@@ -12,6 +12,7 @@
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/ray_certificate.hpp"
 #include "apps/vdvr/render_options.hpp"
+#include "apps/vdvr/sampler_json.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
@@ -30,18 +31,24 @@ void write_error_slice(const std::filesystem::path& output, OutputKind kind, con
   else write_png(output, slice.image);
 }
 
-/// What the certificate alone says of a slice.
+/// What the certificate alone says of a slice, but for a texture unit, which the device must tell.
 int render_bound(const CommonOptions& common, const RenderOptions& o, const std::filesystem::path& output,
                  OutputKind kind, const Scene& scene, const ErrorSliceOptions& options) {
   const bool image3d = o.sampler == SamplerKind::image3d;
-  const ErrorSlice slice = bound_slice(scene.volume, *scene.certificate, image3d, options);
+  const auto on_device = [&] {
+    Device device = open_device(common);
+    return certificate_on(device, scene.volume, *scene.certificate);
+  };
+  const Certificate certificate = image3d ? on_device() : *scene.certificate;
+  const ErrorSlice slice = bound_slice(scene.volume, certificate, image3d, options);
   write_error_slice(output, kind, slice);
-  const double epsilon = scene.certificate->epsilon_abs;
+  const double epsilon = certificate.epsilon_abs;
   const Json json = {{"output", output.string()},
                      {"mode", "error"},
                      {"bound", slice.max_error},
                      {"epsilon_abs", epsilon},
                      {"sampler", image3d ? "image3d" : "buffer"},
+                     {"sampler_term", sampler_term_json(certificate, image3d)},
                      {"pixels", slice.pixels},
                      {"not_covered_fraction", scene.certificate->not_covered_fraction}};
   print_result(common, json, [&] {
@@ -262,15 +269,17 @@ int render_command(Arguments& args) {
   o.transfer = of_integrals ? two_material_transfer(bright) : transfer_for(args, bright, scene.volume.grid);
   o.slice_range = given_range(args);
   if (!o.slice_range && !of_integrals) o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
-  o.sampler = safe_sampler(o.sampler, scene.certificate);
+  const SafeSampler safe = source.take_sampler(o.sampler, args.has("unverified"));
+  o.sampler = safe.sampler;
   const Orbit orbit = orbit_options(args, kRenderOrbit);
   const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
   o.camera = camera_for(args, frame, orbit);
   o.clip = clip_for(args, scene, progress.callback());
   if (certifies) o.clip = certified_clip(args, scene, o, progress.callback());
+  const bool comparison = scene.certificate && scene.certificate->comparison;
   std::vector<std::string> notes = notes_on(args, o, source);
   // The base samples alone are another field than the one certified.
-  const bool certified = scene.verified && method == "vdvr";
+  const bool certified = scene.verified && method == "vdvr" && !comparison;
   o.skip_empty = !args.has("no-skip");
 
   if (asks_certify(args) && !certifies) {
@@ -300,8 +309,10 @@ int render_command(Arguments& args) {
                           : write_ray_certificate(args, source, o, result, output, progress.callback());
   progress.clear();
 
+  const std::string& sampler_reason = safe.reason.empty() ? result.sampler_reason : safe.reason;
   const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
                             : certified      ? "certified"
+                            : comparison     ? "for comparison: no certificate"
                             : scene.verified ? "base samples alone: no certificate"
                             : scene.certificate
                                 ? "UNVERIFIED: the content was not compared with the certificate"
@@ -315,7 +326,9 @@ int render_command(Arguments& args) {
       {"frames_kept", turned.kept},
       {"verified", certified},
       {"sampler", sampler_name(result.sampler)},
-      {"sampler_reason", result.sampler_reason},
+      {"sampler_reason", sampler_reason},
+      {"sampler_term",
+       certified ? sampler_term_json(source.certificate(), result.sampler == SamplerKind::image3d) : Json()},
       {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
       {"samples", result.samples},
       {"seconds", result.seconds},
@@ -333,7 +346,7 @@ int render_command(Arguments& args) {
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);
-    fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), result.sampler_reason);
+    fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), sampler_reason);
     print_paging(source.paging());
     if (result.gradient == GradientKind::stored)
       fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n",

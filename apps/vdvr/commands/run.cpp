@@ -20,6 +20,7 @@
 #include "vdvr/error_slice.hpp"
 #include "vdvr/framing.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/safe_sampler.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -61,7 +62,8 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   Renderer renderer(device, resident);
   RenderOptions o;
   o.width = o.height = kPictureSide;
-  o.sampler = safe_sampler(SamplerKind::automatic, out.built.certificate);
+  const SafeSampler safe = safe_sampler(device, volume, out.built.certificate);
+  o.sampler = safe.sampler;
   o.gradient = GradientKind::automatic;
   o.transfer = two_material_transfer(bright);
   o.surfaces = {{bright.threshold}};
@@ -81,7 +83,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     out.files.emplace_back(name, what);
     out.outside[name] = outside_certificate(o);
     out.sampler = sampler_name(r.sampler);
-    out.sampler_reason = r.sampler_reason;
+    out.sampler_reason = safe.reason.empty() ? r.sampler_reason : safe.reason;
   };
 
   // Of a volume of a cell or two in z only slices across z show anything: there the object fills the picture.
@@ -94,7 +96,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     RenderOptions bound = o;
     bound.output = RenderOutput::error;
     bound.height -= kErrorCaption;
-    renderer.set_bounds(brick_bounds(out.built.certificate, out.sampler == "image3d"));
+    renderer.set_bounds(brick_bounds(*safe.certificate, out.sampler == "image3d"));
     write_png(folder.file("bound.png"),
               bound_picture(renderer.render(bound).values, out.built.certificate.epsilon_abs));
     out.files.emplace_back("bound.png", "how far the samples behind each pixel of dvr.png can lie from F");

@@ -1,0 +1,72 @@
+// What a build leaves of epsilon for the samplers of its devices (docs/error-bounds.md, section 8). What they
+// take is known only of a volume that is stored; the texture unit's part can be many times the buffer's, and
+// falls as bricks with steep samples are refined. Called by build.cpp.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host/crew/crew.hpp"
+#include "host/sampler/sampler_terms.hpp"
+#include "host/scan/units.hpp"
+#include "vdvr/certificate.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/plan.hpp"
+
+namespace vdvr {
+
+/// No refinement that was tried leaves room for the texture unit.
+struct NoRoomForImage3d : ToleranceError {
+  using ToleranceError::ToleranceError;
+};
+
+class SamplerShare {
+ public:
+  /// `epsilon_abs` in `units`, as all values here; `arithmetic`: what rounding up to gold takes. Where
+  /// nothing is charged (terms grid) all of epsilon is left. Refers to the plan and the devices. `base`:
+  /// slopes of the base volume, by which a reserve is left for the buffer at first, and nothing beside it for
+  /// the texture unit. Throws ToleranceError where nothing is left for nodes.
+  SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& plan, const Units& units, double epsilon_abs,
+               double arithmetic, const FieldSlopes& base);
+
+  /// On the worst of the devices.
+  [[nodiscard]] SamplerTerms of(const MixedVolume& volume) const;
+  /// What a bound holds beside what is measured at nodes: arithmetic, and what the worse sampler takes.
+  [[nodiscard]] double beside_nodes(const SamplerTerms& sampler) const;
+
+  /// What |V - gold| + T + P may be at first, within this tolerance. Throws ToleranceError where nothing is
+  /// left.
+  [[nodiscard]] double first_tolerance(double epsilon_abs) const;
+
+  /// A volume is begun: what it is to be brought within at first.
+  double begin();
+  /// What to bring a measured volume within, so that the certificate holds for its samplers; nothing where it
+  /// does, where it is to be begun anew(), or where nothing smaller is to be tried. Throws NoRoomForImage3d,
+  /// and ToleranceError where the buffer has no room.
+  std::optional<double> smaller(const Certificate& measured);
+  /// The texture unit takes so much that its bricks had better be classified anew, beside what it took:
+  /// raised a level at a time they come to more samples than need be.
+  [[nodiscard]] bool anew() const { return anew_; }
+
+  /// Bricks were raised for the texture unit's sake, of this volume or one before.
+  [[nodiscard]] bool raised_for_image3d() const { return raised_for_image3d_; }
+  /// From now on volumes are held to the buffer alone.
+  void give_up_image3d();
+
+ private:
+  [[nodiscard]] SamplerTerms terms(const Crew::Kind& kind, const FieldSlopes& slopes,
+                                   std::int64_t atlas) const;
+  [[nodiscard]] double left(double taken, double epsilon_abs) const;
+  [[nodiscard]] double left_or_throw(double taken, double epsilon_abs) const;
+
+  const std::vector<Crew::Kind>& kinds_;
+  const Plan& plan_;
+  Units units_;
+  double epsilon_abs_, arithmetic_, reserved_ = 0;
+  double start_ = 0, now_ = 0;  // what volumes are begun with, and brought within
+  bool charges_, wants_image3d_ = true, raised_for_image3d_ = false, anew_ = false,
+                 coarse_ = false;  // some texture unit has weights of few bits
+  int times_ = 0, begun_anew_ = 0;
+};
+
+}  // namespace vdvr

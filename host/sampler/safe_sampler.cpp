@@ -1,0 +1,77 @@
+// Called by programs, live_renderer.cpp and the Python module: whoever draws a certified volume.
+#include "vdvr/safe_sampler.hpp"
+
+#include <fmt/format.h>
+
+#include "host/sampler/sampler_terms.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+void forget_image3d(Certificate& c) {
+  c.budget.sampler.image3d.reset();
+  c.total_image3d.reset();
+  c.holds_image3d.reset();
+}
+
+bool may_draw_image3d(Device& device, SamplerKind asked) {
+  if (asked != SamplerKind::automatic) return asked == SamplerKind::image3d;
+  return device.info().linear_float_image && probe_sampler(device).chosen == "image3d";
+}
+
+std::string why_not(const Device& device, const Certificate& here) {
+  return fmt::format(
+      "the texture unit of '{}' may err by {:.3g}, with which the total {:.4g} exceeds epsilon {:.4g}",
+      device.info().name, here.budget.sampler.image3d->value, *here.total_image3d, here.epsilon_abs);
+}
+
+}  // namespace
+
+Certificate certificate_on(Device& device, const MixedVolume& volume, const Certificate& stored) {
+  const DeviceInfo& info = device.info();
+  const SamplerTerms here =
+      sampler_terms(field_slopes(volume), volume.grid, probe_filters(device), atlas_length(info, volume),
+                    stored.epsilon_abs, volume.rate, sampler_underflow(info));
+  Certificate c = stored;
+  const double sum = c.measured_total + c.budget.arithmetic.value;
+  if (!info.subnormals && !(here.buffer.value <= c.budget.sampler.buffer.value)) {
+    c.budget.sampler.buffer = here.buffer;
+    c.total_buffer = sum + here.buffer.value;
+    c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
+  }
+  forget_image3d(c);
+  if (!here.image3d) return c;
+  c.budget.sampler.image3d = here.image3d;
+  c.total_image3d = sum + here.image3d->value;
+  // Where nothing is certified of the arithmetic that is the same everywhere, nothing is of this.
+  c.holds_image3d = stored.holds_buffer && !c.comparison && *c.total_image3d <= c.epsilon_abs;
+  return c;
+}
+
+SafeSampler safe_sampler(Device& device, const MixedVolume& volume, const std::optional<Certificate>& stored,
+                         SamplerKind asked, bool unverified) {
+  SafeSampler safe{asked, "", stored};
+  if (!stored) return safe;
+  Certificate& here = *safe.certificate;
+  const bool image3d = may_draw_image3d(device, asked);
+  if (image3d || !device.info().subnormals) here = certificate_on(device, volume, *stored);
+  if (!image3d) {
+    forget_image3d(here);
+    return safe;
+  }
+  // Without an atlas there is no such sampler: whoever draws says why.
+  if (!here.holds_image3d || *here.holds_image3d) return safe;
+  if (asked == SamplerKind::automatic) {
+    safe.sampler = SamplerKind::buffer;
+    safe.reason = here.comparison ? "nothing is certified of a volume for comparison" : why_not(device, here);
+    forget_image3d(here);
+    return safe;
+  }
+  if (!unverified && !here.comparison)
+    throw ToleranceError("the certificate does not hold for the image3d sampler here: " +
+                         why_not(device, here) + "; use `sampler` buffer");
+  return safe;
+}
+
+}  // namespace vdvr
