@@ -32,8 +32,7 @@ InputKind kind_of(const fs::path& path, const Arguments& args) {
 
 namespace {
 
-ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
-                   std::optional<Beam> beam, const Progress& progress) {
+void require_scan(const fs::path& path, const Arguments& args) {
   switch (kind_of(path, args)) {
     case InputKind::certified:
       throw InputError(fmt::format("{}: is a certified volume, not projections", path.string()));
@@ -47,6 +46,9 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
     case InputKind::scan:
       break;
   }
+}
+
+ScanOptions scan_options(const Arguments& args, const FieldOptions& field, std::optional<Beam> beam) {
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
   options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
@@ -56,7 +58,13 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
-  return read_scan(path, options, progress);
+  return options;
+}
+
+ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                   std::optional<Beam> beam, const Progress& progress) {
+  require_scan(path, args);
+  return read_scan(path, scan_options(args, field, beam), progress);
 }
 
 ProjectionSet checked(ProjectionSet scan) {
@@ -74,6 +82,11 @@ ProjectionSet load_any_scan(const fs::path& path, const Arguments& args, const F
 ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress) {
   return checked(load(path, args, field, {}, progress));
+}
+
+std::optional<LineIntegralNoise> load_line_noise(const fs::path& path, const Arguments& args,
+                                                 const FieldOptions& field) {
+  return read_line_noise(path, scan_options(args, field, {}));
 }
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr std::int64_t most_rows = 8, most_cells = 128, fewest_samples = 50;
+// Pixels about the axis that hold enough samples to go by.
+constexpr double least_radius = 5;
 // Beyond it a column's median is the object, not its noise or a bent background.
 constexpr double share_of_object = 0.05;
 
@@ -30,6 +32,7 @@ double modulo_pi(double theta) {
 struct Middle {
   ProjectionSet scan;
   LineIntegralNoise noise;
+  double height = 0;  // of cone beam, of the row next to the orbit, as seen at the axis, in pixels
 };
 
 Middle middle_rows(const ProjectionSet& scan, const LineIntegralNoise& noise) {
@@ -41,6 +44,7 @@ Middle middle_rows(const ProjectionSet& scan, const LineIntegralNoise& noise) {
   const std::int64_t rows = std::min(g.rows, most_rows),
                      first = std::clamp<std::int64_t>(std::llround(row) - rows / 2, 0, g.rows - rows);
   out.scan.geometry.rows = rows;
+  out.height = std::round(row) - row;
   if (out.scan.cone)
     for (ViewMatrix& m : out.scan.cone->views)
       for (std::size_t j = 0; j < 4; ++j) m[1][j] -= static_cast<double>(first) * m[2][j];
@@ -118,10 +122,12 @@ std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& 
   ParallelGeometry& g = middle.scan.geometry;
   const double center = field.center.value_or(g.center);
   const std::vector<int> signs = alternating_signs(scan);
+  SplitOfViews out;
   // World lengths, as seen at the axis.
-  const double radius =
-      std::min((views_of_half(scan, signs) / pi - object_radius(middle.scan, center)) * g.pitch_u,
-               certified_coverage(middle.scan, field).inner_radius());
+  const double sharp = views_of_half(scan, signs) / pi, close = sharp - object_radius(middle.scan, center);
+  out.resolved = close >= least_radius;
+  const double radius = std::min((out.resolved ? close : sharp / 2) * g.pitch_u,
+                                 certified_coverage(middle.scan, field).inner_radius());
   const Volume expected = [&] {
     GridOptions options;
     const auto cells = std::min(most_cells, static_cast<std::int64_t>(2 * radius / g.pitch_u));
@@ -131,7 +137,7 @@ std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& 
     options.size = Index3{cells, cells, std::max<std::int64_t>(1, scan.cone ? 1 : g.rows - 1)};
     if (scan.cone)
       options.origin = Vec3{-0.5 * static_cast<double>(cells) * g.pitch_u,
-                            -0.5 * static_cast<double>(cells) * g.pitch_u, -0.5 * g.pitch_v};
+                            -0.5 * static_cast<double>(cells) * g.pitch_u, middle.height * g.pitch_v};
     const Grid grid = make_grid(middle.scan, options);
     return noise_of_field(device, middle.scan, field, middle.noise, grid, progress);
   }();
@@ -146,7 +152,6 @@ std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& 
   options.field = field;
   const Volume difference = reconstruct(device, middle.scan, expected.grid, options, progress);
   double found = 0, predicted = 0;
-  SplitOfViews out;
   const Index3 n = expected.grid.samples();
   for (std::int64_t i = 0; i < expected.grid.sample_count(); ++i) {
     const Vec3 p = expected.grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]});

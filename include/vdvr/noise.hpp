@@ -67,11 +67,15 @@ struct SplitOfViews {
   double sigma = 0;      ///< root mean square of that half difference
   double predicted = 0;  ///< of the sigma of F at the same samples
   std::int64_t samples = 0;
+  /// Whether the whole object lies within K / pi pixels of these samples, for K views in each half; if not,
+  /// the difference holds beside noise what so few views alias.
+  bool resolved = false;
   [[nodiscard]] double ratio() const { return sigma / predicted; }
 };
 
-/// In planes through the middle rows, where the object within K / pi pixels of the axis lies for K views in
-/// each half; nothing where that leaves fewer than 50 samples. Cost: an FBP of a few planes.
+/// In planes through the middle rows: at the samples that the whole object lies close enough to, if there are
+/// any, else within K / 2 pi pixels of the axis. Nothing of fewer than 50 samples. Cost: an FBP of a few
+/// planes.
 VDVR_API std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& scan,
                                                     const FieldOptions& field, const LineIntegralNoise& noise,
                                                     const Progress& progress = {});

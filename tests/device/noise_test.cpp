@@ -276,6 +276,7 @@ BOOST_AUTO_TEST_CASE(splitting_the_views_finds_the_same_sigma) {
   const auto noise = scan_noise(scan, {.photons = photons});
   const auto split = split_of_views(support::device(), scan, {}, noise->model);
   BOOST_TEST_REQUIRE(split.has_value());
+  BOOST_TEST(split->resolved);
   // Within 1.5 % for alternating signs, and four standard errors of a mean over that many samples.
   BOOST_TEST(std::abs(split->ratio() - 1) <=
              0.015 + 4 / std::sqrt(2.0 * static_cast<double>(split->samples)) + 0.03);

@@ -6,6 +6,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_large.hpp"
@@ -75,6 +76,7 @@ int volume_info(const std::filesystem::path& path, const CommonOptions& common) 
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback());
+  const NoiseFound noise = noise_of_scan(path, args, {}, scan);
   const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
@@ -85,8 +87,10 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
   if (scan.cone) json["cone"] = cone_json(scan);
+  json["noise"] = noise_json(noise);
   print_result(common, json, [&] {
     print_scan(scan);
+    print_noise(noise);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
     print_grid(grid);
   });
@@ -98,6 +102,7 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
 int info_command(Arguments& args) {
   args.positional("FILE", "a certified volume, a volume, or projections");
   add_scan(args);
+  add_noise(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
