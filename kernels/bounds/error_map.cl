@@ -17,7 +17,8 @@ float axis_error(float kappa) {
 
 // The table falls with the product: its entry below, and one more for rounding, is never too small.
 float beyond_product(__global const float* restrict beyond, float product, float exact_product) {
-  return beyond[clamp((int)(product / exact_product * VDVR_TABLE_STEPS - 0.01f), 0, VDVR_TABLE_STEPS)];
+  return beyond[clamp((int)(fma(product / exact_product, (float)VDVR_TABLE_STEPS, -0.01f)), 0,
+                      VDVR_TABLE_STEPS)];
 }
 
 __kernel void error_map(__global float* restrict centre, __global float* restrict bound,

@@ -5,6 +5,7 @@
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
+#include "device/masks.h"
 
 #if VDVR_LANES == 1
 #define VEC float

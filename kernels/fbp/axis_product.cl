@@ -5,8 +5,6 @@
 // Any other axis: b = o, r = m, c = i, s = at, v = in. The fast axis (no i): one batch, r = o, c = m, s = in,
 // v = at. A work-item does 16 columns of 4 rows, so that each vector it reads is used four times. Sums run in
 // runs of 32 terms, as in kernels/fbp/batched_product.cl, for rounding.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "shared/axis_product.h"
 
 // The last columns, fewer than 16.

@@ -9,8 +9,6 @@
 // run's sums are added to those of others (docs/error-bounds.md, section 7). rows int2[block][y]: the first
 // and last column of that row (and of the tile's rows above it) that anyone wants. Called by
 // host/fbp/back_project.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/back_project.h"
 #include "shared/six_taps.h"
@@ -188,12 +186,12 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
 #endif
 #if VDVR_TAPS == 6
           const TILE m = f - 0.5f, square = m * m;
-          const TILE even_a = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_A),
-                     odd_a = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_A),
-                     even_b = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_B),
-                     odd_b = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_B),
-                     even_c = VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_EVEN_C),
-                     odd_c = m * VDVR_SIX_POLYNOMIAL(square, VDVR_SIX_ODD_C);
+          const TILE even_a = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_A),
+                     odd_a = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_A),
+                     even_b = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_B),
+                     odd_b = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_B),
+                     even_c = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_C),
+                     odd_c = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_C);
           const TILE w0 = even_a + odd_a, w1 = even_b + odd_b, w2 = even_c + odd_c, w3 = even_c - odd_c,
                      w4 = even_b - odd_b, w5 = even_a - odd_a;
           const ITILE at = (clamp((int)step.w + below, (ITILE)2, (ITILE)(columns - 4)) - 2) * 16;

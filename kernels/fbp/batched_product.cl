@@ -4,8 +4,6 @@
 // VDVR_RUN terms, and what adding a run to the others rounds off is summed beside them (Knuth's TwoSum,
 // additions alone: nothing to contract): the rounding error is that of one run (docs/error-bounds.md, section
 // 7). Called by host/fbp/batched_product.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/batched_product.h"
 

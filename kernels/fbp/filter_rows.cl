@@ -6,20 +6,11 @@
 // every second tap is zero but the centre (Ram-Lak), so that a column sees only those of the other parity and
 // itself. Sums run in runs of 16 terms that are then added. VDVR_DOUBLE 1: taps, weights and sums in double
 // precision, rounded once, to the float that is stored. Called by host/fbp/filter_rows.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/filter_rows.h"
 
 #ifndef VDVR_STEP
 #error "VDVR_STEP must be 1 (any kernel) or 2 (even taps are zero but the centre)"
-#endif
-
-// A scalar's truth is 1, a vector's -1, and any() reads sign bits.
-#if VDVR_LANES == 1
-#define ANY_BROKEN(v) (!isfinite(v))
-#else
-#define ANY_BROKEN(v) (!all(isfinite(v)))
 #endif
 
 // Eight columns share each vector of `in`. Named sums, not arrays: compilers keep these in registers.
@@ -44,7 +35,7 @@
   if (i + VDVR_STEP * r < columns) {                                             \
     const int u = i + VDVR_STEP * r;                                             \
     const VEC value = NARROW(weight * total##r);                                 \
-    if (ANY_BROKEN(value)) broken[k] = 1;                                        \
+    if (!ALL(isfinite(value))) broken[k] = 1;                                    \
     PUT_AT(value, u)                                                             \
     if (first_column < 0) PUT_AT(value, -1 - u)                                  \
     if (first_column + out_columns > columns) PUT_AT(value, 2 * columns - 1 - u) \

@@ -4,8 +4,6 @@
 // that is stored. A work-item carries 2 VDVR_LANES rows of one view as VDVR_LANES complex rows: the
 // convolution's kernel is real. Layouts: in and out as shared/chunks.h says; scratch: VDVR_WIDTH work-items
 // side by side, element by element. Called by host/fbp/upsample_columns.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/upsample_columns.h"
 
@@ -36,13 +34,14 @@
     PUT(im, AT(i) + VDVR_LANES); \
   }
 // Times a root of unity, and times its conjugate.
-#define TURN(i, re, im, w) KEEP(i, (re) * (w).x - (im) * (w).y, (re) * (w).y + (im) * (w).x)
-#define TURNED_BACK(name, i, w)              \
-  SUM name##_re, name##_im;                  \
-  {                                          \
-    COMPLEX(r, i)                            \
-    name##_re = r_re * (w).x + r_im * (w).y; \
-    name##_im = r_im * (w).x - r_re * (w).y; \
+#define TURN(i, re, im, w) \
+  KEEP(i, fma((re), (SUM)((w).x), -((im) * (SUM)((w).y))), fma((re), (SUM)((w).y), (im) * (SUM)((w).x)))
+#define TURNED_BACK(name, i, w)                                  \
+  SUM name##_re, name##_im;                                      \
+  {                                                              \
+    COMPLEX(r, i)                                                \
+    name##_re = fma(r_re, (SUM)((w).x), r_im * (SUM)((w).y));    \
+    name##_im = fma(r_im, (SUM)((w).x), -(r_re * (SUM)((w).y))); \
   }
 // A row of either half of the lanes, at a detector column.
 #define ROWS(u) WIDE(LOAD(rows + (size_t)(u)*16))
@@ -105,10 +104,10 @@ inline void spread(__global double* mine, __global const float* rows, __global c
                    int columns, int length) {
   const int quarter = length / 4;
   for (int j = 0; j < quarter; ++j) {
-    const SUM a_re = j < columns ? ROWS(j) : (SUM)(0.0), a_im = j < columns ? OTHER_ROWS(j) : (SUM)(0.0);
+    const SUM a_re = j < columns ? ROWS(j) : (SUM)(0.0f), a_im = j < columns ? OTHER_ROWS(j) : (SUM)(0.0f);
     const bool has_b = j + quarter < columns;
-    const SUM b_re = has_b ? ROWS(j + quarter) : (SUM)(0.0),
-              b_im = has_b ? OTHER_ROWS(j + quarter) : (SUM)(0.0);
+    const SUM b_re = has_b ? ROWS(j + quarter) : (SUM)(0.0f),
+              b_im = has_b ? OTHER_ROWS(j + quarter) : (SUM)(0.0f);
     KEEP(j, a_re + b_re, a_im + b_im)
     TURN(j + quarter, a_re - b_re, a_im - b_im, root[2 * j])
     TURN(j + 2 * quarter, a_re + b_im, a_im - b_re, root[j])
@@ -140,7 +139,7 @@ inline void take_half_columns(__global double* halves, __global const double* mi
 }
 
 #define FOR_PHASES(M) M(0) M(1) M(2)
-#define CLEAR(r) SUM re##r = (SUM)(0.0), im##r = (SUM)(0.0);
+#define CLEAR(r) SUM re##r = (SUM)(0.0f), im##r = (SUM)(0.0f);
 #define ADD(r)                                              \
   {                                                         \
     const SUM w = (SUM)(taps[(phase + r) * VDVR_TAPS + t]); \

@@ -9,8 +9,6 @@
 // a pixel apart: lane i reads the i-th row of each run, and takes its two rows from those runs in which they
 // are its neighbours, because v moves by about a pixel per sample. Where it moves by more, the runs are more,
 // or vectors have one lane. Called by host/fdk/cone_back_project.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/cone_back_project.h"
 

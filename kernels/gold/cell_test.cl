@@ -8,6 +8,7 @@
 // are computed. Called by host/gold/cell_test.cpp.
 #include "device/lanes.h"
 #include "device/largest.h"
+#include "device/powers.h"
 #include "shared/cell_test.h"
 #include "shared/gold_shape.h"
 #include "shared/mixed_sampler.h"
@@ -102,13 +103,13 @@ typedef struct {
 } Column;
 inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
   const int g = grid.granularity;
-  const float cx = (float)(p->bx * g) + (float)ix / (float)rate,
-              cy = (float)(p->by * g) + (float)iy / (float)rate;
+  const float to_cells = inverse_of_power(rate), cx = (float)(p->bx * g) + (float)ix * to_cells,
+              cy = (float)(p->by * g) + (float)iy * to_cells;
   Column c;
   c.x = vdvr_local(cx, p->bx, p->brick.level_x, g, grid.cells_x, grid.coarse_x);
   c.y = vdvr_local(cy, p->by, p->brick.level_y, g, grid.cells_y, grid.coarse_y);
   c.per_interval = (rate << grid.coarse_z) >> p->brick.level_z;
-  c.interval = 1.0f / (float)c.per_interval;
+  c.interval = inverse_of_power(c.per_interval);
   return c;
 }
 inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
@@ -160,7 +161,7 @@ typedef struct {
 
 inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
   const int8 second = from_plane >= per;
-  const float8 t = convert_float8(from_plane - (second ? (int8)per : (int8)0)) * (1.0f / (float)per);
+  const float8 t = convert_float8(from_plane - (second ? (int8)per : (int8)0)) * inverse_of_power(per);
   const float8 none = (float8)(0.0f);
   *w0 = second ? none : 1.0f - t;
   *w1 = second ? 1.0f - t : t;
@@ -171,8 +172,8 @@ inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, i
   Planes f;
   f.per_x = (rate << grid.coarse_x) >> p->brick.level_x;
   f.per_y = (rate << grid.coarse_y) >> p->brick.level_y;
-  f.of_x = 1.0f / (float)f.per_x;
-  f.of_y = 1.0f / (float)f.per_y;
+  f.of_x = inverse_of_power(f.per_x);
+  f.of_y = inverse_of_power(f.per_y);
   const int per = (rate << grid.coarse_z) >> p->brick.level_z, lowest = begin / per;
   const size_t stride = p->brick.stride_z;
   f.first = p->brick.place + lowest * stride;
@@ -394,7 +395,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           const VEC both = select(-unlimited, MORE(all.ep + below, all.em + above), counts);
           largest_total = MORE(largest_total, both);
           largest_error = MORE(largest_error, select(-unlimited, MORE(all.ep, all.em), counts));
-          if (test.parts && any(both > tolerance)) {
+          if (test.parts && ANY(both > tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
             WRITE(below, belows);

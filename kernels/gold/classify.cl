@@ -2,6 +2,7 @@
 // chosen tiles. Layouts as in node_slack.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
 // samples every (rate * 2^coarsening >> l)-th gold node. Called by host/gold/gold_batch.cpp.
 #include "device/largest.h"
+#include "device/powers.h"
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 
@@ -9,9 +10,10 @@
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
 // The level's interpolant less gold at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                               \
-  ((1.0f - fy) * ((1.0f - fx) * vload16(0, a + (z)) + fx * vload16(0, a + s.gold_stride + (z))) + \
-   fy * ((1.0f - fx) * vload16(0, b + (z)) + fx * vload16(0, b + s.gold_stride + (z))) -          \
+#define ERROR_AT(z)                                                                                     \
+  (fma((float16)(1.0f - fy),                                                                            \
+       fma((float16)(1.0f - fx), vload16(0, a + (z)), fx * vload16(0, a + s.gold_stride + (z))),        \
+       fy * fma((float16)(1.0f - fx), vload16(0, b + (z)), fx * vload16(0, b + s.gold_stride + (z)))) - \
    vload16(0, gold_column + (z)))
 
 // Raises error[i] to the largest that |interpolant - F| may be at the closed nodes of the brick bricks[i]:
@@ -32,8 +34,8 @@ __kernel void level_error(volatile __global int* error, __global const int4* bri
   if (margin[gold_at] < s.lowest) return;
   const int ix = min(x / l.spacing_x, (s.nx - 1) / l.spacing_x - 1),
             iy = min(y / l.spacing_y, (s.ny - 1) / l.spacing_y - 1);
-  const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
-              fy = (float)(y - iy * l.spacing_y) / (float)l.spacing_y;
+  const float fx = (float)(x - ix * l.spacing_x) * inverse_of_power(l.spacing_x),
+              fy = (float)(y - iy * l.spacing_y) * inverse_of_power(l.spacing_y);
   const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
   __global const float* a =
       along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * s.gold_stride + s.halo +
@@ -52,8 +54,8 @@ __kernel void level_error(volatile __global int* error, __global const int4* bri
                    largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
   }
   for (; z <= last - first; ++z) {
-    const float v = (1.0f - fy) * ((1.0f - fx) * a[z] + fx * a[s.gold_stride + z]) +
-                    fy * ((1.0f - fx) * b[z] + fx * b[s.gold_stride + z]);
+    const float v = fma(1.0f - fy, fma(1.0f - fx, a[z], fx * a[s.gold_stride + z]),
+                        fy * fma(1.0f - fx, b[z], fx * b[s.gold_stride + z]));
     const float e = v - gold_column[z];
     largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
   }
@@ -104,18 +106,19 @@ __kernel void axis_errors(volatile __global int* errors, __global const int4* br
     const int16 node = z + lane, outside = node >= last;
     __global const float* c = column + z;
     const float16 centre = vload16(0, c);
-    const float16 ex = select(0.5f * (vload16(0, c - step_x) + vload16(0, c + step_x)) - centre, none,
-                              outside),
-                  ey = select(0.5f * (vload16(0, c - step_y) + vload16(0, c + step_y)) - centre, none,
-                              outside);
+    const float16 ex = select(fma((float16)(0.5f), vload16(0, c - step_x) + vload16(0, c + step_x), -centre),
+                              none, outside),
+                  ey = select(fma((float16)(0.5f), vload16(0, c - step_y) + vload16(0, c + step_y), -centre),
+                              none, outside);
     plus_x = fmax(plus_x, ex);
     minus_x = fmax(minus_x, -ex);
     plus_y = fmax(plus_y, ey);
     minus_y = fmax(minus_y, -ey);
     for (int l = 0; l < levels_z; ++l) {
       const int half_z = 1 << (levels_z - 1 - l);
-      const float16 ez = select(0.5f * (vload16(0, c - half_z) + vload16(0, c + half_z)) - centre, none,
-                                outside | ((node & (2 * half_z - 1)) != half_z));
+      const float16 ez =
+          select(fma((float16)(0.5f), vload16(0, c - half_z) + vload16(0, c + half_z), -centre), none,
+                 outside | ((node & (2 * half_z - 1)) != half_z));
       plus_z[l] = fmax(plus_z[l], ez);
       minus_z[l] = fmax(minus_z[l], -ez);
     }

@@ -85,7 +85,7 @@ __kernel void take_targets(__global float* targets, __global const float* gold, 
   const PAIRS f = READ_PAIRS(c),
               around = READ_PAIRS(c - 1) + READ_PAIRS(c + 1) + READ_PAIRS(c - g.gold_stride) +
                        READ_PAIRS(c + g.gold_stride) + READ_PAIRS(c - to_y) + READ_PAIRS(c + to_y),
-              target = f - curvature * (around - 6.0f * f);
+              target = fma((PAIRS)(-curvature), fma((PAIRS)(-6.0f), f, around), f);
   WRITE(SECOND(target), to);
   WRITE(FIRST(target), to + stride);
 }
@@ -112,7 +112,7 @@ __kernel void give_samples(__global float* out, __global const float* lattice, V
   out[of_lattice * l.cz + k] = lattice[of_lattice * stride + k + 1];
 }
 
-#define HALF(a, b) (0.5f * (a) + 0.5f * (b))
+#define HALF(a, b) fma((VEC)(0.5f), (a), 0.5f * (b))
 // Smallest and largest error so far, of a column of gold nodes that counts.
 #define ERROR(counts, interpolant, at)      \
   if (counts) {                             \
@@ -202,6 +202,6 @@ __kernel void fit_step(__global float* out, __global const float* lattice, __glo
   POOL_AT(AT_SAMPLE, t, at_node)
   POOL_AT(BELOW, t + stride, at_below)
   POOL_AT(ABOVE, t + stride + 1, at_above)
-  const VEC old = READ(c), moved = old - share * 0.5f * (least + most);
+  const VEC old = READ(c), moved = fma((VEC)(-(share * 0.5f)), least + most, old);
   WRITE(select(old, moved, least <= most), out + column * stride + k + 1);
 }

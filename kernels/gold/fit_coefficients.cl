@@ -11,6 +11,7 @@
 // nothing to do costs as much as three that do);
 // along, low and high float[block][cy][cx][gold_stride], gold node z at z + halo. Called by
 // host/gold/fit_coefficients.cpp.
+#include "device/powers.h"
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 
@@ -38,12 +39,12 @@ __kernel void interpolate_lattice(__global float* along, __global const float* l
   const size_t column = ((size_t)columns[i].block * l.cy + columns[i].y) * l.cx + columns[i].x;
   __global const float* from = lattice + column * l.cz;
   __global float* to = along + column * g.gold_stride + g.halo - l.reach_z * l.spacing_z;
-  const float step = 1.0f / (float)l.spacing_z;
+  const float step = inverse_of_power(l.spacing_z);
   for (int k = 0; k + 1 < l.cz; ++k) {
     const float low = from[k], high = from[k + 1];
     for (int i = 0; i < l.spacing_z; ++i) {
       const float f = (float)i * step;
-      to[k * l.spacing_z + i] = (1.0f - f) * low + f * high;
+      to[k * l.spacing_z + i] = fma(1.0f - f, low, f * high);
     }
   }
   to[(l.cz - 1) * l.spacing_z] = from[l.cz - 1];
@@ -65,8 +66,8 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
   // The last column is no cell's lower end. The halo's outermost nodes have no second differences: what lies
   // beyond them is not gold.
   const int ix = min(x / l.spacing_x, l.cx - 2), iy = min(y / l.spacing_y, l.cy - 2);
-  const float fx = (float)(x - ix * l.spacing_x) / (float)l.spacing_x,
-              fy = (float)(y - iy * l.spacing_y) / (float)l.spacing_y;
+  const float fx = (float)(x - ix * l.spacing_x) * inverse_of_power(l.spacing_x),
+              fy = (float)(y - iy * l.spacing_y) * inverse_of_power(l.spacing_y);
   __global const float* a = along + (((size_t)block * l.cy + iy) * l.cx + ix) * g.gold_stride + z;
   __global const float* b = a + (size_t)l.cx * g.gold_stride;
   __global const float* centre = gold + column * g.gold_stride + z;
@@ -78,10 +79,13 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
                            vload16(0, centre - (size_t)row * g.gold_stride) +
                            vload16(0, centre + (size_t)row * g.gold_stride);
     const int16 node = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    target = select(f - curvature * (around - 6.0f * f), f, (node == 0) | (node >= g.nz + 2 * g.halo - 1));
+    target = select(fma((float16)(-curvature), fma((float16)(-6.0f), f, around), f), f,
+                    (node == 0) | (node >= g.nz + 2 * g.halo - 1));
   }
-  const float16 e = (1.0f - fy) * ((1.0f - fx) * vload16(0, a) + fx * vload16(0, a + g.gold_stride)) +
-                    fy * ((1.0f - fx) * vload16(0, b) + fx * vload16(0, b + g.gold_stride)) - target;
+  const float16 before = (float16)(1.0f - fx),
+                e = fma((float16)(1.0f - fy), fma(before, vload16(0, a), fx * vload16(0, a + g.gold_stride)),
+                        fy * fma(before, vload16(0, b), fx * vload16(0, b + g.gold_stride))) -
+                    target;
   vstore16(e, 0, errors + column * g.gold_stride + z);
 }
 
@@ -127,5 +131,8 @@ __kernel void shift_lattice(__global float* lattice, __global const float* low, 
     smallest = fmin(smallest, low[column * g.gold_stride + z + g.halo]);
     largest = fmax(largest, high[column * g.gold_stride + z + g.halo]);
   }
-  if (smallest <= largest) lattice[column * l.cz + k] -= share * 0.5f * (smallest + largest);
+  if (smallest <= largest) {
+    __global float* sample = lattice + column * l.cz + k;
+    *sample = fma(-(share * 0.5f), smallest + largest, *sample);
+  }
 }

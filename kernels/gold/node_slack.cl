@@ -65,7 +65,8 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
   CORNERS(DIFFERENCES)
   const float16 bound =
       vload16(0, addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
-  float16 below = (px + py + pz) * curvature + bound, above = -(mx + my + mz) * curvature + bound;
+  float16 below = fma(px + py + pz, (float16)(curvature), bound),
+          above = fma(-(mx + my + mz), (float16)(curvature), bound);
   const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   int16 out = k > nz - 2;
   if (windowed) {

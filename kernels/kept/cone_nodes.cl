@@ -41,8 +41,8 @@ typedef struct {
 
 static inline __attribute__((always_inline)) float8 taps(float g) {
   const float s = g * g;
-  return VDVR_SIX_HORNER(s, EVEN(FIRST_OF), EVEN(SECOND_OF), EVEN(THIRD_OF)) +
-         g * VDVR_SIX_HORNER(s, ODD(FIRST_OF), ODD(SECOND_OF), ODD(THIRD_OF));
+  return fma((float8)(g), VDVR_SIX_FUSED_HORNER(float8, s, ODD(FIRST_OF), ODD(SECOND_OF), ODD(THIRD_OF)),
+             VDVR_SIX_FUSED_HORNER(float8, s, EVEN(FIRST_OF), EVEN(SECOND_OF), EVEN(THIRD_OF)));
 }
 
 static inline __attribute__((always_inline)) float sum_of(float8 v) {
@@ -53,12 +53,17 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
 // What a view adds at one height: six columns of eight rows, by weights along u, then along v.
-#define ADD(n, at_u, weight, at_v, share_v)                                                            \
-  {                                                                                                    \
-    __global const float* from =                                                                       \
-        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row);    \
-    sum##n += taps(share_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) + weight.s2 * COLUMN(2) + \
-                               weight.s3 * COLUMN(3) + weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5)); \
+#define ADD(n, at_u, weight, at_v, share_v)                                                         \
+  {                                                                                                 \
+    __global const float* from =                                                                    \
+        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row); \
+    float8 across = (float8)(weight.s1) * COLUMN(1);                                                \
+    across = fma((float8)(weight.s0), COLUMN(0), across);                                           \
+    across = fma((float8)(weight.s2), COLUMN(2), across);                                           \
+    across = fma((float8)(weight.s3), COLUMN(3), across);                                           \
+    across = fma((float8)(weight.s4), COLUMN(4), across);                                           \
+    across = fma((float8)(weight.s5), COLUMN(5), across);                                           \
+    sum##n = fma(taps(share_v), across, sum##n);                                                    \
   }
 
 #define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
@@ -93,24 +98,26 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
     __global const float* plane = table;
     FOR_HEIGHTS(CLEAR)
     for (int k = 0; k < views_all; ++k, ++v, plane += s.plane) {
-      const REAL l_plane = v->step_lambda[0] * dx + v->step_lambda[1] * dy + v->lambda,
-                 u_plane = v->step_u[0] * dx + v->step_u[1] * dy,
-                 v_plane = v->step_v[0] * dx + v->step_v[1] * dy;
+      const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
+                 u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
+                 v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
 #if VDVR_UPRIGHT
-      const REAL inverse = (REAL)1 / l_plane, u = u_plane * inverse + v->part_u, whole_u = floor(u);
+      const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
       const int column = (int)v->whole_u + (int)whole_u - 2;
-      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - (REAL)0.5));
-      const REAL8 v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
+      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
+      const REAL8 v8 =
+          fma(fma((REAL8)(v->step_v[2]), dz, (REAL8)(v_plane)), (REAL8)(inverse), (REAL8)(v->part_v));
 #else
-      const REAL8 inverse = (REAL)1 / (v->step_lambda[2] * dz + l_plane),
-                  u8 = (v->step_u[2] * dz + u_plane) * inverse + v->part_u, whole_u = floor(u8),
-                  v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
+      const REAL8 inverse = (REAL)1 / fma((REAL8)(v->step_lambda[2]), dz, (REAL8)(l_plane)),
+                  u8 = fma(fma((REAL8)(v->step_u[2]), dz, (REAL8)(u_plane)), inverse, (REAL8)(v->part_u)),
+                  whole_u = floor(u8),
+                  v8 = fma(fma((REAL8)(v->step_v[2]), dz, (REAL8)(v_plane)), inverse, (REAL8)(v->part_v));
       const int8 column = (int)v->whole_u + convert_int8(whole_u) - 2;
-      const float8 g_u = convert_float8(u8 - whole_u - (REAL)0.5);
+      const float8 g_u = convert_float8(u8 - whole_u - 0.5f);
 #endif
       const REAL8 whole_v = floor(v8);
       const int8 row = (int)v->whole_v + convert_int8(whole_v) - 2;
-      const float8 g_v = convert_float8(v8 - whole_v - (REAL)0.5);
+      const float8 g_v = convert_float8(v8 - whole_v - 0.5f);
 #if VDVR_UPRIGHT
       FOR_HEIGHTS(UPRIGHT_PART)
 #else

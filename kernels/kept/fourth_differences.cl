@@ -5,8 +5,8 @@
 
 #define AT(c) vload8(0, c)
 // Second difference along z of a column.
-#define ALONG(c) (vload8(0, (c)-1) + vload8(0, (c) + 1) - 2.0f * vload8(0, c))
-#define FOURTH(a, b, c, d, e) ((a) + (e)-4.0f * ((b) + (d)) + 6.0f * (c))
+#define ALONG(c) fma((float8)(-2.0f), vload8(0, c), vload8(0, (c)-1) + vload8(0, (c) + 1))
+#define FOURTH(a, b, c, d, e) fma((float8)(6.0f), (c), fma((float8)(-4.0f), (b) + (d), (a) + (e)))
 // NaN would drop out of a maximum.
 #define TAKE(largest, v)                                                                                  \
   {                                                                                                       \
@@ -39,11 +39,13 @@ __kernel void fourth_differences(__global float* out, __global const float* gold
         TAKE(xx, FOURTH(AT(c - 2 * to_x), AT(c - to_x), v, AT(c + to_x), AT(c + 2 * to_x)))
         TAKE(yy, FOURTH(AT(c - 2 * to_y), AT(c - to_y), v, AT(c + to_y), AT(c + 2 * to_y)))
         TAKE(zz, FOURTH(AT(c - 2), AT(c - 1), v, AT(c + 1), AT(c + 2)))
-        TAKE(xy, AT(c - to_x - to_y) + AT(c + to_x - to_y) + AT(c - to_x + to_y) + AT(c + to_x + to_y) -
-                     2.0f * (AT(c - to_x) + AT(c + to_x) + AT(c - to_y) + AT(c + to_y)) + 4.0f * v)
+        TAKE(xy,
+             fma((float8)(4.0f), v,
+                 fma((float8)(-2.0f), AT(c - to_x) + AT(c + to_x) + AT(c - to_y) + AT(c + to_y),
+                     AT(c - to_x - to_y) + AT(c + to_x - to_y) + AT(c - to_x + to_y) + AT(c + to_x + to_y))))
         const float8 here = ALONG(c);
-        TAKE(xz, ALONG(c - to_x) + ALONG(c + to_x) - 2.0f * here)
-        TAKE(yz, ALONG(c - to_y) + ALONG(c + to_y) - 2.0f * here)
+        TAKE(xz, fma((float8)(-2.0f), here, ALONG(c - to_x) + ALONG(c + to_x)))
+        TAKE(yz, fma((float8)(-2.0f), here, ALONG(c - to_y) + ALONG(c + to_y)))
       }
     }
   __global float* of_brick = out + (((size_t)bz * s.bricks_y + by) * s.bricks_x + bx) * 6;

@@ -1,8 +1,6 @@
 // Gold from the nodes that determine it (docs/error-bounds.md, section 3): along z a product with few rows or
 // with a band of them, across z filters of VDVR_TAPS taps. Layouts: columns of contiguous heights, anywhere
 // (shared/interpolate_gold.h). Called by host/kept/interpolate_gold.cpp.
-#pragma OPENCL FP_CONTRACT ON
-
 #include "device/lanes.h"
 #include "shared/interpolate_gold.h"
 

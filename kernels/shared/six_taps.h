@@ -21,5 +21,8 @@
 // By Horner's scheme; the second macro is there to take the list apart.
 #define VDVR_SIX_POLYNOMIAL(s, list) VDVR_SIX_HORNER(s, list)
 #define VDVR_SIX_HORNER(s, c0, c1, c2) ((c0) + (s) * ((c1) + (s) * (c2)))
+// The same on a device, in one type.
+#define VDVR_SIX_FUSED(T, s, list) VDVR_SIX_FUSED_HORNER(T, s, list)
+#define VDVR_SIX_FUSED_HORNER(T, s, c0, c1, c2) fma((T)(s), fma((T)(s), (T)(c2), (T)(c1)), (T)(c0))
 
 #endif

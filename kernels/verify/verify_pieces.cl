@@ -8,6 +8,7 @@
 // block; int4 first[block] = the block's first piece; uchar tested[block][cell y][cell x]: columns of gold
 // cells that can hold a covered point. Called by host/verify/verify_pieces.cpp.
 #include "device/largest.h"
+#include "device/powers.h"
 #include "shared/mixed_sampler.h"
 #include "shared/verify_pieces.h"
 
@@ -41,16 +42,17 @@ __kernel void verify_errors(__global float* error, __global const float* field, 
             from_z = item.z * s.cells - bz * per_brick;
   const VdvrBrick b = vdvr_brick(bricks, grid, ((ulong)bz * grid.bricks_y + by) * grid.bricks_x + bx);
   // Gold nodes are dyadic fractions of a cell: these cell coordinates are exact.
-  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) / (float)s.rate, bx, b.level_x, g,
+  const float to_cells = inverse_of_power(s.rate);
+  const VdvrLocal lx = vdvr_local((float)(bx * g) + (float)(from_x + x) * to_cells, bx, b.level_x, g,
                                   grid.cells_x, grid.coarse_x),
-                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) / (float)s.rate, by, b.level_y, g,
+                  ly = vdvr_local((float)(by * g) + (float)(from_y + y) * to_cells, by, b.level_y, g,
                                   grid.cells_y, grid.coarse_y);
   __global const float* f = field_column(field, item, first[item.w], x, y, s.cells, s.nx, s.ny, s.z_padded);
   __global float* out = error + (((size_t)i * side + y) * side + x) * s.error_padded;
   // vdvr_trilinear, its two faces kept for all nodes between them.
   const int per_interval = (s.rate << grid.coarse_z) >> b.level_z;
   const int intervals = min(g, grid.cells_z - bz * g) * s.rate / per_interval;
-  const float step = 1.0f / (float)per_interval;
+  const float step = inverse_of_power(per_interval);
   int index = from_z / per_interval;
   float low = vdvr_sample_in_plane(samples, b, lx, ly, index);
   for (int k = 0; k <= last_z; ++index) {

@@ -31,13 +31,19 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
 }
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*rows)
-#define ADD(n, at_u, weight, at_v, part_v)                                                                \
-  {                                                                                                       \
-    __global const float* from =                                                                          \
-        plane + (size_t)clamp(at_u, 0, last_column) * rows + clamp(at_v, 0, last_row);                    \
-    sum##n += lagrange(part_v) * (weight.s0 * COLUMN(0) + weight.s1 * COLUMN(1) + weight.s2 * COLUMN(2) + \
-                                  weight.s3 * COLUMN(3) + weight.s4 * COLUMN(4) + weight.s5 * COLUMN(5) + \
-                                  weight.s6 * COLUMN(6) + weight.s7 * COLUMN(7));                         \
+#define ADD(n, at_u, weight, at_v, part_v)                                             \
+  {                                                                                    \
+    __global const float* from =                                                       \
+        plane + (size_t)clamp(at_u, 0, last_column) * rows + clamp(at_v, 0, last_row); \
+    float8 across = (float8)(weight.s1) * COLUMN(1);                                   \
+    across = fma((float8)(weight.s0), COLUMN(0), across);                              \
+    across = fma((float8)(weight.s2), COLUMN(2), across);                              \
+    across = fma((float8)(weight.s3), COLUMN(3), across);                              \
+    across = fma((float8)(weight.s4), COLUMN(4), across);                              \
+    across = fma((float8)(weight.s5), COLUMN(5), across);                              \
+    across = fma((float8)(weight.s6), COLUMN(6), across);                              \
+    across = fma((float8)(weight.s7), COLUMN(7), across);                              \
+    sum##n = fma(lagrange(part_v), across, sum##n);                                    \
   }
 
 #define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
@@ -78,17 +84,20 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       const float4 u = view->u, v = view->v, lambda = view->lambda;
       const int4 whole = view->whole;
 #if VDVR_UPRIGHT
-      const float inverse = 1.0f / (lambda.x * dx + lambda.y * dy + lambda.w),
-                  place_u = (u.x * dx + u.y * dy) * inverse + u.w;
+      const float inverse = 1.0f / (fma(lambda.x, dx, lambda.y * dy) + lambda.w),
+                  place_u = fma(fma(u.x, dx, u.y * dy), inverse, u.w);
       const int below_u = (int)place_u, column = whole.x + below_u - 3;
       const float8 weight = (inverse * inverse) * lagrange(place_u - (float)below_u);
 #else
-      const float8 inverse = 1.0f / (lambda.z * dz + (lambda.x * dx + lambda.y * dy + lambda.w)),
-                   place_u = (u.z * dz + (u.x * dx + u.y * dy)) * inverse + u.w;
+      const float8 inverse = 1.0f / fma((float8)(lambda.z), dz,
+                                        (float8)(fma(lambda.x, dx, lambda.y * dy) + lambda.w)),
+                   place_u =
+                       fma(fma((float8)(u.z), dz, (float8)(fma(u.x, dx, u.y * dy))), inverse, (float8)(u.w));
       const int8 below_u = convert_int8(place_u), column = whole.x + below_u - 3;
       const float8 part_u = place_u - convert_float8(below_u);
 #endif
-      const float8 place_v = (v.z * dz + (v.x * dx + v.y * dy)) * inverse + v.w;
+      const float8 place_v =
+          fma(fma((float8)(v.z), dz, (float8)(fma(v.x, dx, v.y * dy))), (float8)(inverse), (float8)(v.w));
       // Places are positive: truncation is floor.
       const int8 below_v = convert_int8(place_v), row = whole.y + below_v - 3;
       const float8 part_v = place_v - convert_float8(below_v);
