@@ -39,9 +39,7 @@ void say_warnings(const Understood& understood, const Arguments& args) {
     say(fmt::format("{}: WARNING: {}\n", args.who(), with_options(warning)));
 }
 
-ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
-                   std::optional<Beam> beam, const InputStatement& stored, const Progress& progress,
-                   Understood& understood) {
+void require_scan(const fs::path& path, const Arguments& args) {
   switch (kind_of(path, args)) {
     case InputKind::certified:
       throw InputError(fmt::format("{}: is a certified volume, not projections", path.string()));
@@ -55,6 +53,10 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
     case InputKind::scan:
       break;
   }
+}
+
+ScanOptions scan_options(const Arguments& args, const FieldOptions& field, std::optional<Beam> beam,
+                         const InputStatement& stored) {
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
   options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
@@ -65,8 +67,15 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   const CommonOptions common = common_options(args);
   options.max_memory_bytes = common.max_memory;
   options.scratch = common.scratch;
-  ProjectionSet scan = read_scan(path, options, progress, &understood);
-  if (!common.quiet) say_warnings(understood, args);
+  return options;
+}
+
+ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                   std::optional<Beam> beam, const InputStatement& stored, const Progress& progress,
+                   Understood& understood) {
+  require_scan(path, args);
+  ProjectionSet scan = read_scan(path, scan_options(args, field, beam, stored), progress, &understood);
+  if (!common_options(args).quiet) say_warnings(understood, args);
   return scan;
 }
 
@@ -87,6 +96,11 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
                         const Progress& progress, Understood* understood) {
   Understood own;
   return checked(load(path, args, field, {}, {}, progress, understood ? *understood : own));
+}
+
+std::optional<LineIntegralNoise> load_line_noise(const fs::path& path, const Arguments& args,
+                                                 const FieldOptions& field) {
+  return read_line_noise(path, scan_options(args, field, {}, {}));
 }
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,

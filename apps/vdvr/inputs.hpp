@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "apps/vdvr/options.hpp"
+#include "vdvr/line_noise.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -22,6 +23,10 @@ InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
 /// overrides. `understood` is filled unless it is null.
 ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress, Understood* understood = nullptr);
+
+/// What the scan's repeated flats say of its noise, if they do (vdvr::read_line_noise).
+std::optional<LineIntegralNoise> load_line_noise(const std::filesystem::path& path, const Arguments& args,
+                                                 const FieldOptions& field);
 
 /// The same without the check: of what reconstruction may refuse, too.
 ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& args,

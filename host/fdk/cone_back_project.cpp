@@ -236,6 +236,7 @@ void cone_back_project(opencl::State& state, const FilteredScan& scan, const Con
        {"VDVR_RATE", std::to_string(table.rate)},
        {"VDVR_UPRIGHT", spread.upright ? "1" : "0"},
        {"VDVR_RUN", std::to_string(views_together)},
+       {"VDVR_DEPTH_POWER", std::to_string(band.depth_power)},
        {"VDVR_VECTORS", std::to_string(vectors_each)},
        {"VDVR_TILE_X", std::to_string(tile)},
        {"VDVR_TILE_Y", std::to_string(tile)}});

@@ -37,7 +37,8 @@ struct ConeBand {
   std::int64_t first_y = 0, ny = 0, first_z = 0, nz = 0;
   /// [y][x]: first and last plane wanted, counted from first_z; others hold anything or what they held.
   std::vector<std::array<std::int32_t, 2>> wanted{};
-  bool adds = false;  ///< to what `out` holds
+  bool adds = false;    ///< to what `out` holds
+  int depth_power = 2;  ///< samples are weighed with lambda to minus this: 2, or 4 for squared weights
 
   [[nodiscard]] std::int64_t nx() const { return grid->samples()[0]; }
 };

@@ -79,21 +79,16 @@ ViewMatrix from_world(ViewMatrix matrix, const Units& units) {
   return matrix;
 }
 
-FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                         const Progress& progress, Precision precision, const Units& units) {
+ConeFrame::ConeFrame(const ProjectionSet& scan, const FieldOptions& field, const Units& units)
+    : cone(used_cone(scan, field)), weights(cone, scan.geometry.columns, scan.geometry.rows) {
   const ParallelGeometry& detector = scan.geometry;
-  const ConeGeometry cone = used_cone(scan, field);
-  const FdkWeights weights(cone, detector.columns, detector.rows);
-  FilteredScan out;
-  out.geometry = parallel_limit(cone, detector.columns + weights.pad_before() + weights.pad_after(),
-                                detector.rows, detector.unit);
-  out.geometry.center += static_cast<double>(weights.pad_before());
-  out.geometry.pitch_u = std::ldexp(out.geometry.pitch_u, -units.across);
-  out.geometry.pitch_v = std::ldexp(out.geometry.pitch_v, -units.along);
-  out.limited_angle = weights.limited_angle();
-  out.fft_length = fft::good_length(2 * out.geometry.columns - 1);
-  std::vector<double> of_view;
-  std::vector<bool> flipped;
+  filtered.geometry = parallel_limit(cone, detector.columns + weights.pad_before() + weights.pad_after(),
+                                     detector.rows, detector.unit);
+  ParallelGeometry& g = filtered.geometry;
+  g.center += static_cast<double>(weights.pad_before());
+  g.pitch_u = std::ldexp(g.pitch_u, -units.across);
+  g.pitch_v = std::ldexp(g.pitch_v, -units.along);
+  filtered.limited_angle = weights.limited_angle();
   for (std::size_t k = 0; k < cone.views.size(); ++k) {
     ViewMatrix matrix = padded(cone.views[k], weights);
     // Vectors of z read rows that grow with z.
@@ -101,10 +96,21 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
     if (flipped.back())
       for (std::size_t j = 0; j < 4; ++j)
         matrix[1][j] = static_cast<double>(detector.rows - 1) * matrix[2][j] - matrix[1][j];
-    out.views.push_back(from_world(matrix, units));
+    filtered.views.push_back(from_world(matrix, units));
     // The ramp's is 1 over the pitch; line integrals and pitches are those of computation.
     of_view.push_back(std::ldexp(weights.of_view(k) / weights.view(k).pitch_u, units.across - units.line));
   }
+}
+
+FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                         const Progress& progress, Precision precision, const Units& units) {
+  ConeFrame frame(scan, field, units);
+  const ParallelGeometry& detector = scan.geometry;
+  const FdkWeights& weights = frame.weights;
+  const std::vector<double>& of_view = frame.of_view;
+  const std::vector<bool>& flipped = frame.flipped;
+  FilteredScan out = std::move(frame.filtered);
+  out.fft_length = fft::good_length(2 * out.geometry.columns - 1);
 
   const ParallelGeometry& g = out.geometry;
   const std::int64_t size = g.rows * g.columns, own = detector.rows * detector.columns, views = g.views();

@@ -4,6 +4,7 @@
 
 #include "host/fbp/coverage.hpp"
 #include "host/fdk/cone_coverage.hpp"
+#include "host/fdk/fdk_weights.hpp"
 #include "host/fbp/filter_projections.hpp"
 #include "host/scan/units.hpp"
 
@@ -17,6 +18,19 @@ ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field)
 Coverage certified_coverage(const ProjectionSet& scan, const FieldOptions& field);
 /// In units of computation.
 ViewMatrix from_world(ViewMatrix matrix, const Units& units);
+
+/// What filtered cone-beam views are before they hold samples: the detector with its padding, the matrices
+/// for it, and how samples and views are weighed. All but `cone` and `weights` in `units`.
+struct ConeFrame {
+  /// Throws what FdkWeights throws.
+  ConeFrame(const ProjectionSet& scan, const FieldOptions& field, const Units& units);
+
+  ConeGeometry cone;  ///< as the scan has it, with the centre in use
+  FdkWeights weights;
+  FilteredScan filtered;          ///< geometry and matrices alone
+  std::vector<bool> flipped{};    ///< by view: rows are kept in the other order, so that they grow with z
+  std::vector<double> of_view{};  ///< times a view's samples, where the ramp is that of pitch 1
+};
 
 /// Samples weighed, filtered along rows at the pitch at the axis, times the views' weights. The detector gets
 /// the columns that FdkWeights pads it with. Cost: as filter_projections(). Memory: as its; a chunk of views

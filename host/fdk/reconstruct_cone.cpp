@@ -113,6 +113,11 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
   const FilteredScan filtered =
       filter_cone(state, scan, options.field, progress, rate == 1 ? Precision::fp32 : Precision::fp64, units);
   watch.lap(state, "filter");
+  back_project_views(state, filtered, grid, rate, 2, planes, progress, watch);
+}
+
+void back_project_views(opencl::State& state, const FilteredScan& filtered, const Grid& grid, int rate,
+                        int depth_power, const Planes& planes, const Progress& progress, StageWatch& watch) {
   const ParallelGeometry& g = filtered.geometry;
   const ConeCoverage coverage(filtered.views, g.columns, g.rows);
   const ConeMargins margins = margins_of(filtered, grid);
@@ -130,6 +135,7 @@ void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Uni
     for (std::int64_t y0 = 0; y0 < n[1]; y0 += sizes.band) {
       const std::int64_t ny = std::min(sizes.band, n[1] - y0);
       ConeBand band{&grid, y0, ny, z0, nz, {kept.begin() + y0 * n[0], kept.begin() + (y0 + ny) * n[0]}};
+      band.depth_power = depth_power;
       if (std::none_of(band.wanted.begin(), band.wanted.end(), [](const auto& w) { return w[0] <= w[1]; }))
         continue;
       any = true;

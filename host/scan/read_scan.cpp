@@ -13,9 +13,9 @@
 #include <numbers>
 #include <thread>
 
-#include "host/hdf5/hdf5_writer.hpp"
 #include "host/prepare/prepare.hpp"
 #include "host/scan/motion.hpp"
+#include "host/scan/photon_transfer.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/values.hpp"
 #include "host/raw/open_scan.hpp"
@@ -334,34 +334,14 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
   }
 }
 
-void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {
-  const ParallelGeometry& g = scan.geometry;
-  const std::array<std::int64_t, 3> shape{g.views(), g.rows, g.columns};
-  if (std::any_of(shape.begin(), shape.end(), [](std::int64_t n) { return n < 1; }) ||
-      static_cast<std::int64_t>(scan.data.size()) != scan.size())
-    throw InputError(fmt::format("{}: {} samples for {} projections", path.string(), scan.data.size(),
-                                 io::shape_text(shape)));
-  std::vector<double> theta_deg;
-  for (const double t : g.theta_rad) theta_deg.push_back(t * (180 / std::numbers::pi));
-  io::AtomicFile target(path);
-  io::hdf5::Writer file(target.temporary(), path, {.headers = io::hdf5::Headers::dated});
-  file.group("/exchange");
-  // One chunk per view, cut into rows where a chunk would pass HDF5's 4 GiB.
-  constexpr std::int64_t chunk_samples = std::int64_t{1} << 26;
-  const std::array<std::int64_t, 3> chunk{1, std::clamp<std::int64_t>(chunk_samples / g.columns, 1, g.rows),
-                                          g.columns};
-  file.dataset("/exchange/data", {shape.begin(), shape.end()}, std::span<const float>(scan.data),
-               {chunk.begin(), chunk.end()});
-  file.attribute("/exchange/data", "description", "line integrals");
-  file.attribute("/exchange/data", "axes", "theta:y:x");
-  file.attribute("/exchange/data", "unit", g.unit);
-  file.attribute("/exchange/data", "pitch_u", g.pitch_u);
-  file.attribute("/exchange/data", "pitch_v", g.pitch_v);
-  file.attribute("/exchange/data", "center", g.center);
-  file.dataset("/exchange/theta", {theta_deg.size()}, std::span<const double>(theta_deg), {theta_deg.size()});
-  file.attribute("/exchange/theta", "units", "degrees");
-  file.close();
-  target.commit();
+std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const ScanOptions& options) {
+  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  bool folder = false;
+  const io::RawScan raw = open_described(path, options, folder);
+  if (!raw.counts) return std::nullopt;
+  std::optional<LineIntegralNoise> noise = photon_transfer(raw.flats, raw.darks, raw.rows, raw.columns);
+  if (noise) noise = binned(*noise, raw.rows, raw.columns, options.preparation.binning);
+  return noise;
 }
 
 }  // namespace vdvr

@@ -114,10 +114,11 @@ double ConeRays::through(double column, double row) const {
 }
 
 void write_cone_scan(const std::filesystem::path& folder, const ProjectionSet& scan,
-                     const SimulateOptions& options) {
+                     const SimulateOptions& options, const std::optional<PhotonCounts>& counts) {
   if (!options.cone || !scan.cone)
     throw InputError(folder.string() + ": only a cone-beam scan is written as a folder");
-  write_data_exchange(folder / "projections.h5", scan);
+  if (counts) write_photon_counts(folder / "projections.h5", scan, *counts);
+  else write_data_exchange(folder / "projections.h5", scan);
   const ConeSetup& cone = *options.cone;
   const CircularView view = circular_view_of(options, 0);
   nlohmann::ordered_json geometry{{"source_to_axis", cone.source_to_axis},

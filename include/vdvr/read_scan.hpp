@@ -2,11 +2,13 @@
 // file; and projections written as Data Exchange (docs/inputs.md).
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "vdvr/export.hpp"
+#include "vdvr/line_noise.hpp"
 #include "vdvr/preparation.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -45,8 +47,29 @@ struct ScanOptions {
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
                                  const Progress& progress = {}, Understood* understood = nullptr);
 
+/// What repeated flats and darks of the same scan say of its line integrals, pixel by pixel (photon transfer:
+/// Janesick, SPIE Press 2007), of binned ones where `preparation` bins. Nothing of line integrals, of fewer
+/// than five flats, or where flats do not vary. Throws what read_scan() throws. Cost: flats and darks are
+/// read twice.
+VDVR_API std::optional<LineIntegralNoise> read_line_noise(const std::filesystem::path& path,
+                                                          const ScanOptions& options = {});
+
 /// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
 /// theta in degrees. Written whole or not at all.
 VDVR_API void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
+
+/// What a detector counts of a scan whose line integrals are exact.
+struct PhotonCounts {
+  double photons = 0;      ///< of a pixel in the open beam, up to 1e9
+  std::uint64_t seed = 1;  ///< of Poisson's variates; the same on every machine
+  std::int64_t flats = 10, darks = 10;
+  int offset = 100;  ///< what the dark counts
+};
+
+/// Counts as Data Exchange: /exchange/data [angle][v][u] is offset + Poisson(photons e^-p), data_white offset
+/// + Poisson(photons), data_dark the offset; uint16, or uint32 where they need it. Written whole or not at
+/// all. Throws InputError for photons out of range.
+VDVR_API void write_photon_counts(const std::filesystem::path& path, const ProjectionSet& scan,
+                                  const PhotonCounts& counts);
 
 }  // namespace vdvr

@@ -13,6 +13,7 @@
 #include "vdvr/grid.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/read_scan.hpp"
 
 namespace vdvr {
 
@@ -111,9 +112,9 @@ struct SimulateOptions {
 VDVR_API ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options,
                                 const Progress& progress = {});
 
-/// A folder that read_scan() reads: projections.h5, and scan.json with the geometry that `options` say. The
-/// folder must exist. Throws FileError.
+/// A folder that read_scan() reads: projections.h5, of line integrals or of counted photons, and scan.json
+/// with the geometry that `options` say. The folder must exist. Throws FileError.
 VDVR_API void write_cone_scan(const std::filesystem::path& folder, const ProjectionSet& scan,
-                              const SimulateOptions& options);
+                              const SimulateOptions& options, const std::optional<PhotonCounts>& counts = {});
 
 }  // namespace vdvr

@@ -1,4 +1,4 @@
-// Back-projection of cone-beam views onto columns of z samples: out[y][x][z] = sum_k lambda^-2 q_k(u, v),
+// Back-projection of cone-beam views onto columns of z samples: out[y][x][z] = sum_k lambda^-2 q_k(u, v), or with lambda^-4,
 // bilinear between the table's columns and rows (FDK; docs/geometry.md, "Cone beam"). Layouts: float
 // table[view][column][row % VDVR_RATE][row / VDVR_RATE], so that rows a pixel apart follow one another;
 // VdvrConeView views[block][view]; int2 wanted[y][x], the first
@@ -20,6 +20,9 @@
 #endif
 #ifndef VDVR_RUN
 #error "VDVR_RUN must be the views of a run"
+#endif
+#ifndef VDVR_DEPTH_POWER
+#error "VDVR_DEPTH_POWER must be 2 for F, or 4 for what is squared of it (its variance)"
 #endif
 // Tuning; never changes the result beyond rounding.
 // Vectors of z per work-item, 1 or 4: they share what belongs to the column.
@@ -64,6 +67,14 @@
 #define ROW(column, row, row_stride) \
   ((column) + ((row) & (VDVR_RATE - 1)) * ((row_stride) / VDVR_RATE) + (row) / VDVR_RATE)
 #define FLOOR(s) ((int)(s) - ((s) < (float)(int)(s)))
+// lambda^-VDVR_DEPTH_POWER times a value.
+#if VDVR_DEPTH_POWER == 2
+#define AT_DEPTH(value, inverse) ((value) * (inverse) * (inverse))
+#elif VDVR_DEPTH_POWER == 4
+#define AT_DEPTH(value, inverse) ((value) * ((inverse) * (inverse)) * ((inverse) * (inverse)))
+#else
+#error "VDVR_DEPTH_POWER is 2 or 4"
+#endif
 #define INLINE static inline __attribute__((always_inline))
 
 #if VDVR_UPRIGHT
@@ -121,7 +132,7 @@ INLINE VEC view_part(__global const float* table, __global const VdvrConeView* v
     value = fma(SHARE(s), high - low, value);
     low = high;
   }
-  return value * inverse * inverse;
+  return AT_DEPTH(value, inverse);
 }
 #define PART(i)                                                                                         \
   sum##i += view_part(plane, v, u_plane, v_plane, l_plane, dz + (float)(i * VDVR_LANES), columns, rows, \
@@ -182,7 +193,7 @@ __kernel void cone_back_project(__global float* out, __global const float* table
           const float lane_step = v->step_v[2] * inverse, bend = lane_step - (float)VDVR_RATE,
                       first = fma(fma(v->step_v[2], above, v_plane), inverse, v->part_v),
                       across = bend * (float)(VDVR_LANES - 1), lowest = LESS(across, 0.0f),
-                      weight = inverse * inverse, right = (u - (float)cut) * weight, left = weight - right;
+                      weight = AT_DEPTH(1.0f, inverse), right = (u - (float)cut) * weight, left = weight - right;
           const int spans = clamp((int)fabs(across) + 2, 1, spans_v), last_start = rows - 1 - spans;
           __global const float* from = plane + (size_t)column * row_stride;
           FOR_VECTORS(PLACE)

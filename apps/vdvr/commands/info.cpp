@@ -6,6 +6,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
@@ -76,6 +77,7 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   ProgressLine progress(args.who(), common.quiet);
   Understood understood;
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback(), &understood);
+  const NoiseFound noise = noise_of_scan(path, args, {}, scan);
   const Grid grid = make_grid(scan, {});
   const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
   progress.clear();
@@ -87,8 +89,10 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
   if (scan.cone) json["cone"] = cone_json(scan);
+  json["noise"] = noise_json(noise);
   print_result(common, json, [&] {
     print_scan(scan, &understood);
+    print_noise(noise);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
     print_grid(grid);
   });
@@ -101,6 +105,7 @@ int info_command(Arguments& args) {
   args.positional("FILE", "a certified volume, a volume, or projections");
   add_scan(args);
   add_volume_input(args);
+  add_noise(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);

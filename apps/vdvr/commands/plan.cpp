@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
@@ -172,6 +173,7 @@ int plan_command(Arguments& args) {
       .value("ranks", "N", "also what N ranks of vdvr-mpi would take, each with a device as this one")
       .value("machines", "M", "on which these ranks are, alike on each (default 1)");
   add_plan_options(args);
+  add_noise(args);
   add_build(args);
   add_common(args);
   if (!args.parse()) return 0;
@@ -197,7 +199,11 @@ int plan_command(Arguments& args) {
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   const std::optional<PictureForecast> forecast =
       picture_forecast(device, planned, wanted, progress.callback());
+  const NoiseFound found = noise_of_scan(args.path("IN"), args, wanted.options.field, planned.scan);
+  const std::optional<FieldNoise> noise = noise_of_plan(device, planned, found, progress.callback());
   Json json = plan_json(planned, forecast), pictures;
+  json["noise"] = noise_json(found);
+  if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.plan);
   const std::optional<Spread> spread = spread_of(args, planned);
   if (spread) json["foreseen"]["spread"] = spread_json(*spread);
   if (folder) {
@@ -208,6 +214,8 @@ int plan_command(Arguments& args) {
   progress.clear();
   print_result(common, json, [&] {
     print_plan(planned, forecast);
+    print_noise(found);
+    if (noise) print_field_noise(*noise, planned.plan);
     if (spread) print_spread(*spread);
     if (folder) print_pictures(pictures);
   });

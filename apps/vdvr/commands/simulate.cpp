@@ -32,6 +32,9 @@ void add_options(Arguments& args) {
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")
+      .value(
+          "photons", "N0",
+          "counts of N0 photons a pixel in the open beam, with 10 flats and 10 darks, as a detector has them")
       .value("seed", "N", "of the noise (default 1)")
       .value("median", "N", "side of a square median window on the fine detector, odd (default 1: none)")
       .value("gaussian", "SU,SV",
@@ -152,6 +155,16 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
   scan.seed = static_cast<std::uint64_t>(args.integer_or("seed", 1, 0, std::int64_t{1} << 62));
 }
 
+std::optional<PhotonCounts> photon_counts(const Arguments& args, const SimulateOptions& scan) {
+  if (!args.has("photons")) return std::nullopt;
+  refuse(args, {"noise-sigma", "median", "gaussian", "binning"},
+         "excludes --photons: it counts in the detector's pixels");
+  PhotonCounts counts;
+  counts.photons = args.positive_or("photons", 0);
+  counts.seed = scan.seed;
+  return counts;
+}
+
 /// Built-in phantoms fill the detector: half of its width is 32 sqrt(2) / sqrt(2) pixels for the usual
 /// Marschner-Lobb set-up and one unit of Shepp-Logan for its own (docs/phantoms.md).
 Phantom phantom_for(Setup& setup) {
@@ -184,6 +197,7 @@ int simulate_command(Arguments& args) {
   if (args.has("volume")) inputs.push_back(args.path("volume"));
   Setup setup = setup_for(args);
   apply_scan_options(args, setup.scan);
+  const std::optional<PhotonCounts> counts = photon_counts(args, setup.scan);
   std::optional<OutputFolder> folder;
   if (setup.scan.cone)
     folder.emplace(output, std::vector<std::string>{"projections.h5", "scan.json"}, common.force);
@@ -195,7 +209,9 @@ int simulate_command(Arguments& args) {
   throw_if_stopped();
   if (folder) {
     folder->begin();
-    write_cone_scan(output, scan, setup.scan);
+    write_cone_scan(output, scan, setup.scan, counts);
+  } else if (counts) {
+    write_photon_counts(output, scan, *counts);
   } else {
     write_data_exchange(output, scan);
   }
@@ -207,6 +223,7 @@ int simulate_command(Arguments& args) {
                {"geometry", geometry_json(scan.geometry)},
                {"band_limited", setup.scan.band_limited},
                {"noise_sigma", setup.scan.noise_sigma},
+               {"photons", counts ? Json(counts->photons) : Json()},
                {"range", {*lo, *hi}},
                {"notes", scan.report.notes}};
   if (scan.cone) json["cone"] = cone_json(scan);

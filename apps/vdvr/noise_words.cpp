@@ -1,0 +1,119 @@
+#include "apps/vdvr/noise_words.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "vdvr/read_scan.hpp"
+
+namespace vdvr::cli {
+namespace {
+
+constexpr std::array<double, 2> multiples{1, 2};
+// A split that is this much more, or less, than what was predicted says something (docs/noise.md).
+constexpr double much_more = 1.5, much_less = 0.8;
+
+std::string judgement(const SplitOfViews& split) {
+  if (!split.resolved) return ", with what so few views alias beside noise";
+  if (split.ratio() > much_more)
+    return ": more than noise differs between neighbouring views (motion, beam, drift)";
+  if (split.ratio() < much_less)
+    return ": less than predicted (texture taken for noise, or pixels that share theirs)";
+  return "";
+}
+
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+}  // namespace
+
+void add_noise(Arguments& args) {
+  args.group("Noise (an estimate, beside what is certified)")
+      .value("photons", "N0",
+             "of a pixel in the open beam (default: from repeated flats, or the projections)")
+      .value("sigma-p", "S", "the standard deviation of every line integral");
+}
+
+NoiseOptions noise_options(const Arguments& args) {
+  NoiseOptions options;
+  if (args.has("photons")) options.photons = args.positive_or("photons", 0);
+  if (args.has("sigma-p")) options.sigma_p = args.positive_or("sigma-p", 0);
+  return options;
+}
+
+NoiseFound noise_of_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
+                         const ProjectionSet& scan) {
+  NoiseFound found;
+  const NoiseOptions options = noise_options(args);
+  std::optional<LineIntegralNoise> by_flats;
+  if (!options.photons && !options.sigma_p) by_flats = load_line_noise(path, args, field);
+  found.noise = scan_noise(scan, options, by_flats, &found.why);
+  return found;
+}
+
+Json noise_json(const NoiseFound& found) {
+  if (!found.noise) return {{"found", false}, {"why", found.why}};
+  const ScanNoise& n = *found.noise;
+  return {{"found", true},
+          {"source", n.model.source},
+          {"photons", n.model.photons > 0 ? Json(n.model.photons) : Json()},
+          {"sigma_p", n.model.constant > 0 ? Json(std::sqrt(n.model.constant)) : Json()},
+          {"by_flats", number_or_null(n.by_flats)},
+          {"by_differences", number_or_null(n.by_differences)},
+          {"by_wedge", number_or_null(n.by_wedge)},
+          {"agreed", n.agreed}};
+}
+
+void print_noise(const NoiseFound& found) {
+  fmt::print("  noise        {}\n", found.noise ? found.noise->words : "not known: " + found.why);
+}
+
+std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const NoiseFound& found,
+                                        const Progress& progress) {
+  if (!found.noise) return std::nullopt;
+  const Plan& plan = planned.plan;
+  FieldNoise out;
+  const Volume sigma = noise_of_field(device, planned.scan, plan.field, found.noise->model,
+                                      noise_grid(plan.grid, plan.layout.granularity), progress);
+  out.sigma = sigma_range(sigma, planned.scan, plan.field);
+  out.split = split_of_views(device, planned.scan, plan.field, found.noise->model, progress);
+  out.forecasts = foresee_in_sigma(plan, sigma, multiples);
+  return out;
+}
+
+Json field_noise_json(const FieldNoise& noise, const Plan& plan) {
+  Json json = {
+      {"sigma",
+       {{"least", noise.sigma.least}, {"median", noise.sigma.median}, {"largest", noise.sigma.largest}}},
+      {"epsilon_in_sigma", plan.epsilon_abs / noise.sigma.median},
+      {"split", Json()},
+      {"foreseen", Json::array()}};
+  if (noise.split)
+    json["split"] = {{"sigma", noise.split->sigma},
+                     {"predicted", noise.split->predicted},
+                     {"ratio", noise.split->ratio()},
+                     {"resolved", noise.split->resolved}};
+  for (const SigmaForecast& f : noise.forecasts)
+    json["foreseen"].push_back({{"sigmas", f.multiple}, {"samples_ratio", f.samples_ratio}});
+  return json;
+}
+
+void print_field_noise(const FieldNoise& noise, const Plan& plan) {
+  const double median = noise.sigma.median;
+  fmt::print("noise of F     sigma {:.4g} ({:.4g} to {:.4g}), {:.3g} % of the range; an estimate\n", median,
+             noise.sigma.least, noise.sigma.largest, 100 * median / plan.reference_range);
+  if (noise.split)
+    fmt::print("  split        halves of the views differ by {:.2f} of that{}\n", noise.split->ratio(),
+               judgement(*noise.split));
+  else fmt::print("  split        too few views to be split for comparison\n");
+  fmt::print("  tolerance    epsilon is {:.2f} sigma\n", plan.epsilon_abs / median);
+  for (const SigmaForecast& f : noise.forecasts)
+    fmt::print(
+        "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen, "
+        "brick by brick\n",
+        f.multiple, 100 * f.multiple * median / plan.reference_range, f.samples_ratio);
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,148 @@
+// The noise of a scan and of F; see vdvr/noise.hpp.
+#include "vdvr/noise.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/noise/estimate_photons.hpp"
+#include "host/noise/field_variance.hpp"
+#include "host/system/casts.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+// Two sources agree within this factor.
+constexpr double agreement = 1.5;
+// A pixel's well holds some 10^5 to 10^6 electrons: 10^9 photons would be thousands of exposures, averaged.
+constexpr double most_photons = 1e9;
+// Below about ten counts the logarithm's variance is no longer one over the counts.
+constexpr double fewest_counts = 10, share_of_few = 0.1;
+
+void require_positive(const char* option, const std::optional<double>& value, const char* what) {
+  if (value && !(*value > 0 && std::isfinite(*value)))
+    throw InputError(fmt::format("`{}` {} must be {} above 0", option, *value, what));
+}
+
+LineIntegralNoise of_photons(double photons, const char* source) {
+  LineIntegralNoise noise;
+  noise.photon = {static_cast<float>(1 / photons)};
+  noise.photons = photons;
+  noise.source = source;
+  return noise;
+}
+
+std::optional<ScanNoise> stated(const NoiseOptions& options) {
+  require_positive("photons", options.photons, "a number of photons");
+  require_positive("sigma_p", options.sigma_p, "a standard deviation of line integrals");
+  if (options.photons && options.sigma_p) throw InputError("give one of `photons` and `sigma_p`");
+  ScanNoise out;
+  out.agreed = true;
+  if (options.photons) {
+    out.model = of_photons(*options.photons, "stated");
+    out.words = fmt::format("{:.4g} photons a pixel in the open beam, as stated", *options.photons);
+    return out;
+  }
+  if (!options.sigma_p) return std::nullopt;
+  out.model.constant = *options.sigma_p * *options.sigma_p;
+  out.model.source = "stated";
+  out.words = fmt::format("line integrals with a standard deviation of {:.4g}, as stated", *options.sigma_p);
+  return out;
+}
+
+bool is_prepared(const Preparation& preparation) {
+  Preparation rest = preparation;
+  rest.binning = Preparation{}.binning;
+  return !rest.none();
+}
+
+// The share of pixels whose counts are too few for a variance of 1 / counts.
+double share_of_few_counts(const ProjectionSet& scan, double photons) {
+  const auto size = static_cast<std::int64_t>(scan.data.size()),
+             step = std::max<std::int64_t>(1, size / 1000000);
+  std::int64_t few = 0, all = 0;
+  for (std::int64_t i = 0; i < size; i += step, ++all)
+    few += photons * std::exp(-static_cast<double>(scan.data[at(i)])) < fewest_counts ? 1 : 0;
+  return static_cast<double>(few) / static_cast<double>(all);
+}
+
+double ratio_of(double a, double b) { return std::max(a, b) / std::min(a, b); }
+
+std::string photons_text(const std::optional<double>& photons) {
+  return photons ? fmt::format("{:.4g}", *photons) : "none";
+}
+
+}  // namespace
+
+std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOptions& options,
+                                    const std::optional<LineIntegralNoise>& by_flats, std::string* why) {
+  if (std::optional<ScanNoise> given = stated(options)) return given;
+  const auto none = [&](std::string reason) -> std::optional<ScanNoise> {
+    if (why) *why = std::move(reason);
+    return std::nullopt;
+  };
+  if (is_prepared(scan.report.preparation))
+    return none(
+        "the projections were prepared, which changes what their noise looks like; state the noise of the "
+        "unprepared ones by `photons`");
+  ScanNoise out;
+  out.by_differences = photons_by_differences(scan);
+  out.by_wedge = photons_by_wedge(scan);
+  if (by_flats) out.by_flats = by_flats->photons;
+  std::optional<double> best = out.by_differences;
+  const char* source = "second differences";
+  if (out.by_wedge && (!best || *out.by_wedge > *best)) {
+    best = out.by_wedge;
+    source = "empty wedge";
+  }
+  if (by_flats) {
+    out.model = *by_flats;
+    out.agreed = best && ratio_of(*best, *out.by_flats) <= agreement;
+    out.words = fmt::format(
+        "{:.4g} photons a pixel in the open beam from repeated flats; the projections "
+        "alone say {}",
+        *out.by_flats, photons_text(best));
+  } else {
+    if (!best) return none("the scan has too few views or columns to tell its noise");
+    out.model = of_photons(*best, source);
+    out.agreed =
+        out.by_differences && out.by_wedge && ratio_of(*out.by_differences, *out.by_wedge) <= agreement;
+    out.words = fmt::format(
+        "{:.4g} photons a pixel in the open beam from the projections alone: {} by second "
+        "differences, {} by the sinogram's empty wedge",
+        *best, photons_text(out.by_differences), photons_text(out.by_wedge));
+  }
+  if (out.model.photons > most_photons)
+    return none(
+        fmt::format("{:.2g} photons a pixel would explain what differs between neighbouring views, more "
+                    "than detectors count: these data hold no noise to speak of",
+                    out.model.photons));
+  if (const double few = share_of_few_counts(scan, out.model.photons); few > share_of_few)
+    return none(
+        fmt::format("{:.0f} % of the pixels counted fewer than {} of {:.3g} photons, too few for their "
+                    "variance to be told; state it by `sigma_p`",
+                    100 * few, fewest_counts, out.model.photons));
+  return out;
+}
+
+Volume noise_of_field(Device& device, const ProjectionSet& scan, const FieldOptions& field,
+                      const LineIntegralNoise& noise, const Grid& grid, const Progress& progress) {
+  FieldVariance variance = field_variance(device.state(), scan, field, noise, grid, progress);
+  Volume sigma{grid, std::move(variance.samples)};
+  for (float& s : sigma.samples)
+    s = static_cast<float>(std::sqrt(std::max(0.0, static_cast<double>(s)) * variance.scale));
+  return sigma;
+}
+
+Grid noise_grid(const Grid& grid, int granularity) {
+  Grid coarse = grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    coarse.cells[a] = (grid.cells[a] + granularity - 1) / granularity;
+    coarse.spacing[a] = grid.spacing[a] * granularity;
+  }
+  return coarse;
+}
+
+}  // namespace vdvr

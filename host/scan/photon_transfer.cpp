@@ -1,0 +1,116 @@
+#include "host/scan/photon_transfer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "host/system/casts.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr std::int64_t fewest_flats = 5;
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Median of chi^2 over its degrees of freedom (Wilson and Hilferty 1931).
+double median_of_variance(double freedom) { return std::pow(1 - 2 / (9 * freedom), 3); }
+
+struct Moments {
+  std::vector<double> mean, variance;  // by pixel; the latter of n - 1
+};
+
+// Of frames less `dark`, each times what brings its level to that of all.
+Moments moments_of(const io::Frames& frames, std::size_t size, const std::vector<double>& dark,
+                   bool levelled) {
+  Moments out{std::vector<double>(size), std::vector<double>(size)};
+  std::vector<double> frame(size), levels;
+  if (levelled) {
+    for (std::int64_t k = 0; k < frames.count; ++k) {
+      frames.read(k, 1, frame.data());
+      double level = 0;
+      for (std::size_t i = 0; i < size; ++i) level += frame[i] - dark[i];
+      levels.push_back(level);
+    }
+  }
+  double all = 0;
+  for (const double level : levels) all += level / static_cast<double>(levels.size());
+  for (std::int64_t k = 0; k < frames.count; ++k) {
+    frames.read(k, 1, frame.data());
+    const double scale = levelled ? all / levels[at(k)] : 1, n = static_cast<double>(k + 1);
+    // Welford 1962.
+    for (std::size_t i = 0; i < size; ++i) {
+      const double value = scale * (frame[i] - (dark.empty() ? 0 : dark[i])), off = value - out.mean[i];
+      out.mean[i] += off / n;
+      out.variance[i] += off * (value - out.mean[i]);
+    }
+  }
+  for (double& v : out.variance) v /= std::max(1.0, static_cast<double>(frames.count - 1));
+  return out;
+}
+
+}  // namespace
+
+std::optional<LineIntegralNoise> photon_transfer(const io::Frames& flats, const io::Frames& darks,
+                                                 std::int64_t rows, std::int64_t columns) {
+  if (flats.count < fewest_flats) return std::nullopt;
+  const std::size_t size = at(rows * columns);
+  Moments dark{std::vector<double>(size), {}};
+  if (darks.count > 0) dark = moments_of(darks, size, {}, false);
+  const double read =
+      darks.count > 1 ? median_of(dark.variance) / median_of_variance(static_cast<double>(darks.count - 1))
+                      : 0;
+  const Moments flat = moments_of(flats, size, dark.mean, true);
+  const auto is_usable = [&](std::size_t i) {
+    return flat.mean[i] > 0 && std::isfinite(flat.mean[i]) && std::isfinite(flat.variance[i]);
+  };
+  const double median = median_of_variance(static_cast<double>(flats.count - 1));
+  std::vector<double> gains, levels;
+  for (std::size_t i = 0; i < size; ++i)
+    if (is_usable(i)) {
+      gains.push_back((flat.variance[i] / median - read) / flat.mean[i]);
+      levels.push_back(flat.mean[i]);
+    }
+  if (gains.empty()) return std::nullopt;
+  const double gain = median_of(std::move(gains)), level = median_of(std::move(levels));
+  if (!(gain > 0) || !std::isfinite(gain)) return std::nullopt;
+  LineIntegralNoise out;
+  out.source = "flats";
+  out.photons = level / gain;
+  for (std::size_t i = 0; i < size; ++i) {
+    const double open = is_usable(i) ? flat.mean[i] : level;
+    out.photon.push_back(static_cast<float>(gain / open));
+    out.read.push_back(static_cast<float>(read / open / open));
+  }
+  return out;
+}
+
+LineIntegralNoise binned(const LineIntegralNoise& noise, std::int64_t rows, std::int64_t columns,
+                         int binning) {
+  if (binning == 1) return noise;
+  LineIntegralNoise out = noise;
+  const double pixels = static_cast<double>(binning) * binning;
+  out.photons *= pixels;
+  out.constant /= pixels;
+  for (std::vector<float>* values : {&out.photon, &out.read}) {
+    if (values->size() < 2) {
+      for (float& v : *values) v = static_cast<float>(static_cast<double>(v) / pixels);
+      continue;
+    }
+    const std::vector<float> fine = std::move(*values);
+    values->assign(at(rows / binning * (columns / binning)), 0.0f);
+    // The variance of a mean of n is the mean of theirs over n.
+    for (std::int64_t v = 0; v < rows / binning * binning; ++v)
+      for (std::int64_t u = 0; u < columns / binning * binning; ++u)
+        (*values)[at(v / binning * (columns / binning) + u / binning)] +=
+            static_cast<float>(static_cast<double>(fine[at(v * columns + u)]) / (pixels * pixels));
+  }
+  return out;
+}
+
+}  // namespace vdvr

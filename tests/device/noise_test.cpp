@@ -1,0 +1,288 @@
+// The standard deviation of F: against its definition, against repeated scans; and what is found of a scan's
+// noise, against what was put in.
+#define BOOST_TEST_MODULE noise
+#include "vdvr/noise.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include "host/fbp/view_weights.hpp"
+#include "host/noise/field_variance.hpp"
+#include "host/noise/split_of_views.hpp"
+#include "tests/reference/field_variance.hpp"
+#include "tests/support/cone_scans.hpp"
+#include "tests/support/device.hpp"
+#include "tests/support/photons.hpp"
+#include "tests/support/tolerance.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/exact_field.hpp"
+
+using namespace vdvr;
+using namespace vdvr::testing;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// Three smooth ellipsoids, of line integrals up to about 2.
+Phantom smooth_object(double radius) {
+  return ellipsoid_list(
+      {{1.2 / radius, {0, 0, 0}, {0.8 * radius, 0.7 * radius, 3 * radius}, 20},
+       {-0.4 / radius, {0.2 * radius, 0.1 * radius, 0}, {0.3 * radius, 0.2 * radius, radius}, 0},
+       {0.6 / radius, {-0.3 * radius, 0, 0}, {0.2 * radius, 0.25 * radius, 2 * radius}, 70}},
+      0, "smooth");
+}
+
+struct Shape {
+  const char* name;
+  std::int64_t views, rows, columns;
+  double arc_deg = 180, shift = 0, jitter = 0;
+};
+
+ProjectionSet ideal_scan(const Shape& s) {
+  SimulateOptions options;
+  options.angles = static_cast<int>(s.views);
+  options.rows = s.rows;
+  options.columns = s.columns;
+  options.arc_deg = s.arc_deg;
+  ProjectionSet scan = simulate(smooth_object(0.42 * static_cast<double>(s.columns)), options);
+  scan.geometry.center += s.shift;
+  std::mt19937 random(3);
+  for (double& t : scan.geometry.theta_rad)
+    t += s.jitter * (static_cast<double>(random()) / 4294967296.0 - 0.5) * pi / static_cast<double>(s.views);
+  return scan;
+}
+
+// A handful of samples at and between pixels and rows, within the covered region.
+Grid some_places(double radius, double low, double high) {
+  Grid grid;
+  grid.cells = {4, 2, 2};
+  grid.origin = {-0.8 * radius, -0.55 * radius, low};
+  grid.spacing = {0.39 * radius, 0.53 * radius, (high - low) / 2};
+  return grid;
+}
+
+// Standard deviations over repeated scans, against what is predicted from one of them.
+struct Agreement {
+  double mean = 0, farthest = 0;  // of found over predicted: mean, and largest distance from 1
+};
+Agreement repeated(const ProjectionSet& ideal, const FieldOptions& field, const Grid& grid, int scans,
+                   double photons) {
+  LineIntegralNoise noise;
+  noise.photon = {static_cast<float>(1 / photons)};
+  const Volume predicted = noise_of_field(support::device(), counted(ideal, photons, 77), field, noise, grid);
+  std::vector<Vec3> points;
+  const Index3 n = grid.samples();
+  for (std::int64_t i = 0; i < grid.sample_count(); ++i)
+    points.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  std::vector<double> sum(points.size()), squares(points.size());
+  for (int s = 0; s < scans; ++s) {
+    const ExactField exact(counted(ideal, photons, static_cast<unsigned>(1000 + s)), field);
+    const std::vector<double> values = exact.at(points);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      sum[i] += values[i];
+      squares[i] += values[i] * values[i];
+    }
+  }
+  Agreement out;
+  std::size_t compared = 0;
+  const ExactField exact(ideal, field);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!exact.covered(points[i])) continue;
+    const double mean = sum[i] / scans,
+                 found = std::sqrt((squares[i] / scans - mean * mean) * scans / (scans - 1)),
+                 ratio = found / static_cast<double>(predicted.samples[i]);
+    BOOST_TEST_INFO("sample " << i << ": found " << found << ", predicted " << predicted.samples[i]);
+    BOOST_TEST(std::isfinite(ratio));
+    out.mean += ratio;
+    out.farthest = std::max(out.farthest, std::abs(ratio - 1));
+    ++compared;
+  }
+  BOOST_TEST_REQUIRE(compared >= 20u);
+  out.mean /= static_cast<double>(compared);
+  return out;
+}
+
+// What is promised: 3 % in the mean; and the standard error of a standard deviation from n scans is
+// 1 / sqrt(2 n), of which no point is 4 away.
+void check(const Agreement& found, int scans, const char* name) {
+  const double error = 1 / std::sqrt(2.0 * scans);
+  BOOST_TEST_INFO(name << ": mean " << found.mean << ", farthest " << found.farthest);
+  BOOST_TEST(std::abs(found.mean - 1) <= 0.03 + 4 * error / std::sqrt(20.0));
+  BOOST_TEST_INFO(name << ": mean " << found.mean << ", farthest " << found.farthest);
+  BOOST_TEST(found.farthest <= 0.03 + 4 * error);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(squared_kernel_of_ram_lak_sums_to_a_twelfth) {
+  const SquaredFilter filter({});
+  // g(t) = sinc(t) / 2 - sinc(t / 2)^2 / 4.
+  const auto sinc = [](double t) { return t == 0 ? 1 : std::sin(pi * t) / (pi * t); };
+  const auto squared = [&](double t) { return std::pow(sinc(t) / 2 - sinc(t / 2) * sinc(t / 2) / 4, 2); };
+  for (std::int64_t m = 0; m <= 24; ++m)
+    BOOST_TEST(std::abs(filter.at(m) - squared(0.5 * static_cast<double>(m))) <=
+               tolerance::fp64_sum(1000, 1));
+  // A row of many columns: one twelfth of a constant variance at columns and between them.
+  const std::vector<double> even(4001, 1.0);
+  const std::vector<double> blocks = SquaredFilter::blocks_of(even);
+  // Beyond 12 columns at columns: 2 / (pi^4 t^4) / 2 summed; beyond 2000 between them: 1 / (2 pi^2 t^2).
+  const double at_columns = 1 / (3 * std::pow(pi, 4) * std::pow(11.0, 3)), between = 1 / (2 * pi * pi * 2000);
+  BOOST_TEST(std::abs(filter(even, blocks, 4000) - 1.0 / 12) <= at_columns);
+  // A block of 8 at its middle: 6 / t^4 * 8^3 / 24 of 1 / (2 pi)^2, from 16 columns on, on both sides.
+  double of_blocks = 0;
+  for (double t = 16; t < 2000; t += 8) of_blocks += 2 * 128 / std::pow(t, 4) / (4 * pi * pi);
+  BOOST_TEST(std::abs(filter(even, blocks, 4001) - 1.0 / 12) <= at_columns + 2 * between + of_blocks);
+  // Far from a single pixel, between columns: 1 / (2 pi t)^2 but for a term of its square, to a block's
+  // width.
+  std::vector<double> one(401, 0.0);
+  one[10] = 1;
+  const double t = 200.5 - 10, far = filter(one, SquaredFilter::blocks_of(one), 401);
+  BOOST_TEST(std::abs(far / squared(t) - 1) <= 2 * 4 / t + 0.05);
+}
+
+BOOST_AUTO_TEST_CASE(sigma_of_parallel_beam_is_that_of_its_definition) {
+  for (const Shape& s : {Shape{"odd", 37, 5, 41}, Shape{"two rows, off the middle", 30, 2, 40, 180, 3.3},
+                         Shape{"full turn, uneven", 50, 4, 33, 360, 0, 0.8}}) {
+    const ProjectionSet scan = ideal_scan(s);
+    LineIntegralNoise noise;
+    noise.constant = 1e-5;
+    noise.photon = {1e-4f};
+    noise.read = {2e-6f};
+    const double half_height = 0.5 * static_cast<double>(s.rows - 1);
+    const Grid grid = some_places(0.4 * static_cast<double>(s.columns), -half_height, half_height - 0.3);
+    const Volume sigma = noise_of_field(support::device(), scan, {}, noise, grid);
+    const PixelVariance variance(noise);
+    const std::vector<double> weights = view_weights(scan.geometry.theta_rad).weight;
+    const Index3 n = grid.samples();
+    for (std::int64_t i = 0; i < grid.sample_count(); ++i) {
+      const Vec3 p = grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]});
+      if (!is_covered(scan.geometry, scan.geometry.center, p)) continue;
+      const double expected = std::sqrt(reference::field_variance(
+          scan.geometry, weights, p, [&](std::int64_t k, std::int64_t r, std::int64_t c) {
+            const std::int64_t pixel = r * scan.geometry.columns + c;
+            return variance(static_cast<std::size_t>(pixel),
+                            static_cast<double>(scan.data[static_cast<std::size_t>(
+                                k * scan.geometry.rows * scan.geometry.columns + pixel)]));
+          }));
+      // Half columns are joined by lines, and edges of the detector filter as its middle does: an estimate.
+      constexpr double of_an_estimate = 0.03;
+      BOOST_TEST_INFO(s.name << " at " << p[0] << "," << p[1] << "," << p[2]);
+      BOOST_TEST(std::abs(static_cast<double>(sigma.samples[static_cast<std::size_t>(i)]) / expected - 1) <=
+                 of_an_estimate);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(sigma_is_that_of_repeated_scans) {
+  constexpr int scans = 60;
+  for (const Shape& s :
+       {Shape{"half turn", 40, 4, 41}, Shape{"full turn, off the middle", 48, 2, 41, 360, -2.7}}) {
+    const double half_height = 0.5 * static_cast<double>(s.rows - 1);
+    for (const RampWindow filter : {RampWindow::ram_lak, RampWindow::hann}) {
+      FieldOptions field;
+      field.filter = filter;
+      check(repeated(ideal_scan(s), field,
+                     some_places(0.4 * static_cast<double>(s.columns), -half_height, half_height - 0.4),
+                     scans, 5000),
+            scans, s.name);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(sigma_of_cone_beam_is_that_of_repeated_scans) {
+  constexpr int scans = 60;
+  struct Orbit {
+    const char* name;
+    double arc_deg, shift, tilt_deg;
+  };
+  for (const Orbit& o : {Orbit{"full turn", 360, 0, 0}, Orbit{"short scan", 240, 0, 0},
+                         Orbit{"displaced", 360, 5, 0}, Orbit{"tilted", 360, 0, 2}}) {
+    ConeShape shape;
+    shape.views = 40;
+    shape.columns = 33;
+    shape.rows = 15;
+    shape.source_to_axis = 70;
+    shape.arc_deg = o.arc_deg;
+    shape.shift = o.shift;
+    shape.out_of_plane_deg = o.tilt_deg;
+    ProjectionSet scan = noisy_cone(shape);
+    // A smooth object's line integrals, as the rays of parallel beam see it: only v follows from them.
+    const ParallelGeometry& g = scan.geometry;
+    for (std::size_t i = 0; i < scan.data.size(); ++i) {
+      const double u = static_cast<double>(static_cast<std::int64_t>(i) % g.columns) - g.center;
+      scan.data[i] = static_cast<float>(1.5 * std::exp(-u * u / 100));
+    }
+    check(repeated(scan, {}, some_places(10, -2, 2.3), scans, 20000), scans, o.name);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(sigma_keeps_its_value_in_every_unit) {
+  const Shape s{"half turn", 40, 4, 41};
+  const ProjectionSet scan = ideal_scan(s);
+  LineIntegralNoise noise;
+  noise.photon = {1e-4f};
+  const Grid grid = some_places(15, -1.5, 1.2);
+  const Volume sigma = noise_of_field(support::device(), scan, {}, noise, grid);
+  for (const int exponent : {-30, 25}) {
+    ProjectionSet other = scan;
+    Grid there = grid;
+    other.geometry.pitch_u = other.geometry.pitch_v = std::ldexp(1.0, exponent);
+    for (std::size_t a = 0; a < 3; ++a) {
+      there.origin[a] = std::ldexp(grid.origin[a], exponent);
+      there.spacing[a] = std::ldexp(grid.spacing[a], exponent);
+    }
+    const Volume in_unit = noise_of_field(support::device(), other, {}, noise, there);
+    for (std::size_t i = 0; i < sigma.samples.size(); ++i)
+      BOOST_TEST(std::ldexp(in_unit.samples[i], exponent) == sigma.samples[i]);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(photons_are_found_from_projections_alone) {
+  const ProjectionSet ideal = ideal_scan({"smooth", 128, 6, 128});
+  for (const double photons : {500.0, 5000.0, 50000.0}) {
+    std::string why;
+    const auto found = scan_noise(counted(ideal, photons, 5), {}, {}, &why);
+    BOOST_TEST_REQUIRE(found.has_value(), why);
+    BOOST_TEST_INFO(found->words);
+    // The method's promise for smooth objects.
+    BOOST_TEST(std::abs(found->model.photons / photons - 1) <= 0.1);
+    BOOST_TEST_INFO(found->words);
+    BOOST_TEST(found->agreed);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(noise_is_not_invented) {
+  std::string why;
+  // Constant data differ nowhere.
+  ProjectionSet still = empty_scan(40, 4, 40);
+  BOOST_TEST(!scan_noise(still, {}, {}, &why).has_value());
+  // Two views tell nothing.
+  ProjectionSet two = noise_scan(2, 4, 40);
+  BOOST_TEST(!scan_noise(two, {}, {}, &why).has_value());
+  BOOST_TEST(why.find("too few") != std::string::npos);
+  // A few counts a pixel.
+  const auto few = scan_noise(counted(ideal_scan({"smooth", 64, 4, 64}), 12, 5), {}, {}, &why);
+  BOOST_TEST(!few.has_value());
+  BOOST_TEST(why.find("counted fewer than") != std::string::npos);
+  BOOST_CHECK_THROW(scan_noise(still, {.photons = -3}), InputError);
+  BOOST_CHECK_THROW(scan_noise(still, {.photons = 1000, .sigma_p = 0.1}), InputError);
+  BOOST_TEST(scan_noise(still, {.photons = 1000})->model.photons == 1000);
+}
+
+BOOST_AUTO_TEST_CASE(splitting_the_views_finds_the_same_sigma) {
+  const ProjectionSet ideal = ideal_scan({"smooth", 400, 4, 65});
+  const double photons = 3000;
+  const ProjectionSet scan = counted(ideal, photons, 9);
+  const auto noise = scan_noise(scan, {.photons = photons});
+  const auto split = split_of_views(support::device(), scan, {}, noise->model);
+  BOOST_TEST_REQUIRE(split.has_value());
+  BOOST_TEST(split->resolved);
+  // Within 1.5 % for alternating signs, and four standard errors of a mean over that many samples.
+  BOOST_TEST(std::abs(split->ratio() - 1) <=
+             0.015 + 4 / std::sqrt(2.0 * static_cast<double>(split->samples)) + 0.03);
+  // Opposite views have one sign.
+  const ProjectionSet turn = ideal_scan({"turn", 60, 2, 33, 360});
+  const std::vector<int> signs = alternating_signs(turn);
+  for (std::size_t k = 0; k < 30; ++k) BOOST_TEST(signs[k] == signs[k + 30]);
+  BOOST_TEST(signs[0] != signs[1]);
+}
