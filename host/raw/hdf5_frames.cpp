@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <array>
 #include <numbers>
 
@@ -129,11 +130,14 @@ std::vector<double> read_angles(const Reader& file, const std::string& object,
                     "order must say so with an attribute axes = \"y:theta:x\"){}",
                     data.name, count_of(data), frames.count, frames.data->name, remedy));
   std::vector<double> angles = data.read_all();
-  const std::string unit = file.find_text(object, "units").value_or("degrees");
+  const std::string stated = file.find_text(object, "units").value_or("degrees");
+  std::string unit = stated;  // as whoever wrote it spells it: Degrees, DEG, Radians
+  std::transform(unit.begin(), unit.end(), unit.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (unit.rfind("rad", 0) == 0) {
     for (double& a : angles) a *= 180 / std::numbers::pi;
   } else if (unit.rfind("deg", 0) != 0 && unit != "\u00b0" && !unit.empty()) {
-    throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name, unit));
+    throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name, stated));
   }
   return angles;
 }
