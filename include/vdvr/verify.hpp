@@ -72,12 +72,13 @@ struct VerifyResult {
 /// Recomputes F from `scan` with the field options of `stored` and bounds |V - F| over every tested gold
 /// cell, V through the sampler header, on gold a quarter of a pixel apart; again on finer gold, up to 64x, in
 /// bricks whose bound there exceeds epsilon or the certificate's total. Requires the samplers that `stored`
-/// says hold and that this device has, image3d only on the device that built the volume; then computes again what else `stored` says (docs/error-bounds.md,
-/// "What verify compares"). Does not check hashes: the caller does, from the file. Cost: views * rows *
-/// columns^2 a few times on the host, 7 * views multiply-adds for each node a quarter of a pixel apart across
-/// z on each detector row, as many as there are rows for each gold node (of cone beam 64 * views for each
-/// node at about 8x), and what `build` takes to filter, to reconstruct the base and to measure the tested
-/// bricks. Throws ResourceError when --max-memory is too small for one row of bricks and one view.
+/// says hold and that this device has, image3d only on the device that built the volume; then computes again
+/// what else `stored` says (docs/error-bounds.md, "What verify compares"). Does not check hashes: the caller
+/// does, from the file. Cost: views * rows * columns^2 a few times on the host, 7 * views multiply-adds for
+/// each node a quarter of a pixel apart across z on each detector row, as many as there are rows for each
+/// gold node (of cone beam 64 * views for each node at about 8x), and what `build` takes to filter, to
+/// reconstruct the base and to measure the tested bricks. Throws ResourceError when --max-memory is too small
+/// for one row of bricks and one view.
 VDVR_API VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                              const Certificate& stored, const VerifyOptions& options = {},
                              const Progress& progress = {});

@@ -1,8 +1,8 @@
-// Back-projection of cone-beam views onto columns of z samples: out[y][x][z] = sum_k lambda^-2 q_k(u, v), or with lambda^-4,
-// bilinear between the table's columns and rows (FDK; docs/geometry.md, "Cone beam"). Layouts: float
-// table[view][column][row % VDVR_RATE][row / VDVR_RATE], so that rows a pixel apart follow one another;
-// VdvrConeView views[block][view]; int2 wanted[y][x], the first
-// and last sample of a column that anyone wants; float out[y][x][out_stride].
+// Back-projection of cone-beam views onto columns of z samples: out[y][x][z] = sum_k lambda^-2 q_k(u, v), or
+// with lambda^-4, bilinear between the table's columns and rows (FDK; docs/geometry.md, "Cone beam").
+// Layouts: float table[view][column][row % VDVR_RATE][row / VDVR_RATE], so that rows a pixel apart follow one
+// another; VdvrConeView views[block][view]; int2 wanted[y][x], the first and last sample of a column that
+// anyone wants; float out[y][x][out_stride].
 //
 // Where the detector stands upright (VDVR_UPRIGHT 1), u and lambda belong to the whole column and v runs
 // evenly along it; else each sample has its own. A vector of VDVR_LANES samples reads runs of as many rows,
@@ -193,7 +193,8 @@ __kernel void cone_back_project(__global float* out, __global const float* table
           const float lane_step = v->step_v[2] * inverse, bend = lane_step - (float)VDVR_RATE,
                       first = fma(fma(v->step_v[2], above, v_plane), inverse, v->part_v),
                       across = bend * (float)(VDVR_LANES - 1), lowest = LESS(across, 0.0f),
-                      weight = AT_DEPTH(1.0f, inverse), right = (u - (float)cut) * weight, left = weight - right;
+                      weight = AT_DEPTH(1.0f, inverse), right = (u - (float)cut) * weight,
+                      left = weight - right;
           const int spans = clamp((int)fabs(across) + 2, 1, spans_v), last_start = rows - 1 - spans;
           __global const float* from = plane + (size_t)column * row_stride;
           FOR_VECTORS(PLACE)

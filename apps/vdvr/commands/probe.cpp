@@ -150,9 +150,9 @@ std::vector<Probe> probe_exact(const std::filesystem::path& path, const Argument
     like = open_certified(args.path("like"), args).certificate;
     field = like->field;
   }
-  const ExactField exact(like ? load_certified_scan(path, args, *like, progress)
-                              : load_scan(path, args, field, progress),
-                         field, progress);
+  const ExactField exact(
+      like ? load_certified_scan(path, args, *like, progress) : load_scan(path, args, field, progress), field,
+      progress);
   std::vector<Probe> probes(points.size());
   std::vector<Vec3> covered;
   for (std::size_t i = 0; i < points.size(); ++i)
