@@ -368,6 +368,9 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   if (options.refinement) refinement.emplace(*options.refinement, units);
   const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes);
+  if (refinement)
+    refinement->begin(epsilon_abs - samplers.first_tolerance(epsilon_abs),
+                      samplers.first_tolerance(plan.epsilon_abs));
   records.begin(
       journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
   bool refined = false;
