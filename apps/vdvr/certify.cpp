@@ -141,13 +141,19 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& asked
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
   choose_tolerance(planned, wanted, args);
   if (seen) seen(planned);
-  if (wanted.sigmas) {
-    PlanInSigma made = make_plan_in_sigma(device, planned.scan, *wanted.sigmas, *planned.noise.noise,
-                                          wanted.options, progress);
-    planned.plan = std::move(made.plan);
-    planned.sigma = std::move(made.sigma);
-    return planned;
-  }
+  if (wanted.sigmas) try {
+      PlanInSigma made = make_plan_in_sigma(device, planned.scan, *wanted.sigmas, *planned.noise.noise,
+                                            wanted.options, progress);
+      planned.plan = std::move(made.plan);
+      planned.sigma = std::move(made.sigma);
+      return planned;
+    } catch (const ToleranceError& e) {
+      if (!wanted.chosen_by_noise) throw;
+      wanted.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
+      planned.sigmas.reset();
+      say(fmt::format("{}: one sigma of this scan is out of reach ({}); takes 3 % of the range\n", args.who(),
+                      e.what()));
+    }
   if (!wanted.pictures) {
     planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
     planned.sigma = noted_sigma(device, planned, progress);

@@ -14,7 +14,7 @@ BrickRefinement::BrickRefinement(const Refinement& wanted, const Units& units)
     : wanted_(wanted), units_(units), everywhere_(from_world(wanted.everywhere_abs, units)) {}
 
 void BrickRefinement::begin(double rest, double least) {
-  if (!wanted_.by_brick.empty()) take(wanted_.by_brick, rest, least, {});
+  if (knows_bricks()) take(wanted_.by_brick, rest, least, {});
 }
 
 bool BrickRefinement::asks(const MixedVolume& volume, const Certificate& certificate, double rest,

@@ -16,6 +16,8 @@ class BrickRefinement {
   BrickRefinement(const Refinement& wanted, const Units& units);
   /// What |V - F| may be everywhere.
   [[nodiscard]] double everywhere() const { return everywhere_; }
+  /// Whether each brick's tolerance is known from the start.
+  [[nodiscard]] bool knows_bricks() const { return !wanted_.by_brick.empty(); }
   /// Bricks begin at what is known of them. `rest` and `least` as below, before anything was measured.
   void begin(double rest, double least);
   /// Asks. `rest` is what a brick's bound holds beside what is measured at nodes, `least` the least tolerance
