@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "vdvr/devices.hpp"
 #include "vdvr/scratch.hpp"
 
 namespace vdvr::cli {
@@ -15,6 +16,8 @@ void add_common(Arguments& args) {
              "limit of our host and device allocations together (default: half of what is free)")
       .value("scratch", "DIR",
              "where what does not fit that limit is kept meanwhile (default: the output's folder)")
+      .flag("untrusted-device",
+            "draw with a device that fails the test of its arithmetic; nothing is certified with one")
       .flag("json", "one JSON object on standard output, nothing else")
       .flag("quiet", "no progress and no summary")
       .flag("force", "overwrite existing outputs")
@@ -39,6 +42,7 @@ CommonOptions common_options(const Arguments& args) {
   common.max_memory =
       args.has("max-memory") ? parse_bytes("--max-memory", args.text("max-memory")) : half_of_free_memory();
   common.scratch = scratch_folder(args);
+  if (args.has("untrusted-device")) open_untrusted_devices(true);
   common.json = args.has("json");
   common.quiet = args.has("quiet");
   common.force = args.has("force");

@@ -51,6 +51,7 @@ const std::set<std::string>& fields_with_options() {
                                            "storage",
                                            "tf",
                                            "u_filter",
+                                           "untrusted_device",
                                            "upsampling",
                                            "window",
                                            "zoom"};

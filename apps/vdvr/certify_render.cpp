@@ -10,6 +10,7 @@
 #include "apps/vdvr/picture_certificate.hpp"
 #include "apps/vdvr/picture_light.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"
+#include "vdvr/devices.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/explain_pixel.hpp"
 #include "vdvr/hash.hpp"
@@ -318,6 +319,7 @@ void check_certify(const Arguments& args, const RenderOptions& o) {
 
 int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions o,
                    const Overlay& overlay, const std::filesystem::path& output, const Progress& progress) {
+  require_trusted(source.device(), "certifying a picture");
   const Scene& scene = source.scene();
   check_file(args, scene, o);
   check_pixel(args, o);

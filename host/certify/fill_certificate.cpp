@@ -10,6 +10,7 @@
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
+#include "vdvr/devices.hpp"
 
 namespace vdvr {
 namespace {
@@ -105,6 +106,7 @@ Certificate fill_certificate(const Inputs& in, const Device& device, const Proje
   if (in.crew) name_kinds(*in.crew, c);
   c.version = VDVR_VERSION;
   c.notes = plan.notes;
+  c.notes.push_back("the device passed its test when it was opened: " + test_of(device).names());
   for (const std::string& note : scan.report.notes)
     if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
   if (c.comparison)

@@ -1,4 +1,4 @@
-// Enumerates and chooses OpenCL devices, and keeps the account of allocations.
+// Chooses and opens OpenCL devices, and keeps the account of allocations.
 #include "vdvr/device.hpp"
 
 #include <fmt/format.h>
@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "host/opencl/device_end.hpp"
+#include "host/opencl/device_list.hpp"
 #include "host/opencl/state.hpp"
+#include "host/opencl/trust.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -147,73 +149,7 @@ void State::keep_pace(cl::Event latest) {
 
 namespace {
 
-using Found = std::vector<std::pair<cl::Device, DeviceInfo>>;
-
-bool has_linear_image(const cl::Device& device, cl_channel_type type) {
-  const cl::Context context(device);
-  std::vector<cl::ImageFormat> formats;
-  context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
-  return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
-    return f.image_channel_order == CL_R && f.image_channel_data_type == type;
-  });
-}
-
-std::string trimmed(std::string s) {
-  while (!s.empty() && (s.back() == '\0' || std::isspace(static_cast<unsigned char>(s.back())))) s.pop_back();
-  return s;
-}
-
-DeviceInfo describe(const cl::Platform& platform, const cl::Device& device, int index) {
-  DeviceInfo d;
-  d.index = index;
-  d.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
-  d.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
-  d.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
-  d.version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
-  d.driver = trimmed(device.getInfo<CL_DRIVER_VERSION>());
-  const cl_device_type type = device.getInfo<CL_DEVICE_TYPE>();
-  d.is_gpu = (type & CL_DEVICE_TYPE_GPU) != 0;
-  d.is_cpu = (type & CL_DEVICE_TYPE_CPU) != 0;
-  d.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
-  d.max_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
-  d.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
-  d.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
-  d.max_work_group = static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
-  d.subnormals = (device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>() & CL_FP_DENORM) != 0;
-  d.images = device.getInfo<CL_DEVICE_IMAGE_SUPPORT>() == CL_TRUE;
-  if (d.images) {
-    d.image3d_max[0] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_WIDTH>();
-    d.image3d_max[1] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_HEIGHT>();
-    d.image3d_max[2] = device.getInfo<CL_DEVICE_IMAGE3D_MAX_DEPTH>();
-    d.linear_float_image = has_linear_image(device, CL_FLOAT);
-    d.linear_u16_image = has_linear_image(device, CL_UNORM_INT16);
-    d.linear_u8_image = has_linear_image(device, CL_UNORM_INT8);
-  }
-  return d;
-}
-
-Found enumerate() {
-  Found found;
-  std::vector<cl::Platform> platforms;
-  try {
-    cl::Platform::get(&platforms);
-  } catch (const cl::Error&) {
-    return found;  // the loader reports "no platform" as an error
-  }
-  for (const auto& platform : platforms) {
-    std::vector<cl::Device> devices;
-    try {
-      platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
-    } catch (const cl::Error&) {
-      continue;
-    }
-    for (const auto& device : devices) {
-      if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
-      found.emplace_back(device, describe(platform, device, static_cast<int>(found.size())));
-    }
-  }
-  return found;
-}
+using opencl::FoundDevice;
 
 std::string lower(std::string s) {
   std::transform(s.begin(), s.end(), s.begin(),
@@ -235,39 +171,83 @@ bool matches(const DeviceInfo& d, const std::string& selector) {
 
 std::vector<DeviceInfo> Device::list() {
   std::vector<DeviceInfo> infos;
-  for (const auto& [device, info] : enumerate()) infos.push_back(info);
+  for (const FoundDevice& found : opencl::find_devices())
+    if (found.trouble.empty()) infos.push_back(found.info);
   return infos;
 }
 
-Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
-    : state_(std::make_shared<opencl::State>()) {
-  const Found found = enumerate();
-  if (found.empty()) {
-    throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
-  }
-  auto chosen = found.end();
-  if (selector.empty()) {
-    chosen = std::find_if(found.begin(), found.end(), [](const auto& f) { return f.second.is_gpu; });
-    if (chosen == found.end()) chosen = found.begin();
-  } else {
-    chosen =
-        std::find_if(found.begin(), found.end(), [&](const auto& f) { return matches(f.second, selector); });
-  }
-  if (chosen == found.end()) {
-    std::string names;
-    for (const auto& [device, info] : found)
-      names += fmt::format("\n  {}: {} ({})", info.index, info.name, info.platform);
-    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
-  }
+namespace {
+
+// Those that the selector means, the best first.
+std::vector<FoundDevice> chosen_from(const std::vector<FoundDevice>& all, const std::string& selector) {
+  std::vector<FoundDevice> chosen;
+  for (const FoundDevice& found : all)
+    if (selector.empty() || matches(found.info, selector)) chosen.push_back(found);
+  if (selector.empty())
+    std::stable_partition(chosen.begin(), chosen.end(), [](const FoundDevice& f) { return f.info.is_gpu; });
+  return chosen;
+}
+
+// Throws DeviceError, BuildError or ResourceError where the device cannot be used.
+std::shared_ptr<opencl::State> opened(FoundDevice found) {
+  auto state = std::make_shared<opencl::State>();
+  DeviceTest test;
   try {
-    state_->device = chosen->first;
-    state_->info = chosen->second;
-    state_->context = cl::Context(state_->device);
-    state_->queue = cl::CommandQueue(state_->context, state_->device);
+    opencl::ask_image_formats(found);
+    if (!found.trouble.empty())
+      throw DeviceError(fmt::format("'{}' cannot be used: {}", found.info.name, found.trouble));
+    state->device = found.device;
+    state->info = found.info;
+    state->context = cl::Context(state->device);
+    state->queue = cl::CommandQueue(state->context, state->device);
+    test = opencl::test_device(*state);
   } catch (const cl::Error& e) {
     throw DeviceError(
-        fmt::format("cannot open '{}': {} {}", chosen->second.name, e.what(), opencl::code_name(e.err())));
+        fmt::format("cannot open '{}': {} {}", found.info.name, e.what(), opencl::code_name(e.err())));
   }
+  if (!test.passed() && !opencl::untrusted_are_opened())
+    throw DeviceError(fmt::format(
+        "'{}' (driver {}) does not compute as certificates assume: {}; choose another `device`, or "
+        "draw with `untrusted_device`",
+        found.info.name, found.info.driver, test.failures()));
+  if (!test.passed()) opencl::tell(fmt::format("'{}' is not trusted: {}", found.info.name, test.failures()));
+  opencl::keep_test(*state, std::move(test));
+  return state;
+}
+
+}  // namespace
+
+Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
+  const std::vector<FoundDevice> all = opencl::find_devices();
+  if (all.empty())
+    throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
+  const std::vector<FoundDevice> chosen = chosen_from(all, selector);
+  if (chosen.empty()) {
+    std::string names;
+    for (const FoundDevice& found : all)
+      names += fmt::format("\n  {}: {} ({})", found.info.index, found.info.name, found.info.platform);
+    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
+  }
+  std::vector<std::string> passed_over;
+  for (const FoundDevice& found : chosen) {
+    try {
+      state_ = opened(found);
+      break;
+    } catch (const Error& e) {
+      const bool of_device =
+          e.kind() == ErrorKind::device || e.kind() == ErrorKind::build || e.kind() == ErrorKind::resource;
+      if (!of_device || chosen.size() == 1) throw;
+      passed_over.emplace_back(e.what());
+    }
+  }
+  if (!state_) {
+    std::string reasons;
+    for (const std::string& reason : passed_over) reasons += "\n  " + reason;
+    throw DeviceError(fmt::format("no device that `device` '{}' means can be used:{}", selector, reasons));
+  }
+  for (const std::string& reason : passed_over)
+    opencl::tell(fmt::format("{}; going on with '{}'", reason, state_->info.name));
+  // The test's own buffers are gone, and count for nothing.
   const std::uint64_t device_memory = state_->info.global_memory;
   state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));
 }
