@@ -9,7 +9,7 @@
 #include "apps/common/arguments.hpp"
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/scratch.hpp"
 
 namespace vdvr::cli {

@@ -10,7 +10,7 @@
 #include "apps/vdvr/picture_certificate.hpp"
 #include "apps/vdvr/picture_light.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/explain_pixel.hpp"
 #include "vdvr/hash.hpp"

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "apps/common/progress.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -23,7 +23,7 @@
 #include "host/sampler/sampler_terms.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
 

@@ -10,7 +10,7 @@
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -8,10 +8,14 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
+#include <complex>
 #include <map>
 #include <mutex>
+#include <numbers>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "host/opencl/device_end.hpp"
 #include "vdvr/error.hpp"
@@ -44,12 +48,16 @@ struct Plan {
     if (handle != 0) clfftDestroyPlan(&handle);
   }
   Plan(Plan&& o) noexcept
-      : handle(std::exchange(o.handle, 0)), context(std::move(o.context)), scratch(std::move(o.scratch)) {}
+      : handle(std::exchange(o.handle, 0)),
+        context(std::move(o.context)),
+        scratch(std::move(o.scratch)),
+        compared(o.compared) {}
   Plan& operator=(Plan&&) = delete;
 
   clfftPlanHandle handle = 0;
   cl::Context context;  // keeps the context alive as long as the plan
   cl::Buffer scratch;
+  bool compared = false;  // with what is right, at its first use
 };
 
 using Key = std::tuple<cl_context, cl_command_queue, Precision, std::int64_t, std::int64_t, bool>;
@@ -103,14 +111,104 @@ Plan& plan_for(opencl::State& state, Precision precision, std::int64_t length, s
   return plans.emplace(key, std::move(plan)).first->second;
 }
 
+// A row of a buffer, as doubles. Waits.
+std::vector<double> row_of(const opencl::State& state, Precision precision, const cl::Buffer& buffer,
+                           std::size_t first, std::size_t count) {
+  const auto read = [&]<class Real>(Real) {
+    std::vector<Real> row(count);
+    state.queue.enqueueReadBuffer(buffer, CL_TRUE, first * sizeof(Real), count * sizeof(Real), row.data());
+    return std::vector<double>(row.begin(), row.end());
+  };
+  return precision == Precision::fp64 ? read(double{}) : read(float{});
+}
+
+// What a plan makes of the last row is compared with the sums that define it, at some places: all of a row
+// would be its square. How far apart they may be: each of the transform's stages rounds a few times, log2 n
+// of them, and no partial sum is larger than the sum of the magnitudes.
+class FirstUse {
+ public:
+  FirstUse(const opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
+           bool forward)
+      : state_(state),
+        precision_(precision),
+        forward_(forward),
+        length_(static_cast<std::size_t>(length)),
+        row_(static_cast<std::size_t>(batch - 1)) {}
+
+  void read_input(const cl::Buffer& in) {
+    in_ = row_of(state_, precision_, in, row_ * (forward_ ? length_ : 2 * bins()),
+                 forward_ ? length_ : 2 * bins());
+  }
+  void compare(const cl::Buffer& out) const {
+    const std::vector<double> is = row_of(state_, precision_, out, row_ * (forward_ ? 2 * bins() : length_),
+                                          forward_ ? 2 * bins() : length_);
+    const double unit = precision_ == Precision::fp64 ? 0x1p-53 : 0x1p-24;
+    double magnitudes = 0;
+    for (const double v : in_) magnitudes += std::fabs(v);
+    if (!forward_) magnitudes *= 2.0 / static_cast<double>(length_);
+    const double allowed = 16 * std::log2(static_cast<double>(length_)) * unit * magnitudes;
+    for (const std::size_t place :
+         {std::size_t{0}, std::size_t{1}, length_ / 5, length_ / 2 - 1, length_ / 2}) {
+      const std::complex<double> should = forward_ ? bin(place) : std::complex<double>(sample(place));
+      const std::complex<double> found =
+          forward_ ? std::complex<double>(is[2 * place], is[2 * place + 1]) : std::complex<double>(is[place]);
+      // What overflows is said of the scan, by whoever reads it.
+      if (std::isfinite(std::abs(found)) && !(std::abs(found - should) <= allowed))
+        throw DeviceError(
+            fmt::format("clFFT on '{}' makes of a row of length {} {:.9g} at place {}, where {:.9g} is "
+                        "right; choose another "
+                        "`device`",
+                        state_.info.name, length_, std::abs(found), place, std::abs(should)));
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t bins() const { return length_ / 2 + 1; }
+  [[nodiscard]] std::complex<double> root(std::size_t i) const {
+    const double angle =
+        2 * std::numbers::pi * (static_cast<double>(i % length_) / static_cast<double>(length_));
+    return {std::cos(angle), std::sin(angle)};
+  }
+  [[nodiscard]] std::complex<double> bin(std::size_t k) const {
+    std::complex<double> sum;
+    for (std::size_t i = 0; i < length_; ++i) sum += in_[i] * std::conj(root(i * k));
+    return sum;
+  }
+  [[nodiscard]] double sample(std::size_t i) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < bins(); ++k) {
+      const std::complex<double> value(in_[2 * k], in_[2 * k + 1]);
+      // The bins that are not there are the conjugates of those that are, but for the first and the middle.
+      const bool alone = k == 0 || 2 * k == length_;
+      sum += (alone ? 1.0 : 2.0) * (value * root(i * k)).real();
+    }
+    return sum / static_cast<double>(length_);
+  }
+
+  const opencl::State& state_;
+  Precision precision_;
+  bool forward_;
+  std::size_t length_, row_;
+  std::vector<double> in_;
+};
+
 void transform(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,
                bool forward, const cl::Buffer& in, const cl::Buffer& out) {
   const std::lock_guard guard(bake_lock);
-  const Plan& plan = plan_for(state, precision, length, batch, forward);
+  Plan& plan = plan_for(state, precision, length, batch, forward);
   cl_mem source = in(), target = out();
-  check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0,
-                              nullptr, nullptr, &source, &target, plan.scratch()),
-        "clfftEnqueueTransform", length, batch, state);
+  FirstUse first(state, precision, length, batch, forward);
+  try {
+    if (!plan.compared) first.read_input(in);
+    check(clfftEnqueueTransform(plan.handle, forward ? CLFFT_FORWARD : CLFFT_BACKWARD, 1, &state.queue(), 0,
+                                nullptr, nullptr, &source, &target, plan.scratch()),
+          "clfftEnqueueTransform", length, batch, state);
+    if (!plan.compared) first.compare(out);
+    plan.compared = true;
+  } catch (const cl::Error& e) {
+    throw DeviceError(fmt::format("comparing clFFT's first result on '{}': {} {}", state.info.name, e.what(),
+                                  opencl::code_name(e.err())));
+  }
 }
 
 }  // namespace

@@ -7,9 +7,12 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <optional>
 #include <set>
 #include <sstream>
+#include <utility>
 
+#include "host/opencl/binary_cache.hpp"
 #include "host/opencl/embedded.hpp"
 #include "host/opencl/state.hpp"
 #include "vdvr/error.hpp"
@@ -58,14 +61,20 @@ std::string build_options(const Defines& defines) {
   return options;
 }
 
-const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
-  const std::string options = build_options(defines);
-  const std::string cache_key = name + ' ' + options;
-  const std::lock_guard guard(state.programs_lock_);
-  if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
-    return found->second;
+namespace {
 
-  cl::Program built(state.context, resolve_source(name + ".cl"));
+cl::Program build_source(const State& state, const std::string& name, const std::string& source,
+                         const std::string& options) {
+  const auto failed = [&](const cl::Error& e, const std::string& log) {
+    return BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
+                                  name, state.info.name, options, e.what(), code_name(e.err()), log));
+  };
+  cl::Program built;
+  try {
+    built = cl::Program(state.context, source);
+  } catch (const cl::Error& e) {
+    throw failed(e, "");
+  }
   try {
     built.build({state.device}, options.c_str());
   } catch (const cl::Error& e) {
@@ -77,9 +86,24 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
     } catch (const cl::Error&) {
       log = "(no log)";
     }
-    throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
-                                 name, state.info.name, options, e.what(), code_name(e.err()), log));
+    throw failed(e, log);
   }
+  keep_program(state, source, options, built);
+  return built;
+}
+
+}  // namespace
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  const std::string options = build_options(defines);
+  const std::string cache_key = name + ' ' + options;
+  const std::lock_guard guard(state.programs_lock_);
+  if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
+    return found->second;
+
+  const std::string source = resolve_source(name + ".cl");
+  std::optional<cl::Program> known = kept_program(state, source, options);
+  cl::Program built = known ? std::move(*known) : build_source(state, name, source, options);
   if (state.on_program) state.on_program(name, defines);
   return state.programs_.emplace(cache_key, std::move(built)).first->second;
 }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host/opencl/state.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::opencl {
 

@@ -18,7 +18,7 @@
 #include "host/sampler/picture_parts.hpp"
 #include "shared/certify_params.h"
 #include "vdvr/certify_picture.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
 

@@ -22,7 +22,7 @@
 #include "host/verify/verify_terms.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
-#include "vdvr/devices.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"

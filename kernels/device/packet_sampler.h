@@ -47,13 +47,6 @@
 
 #define GRADIENT_REACH 0.5f
 
-// 1 / p of powers of two, exact: 2^e has the bits (127 + e) << 23.
-RAY_INLINE V inverse_power(V p) { return PACKET(as_float)(0x7f000000 - PACKET(as_int)(p)); }
-// Of cells of samples whose lowest corners are `low`, with `scale` of them to a cell of the grid.
-RAY_INLINE V3 far_corner(V3 low, V3 scale) {
-  return v3(low.x + inverse_power(scale.x), low.y + inverse_power(scale.y), low.z + inverse_power(scale.z));
-}
-
 // The bricks that the lanes are in; a cell coordinate c belongs to one iff low <= c < high.
 typedef struct {
   I3 at;
@@ -75,6 +68,13 @@ typedef struct {
 } OpenBrick;
 
 #include "device/packet_bricks.h"
+
+// 1 / p of powers of two, exact: 2^e has the bits (127 + e) << 23.
+RAY_INLINE V inverse_power(V p) { return PACKET(as_float)(0x7f000000 - PACKET(as_int)(p)); }
+// Of cells of samples whose lowest corners are `low`, with `scale` of them to a cell of the grid.
+RAY_INLINE V3 far_corner(V3 low, V3 scale) {
+  return v3(low.x + inverse_power(scale.x), low.y + inverse_power(scale.y), low.z + inverse_power(scale.z));
+}
 
 #if !VDVR_UNIFORM && defined(VDVR_SAMPLER_BUFFER)
 // The reach of one axis of a brick that starts at cell `low`.

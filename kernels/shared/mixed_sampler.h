@@ -4,8 +4,7 @@
 // tests/device/one_sampler_test.cpp (contract: docs/file-format.md).
 //
 // The includer declares its dialect: VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST. Scalar fp32, + - *, conversion
-// to int, bits read as a float and comparisons only, contraction off on both sides, so that both give the
-// same bits. No quotients: OpenCL's may err by 2.5 ulp.
+// to int and comparisons only, contraction off on both sides, so that both give the same bits.
 //
 // Coordinates are in cells: c = (p - origin) / spacing, 0 <= c <= cells. A point belongs to the brick floor(c
 // / g) (half-open; the last brick is closed). Inside it the local coordinate (c - g b) 2^(level - coarse) is
@@ -27,9 +26,7 @@ typedef uint vdvr_u32;
 typedef ushort vdvr_u16;
 typedef uchar vdvr_u8;
 typedef int vdvr_i32;
-#define VDVR_AS_FLOAT(bits) as_float(bits)
 #elif defined(VDVR_DIALECT_HOST)
-#include <bit>
 #include <cstdint>
 #define VDVR_GLOBAL
 #define VDVR_INLINE inline
@@ -38,7 +35,6 @@ typedef std::uint32_t vdvr_u32;
 typedef std::uint16_t vdvr_u16;
 typedef std::uint8_t vdvr_u8;
 typedef std::int32_t vdvr_i32;
-#define VDVR_AS_FLOAT(bits) std::bit_cast<float>(bits)
 #else
 #error "declare VDVR_DIALECT_OPENCL or VDVR_DIALECT_HOST before including mixed_sampler.h"
 #endif
@@ -145,12 +141,9 @@ VDVR_INLINE vdvr_i32 vdvr_brick_of(float c, vdvr_i32 granularity, vdvr_i32 brick
   return b < 0 ? 0 : (b > bricks - 1 ? bricks - 1 : b);
 }
 
-// 2^n, -126 <= n <= 127.
-VDVR_INLINE float vdvr_power_of_two(vdvr_i32 n) { return VDVR_AS_FLOAT((vdvr_i32)(127 + n) * (1 << 23)); }
-
 // Samples of a level per cell of the grid: a power of two.
 VDVR_INLINE float vdvr_per_cell(vdvr_u32 level, vdvr_i32 coarse) {
-  return vdvr_power_of_two((vdvr_i32)level - coarse);
+  return (float)(1 << level) / (float)(1 << coarse);
 }
 
 // The local coordinate of c in brick b of the given level; c may lie on the brick's far face.

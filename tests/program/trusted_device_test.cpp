@@ -1,8 +1,9 @@
-// Devices that compute badly: a layer makes the arithmetic of a good one wrong, and the test that every device
-// is given when it is opened names what is. Such a device draws when asked to, and certifies nothing.
+// Devices that compute badly: a layer makes the arithmetic of a good one wrong, and the test that every
+// device is given when it is opened names what is. Such a device draws when asked to, and certifies nothing.
 #define BOOST_TEST_MODULE trusted_device
 #include <boost/test/unit_test.hpp>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "tests/support/program.hpp"
 
@@ -21,6 +22,9 @@ struct Bad : Program {
     static_cast<Program&>(*this) = Program(folder.path());
     environment["XDG_CACHE_HOME"] = (folder / "cache").string();
     environment["VDVR_KERNEL_WARNINGS"] = "";
+    // What the compiler keeps is one for all: it knows programs by their text and options.
+    static const TemporaryFolder compiled;
+    environment["POCL_CACHE_DIR"] = compiled.path().string();
     if (replace.empty() && options.empty()) return;
     environment["LD_PRELOAD"] = VDVR_OPENCL_FAULTS;
     environment["VDVR_FAULTS_REPLACE"] = replace;
@@ -73,8 +77,9 @@ BOOST_AUTO_TEST_CASE(a_device_that_computes_as_it_should_passes_and_is_remembere
   BOOST_TEST(!first["remembered"].get<bool>());
   std::set<std::string> names;
   for (const Json& check : first["checks"]) names.insert(check["name"].get<std::string>());
-  for (const char* name : {"contraction", "two-sum", "fma", "division", "square root", "conversions", "subnormals",
-                           "infinity and NaN", "integers", "atomics", "select and masks", "sampler"})
+  for (const char* name :
+       {"contraction", "two-sum", "fma", "division", "square root", "conversions", "subnormals",
+        "infinity and NaN", "integers", "atomics", "select and masks", "sampler"})
     BOOST_TEST(names.count(name) == 1u, name);
   const Json again = good.test();
   BOOST_TEST(again["remembered"].get<bool>());
