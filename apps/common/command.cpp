@@ -9,6 +9,7 @@
 #include "apps/common/arguments.hpp"
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
 
@@ -39,6 +40,8 @@ int run_guarded(const Command& command, std::vector<std::string> words) {
   const std::string who = command.who();
   try {
     catch_signals(who);
+    tell_of_devices(
+        [who](const std::string& line) { say(fmt::format("{}: {}\n", who, with_options(line))); });
     Arguments args(command, std::move(words));
     const int code = command.run(args);
     if (std::fflush(stdout) != 0) return fail(who, "standard output cannot be written", 3);

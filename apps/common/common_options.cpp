@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "vdvr/scratch.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 
@@ -20,6 +21,13 @@ void add_common(Arguments& args) {
       .flag("force", "overwrite existing outputs")
       .flag("help,h", "this text");
 }
+
+void add_untrusted(Arguments& args) {
+  args.flag("untrusted-device",
+            "draw with a device that fails the test of its arithmetic; nothing is certified with one");
+}
+
+void untrusted_option(const Arguments& args) { open_untrusted_devices(args.has("untrusted-device")); }
 
 namespace {
 

@@ -23,6 +23,9 @@ struct CommonOptions {
 
 void add_common(Arguments& args);
 CommonOptions common_options(const Arguments& args);
+/// Of commands that draw: a device that fails its test (vdvr/trust.hpp) is opened where the user says so.
+void add_untrusted(Arguments& args);
+void untrusted_option(const Arguments& args);
 inline Device open_device(const CommonOptions& common) { return Device(common.device, common.max_memory); }
 
 /// The summary of a command: one JSON object with --json, else what `as_text` prints, nothing with --quiet.

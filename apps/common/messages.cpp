@@ -58,6 +58,7 @@ const std::set<std::string>& fields_with_options() {
                                            "tf",
                                            "transmission",
                                            "u_filter",
+                                           "untrusted_device",
                                            "upsampling",
                                            "views",
                                            "window",

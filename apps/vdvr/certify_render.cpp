@@ -16,6 +16,7 @@
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/stop.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -357,6 +358,7 @@ int certify_render(const Arguments& args, const CommonOptions& common, Source& s
       "",
       source.device().info().name,
       source.device().info().driver,
+      test_of(source.device()).names(),
       // Slices and light of F are certified on the host.
       sampler_term_json(certificate, !show.slice && !lit && made.bounds.sampler == SamplerKind::image3d),
       show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};

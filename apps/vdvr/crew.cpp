@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "apps/common/progress.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
@@ -90,8 +91,10 @@ Devices::Devices(const Arguments& args, const CommonOptions& common) {
     all.resize(1);
     sharing = static_cast<std::uint64_t>(the_messenger->neighbours());
   }
-  for (const std::string& selector : all)
+  for (const std::string& selector : all) {
     devices_.push_back(std::make_unique<Device>(selector, common.max_memory / sharing));
+    require_trusted(*devices_.back(), "certifying a volume");
+  }
 }
 
 CrewOptions Devices::crew() {

@@ -320,6 +320,7 @@ Json certificate_head(const CertifiedPicture& picture, const Certificate& certif
           {"step", text_of_step(picture)},
           {"device", picture.device},
           {"driver", picture.driver},
+          {"device_test", picture.device_test},
           {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
 }
 

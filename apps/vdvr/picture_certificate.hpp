@@ -25,6 +25,7 @@ struct CertifiedPicture {
   std::string content_sha256, file, pixels_sha256,
       file_sha256;                    ///< of the volume; the picture, its rgb bytes before overlays, its file
   std::string device, driver;         ///< that drew it
+  std::string device_test;            ///< what it was tested for when it was opened; it passed
   Json sampler_term;                  ///< charged in the intervals (sampler_term_json)
   std::vector<std::string> overlays;  ///< drawn over it afterwards
 };

@@ -15,6 +15,7 @@
 #include "vdvr/output_file.hpp"
 #include "vdvr/stop.hpp"
 #include "vdvr/surface_picture.hpp"
+#include "vdvr/trust.hpp"
 
 namespace fs = std::filesystem;
 
@@ -50,6 +51,7 @@ CertifiedPicture described(Source& source, const RenderOptions& options, const R
   picture.pixels_sha256 = sha256_of_pixels(drawn.image);
   picture.device = source.device().info().name;
   picture.driver = source.device().info().driver;
+  picture.device_test = test_of(source.device()).names();
   picture.sampler_term = sampler_term_json(source.certificate(), false);  // intervals are of the host
   return picture;
 }

@@ -8,6 +8,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -127,6 +128,17 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
   projections_.emplace(*device_, *field_, grid, progress);
   renderer_.emplace(*device_, *projections_);
   scene_ = Scene{as_mixed(projections_->samples()), std::nullopt, false};
+}
+
+bool Source::trusted() {
+  return test_of(*device_).passed() && std::all_of(others_.begin(), others_.end(), [](const auto& other) {
+           return test_of(other->device).passed();
+         });
+}
+
+void Source::require_trusted(const std::string& what) {
+  vdvr::require_trusted(*device_, what);
+  for (const auto& other : others_) vdvr::require_trusted(other->device, what);
 }
 
 SafeSampler Source::take_sampler(SamplerKind asked, bool unverified) {

@@ -39,6 +39,10 @@ class Source {
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
   [[nodiscard]] Device& device() { return *device_; }
+  /// Of all devices that draw: they passed their test when they were opened.
+  [[nodiscard]] bool trusted();
+  /// As of vdvr/trust.hpp, of each of them.
+  void require_trusted(const std::string& what);
   /// What safe_sampler() says of the device that draws. Bounds are afterwards those of its certificate.
   SafeSampler take_sampler(SamplerKind asked, bool unverified);
   /// As take_sampler() found it, else as the file has it; throws InputError where there is none.

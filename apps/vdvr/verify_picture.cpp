@@ -19,6 +19,7 @@
 #include "vdvr/render_crew.hpp"
 #include "vdvr/safe_sampler.hpp"
 #include "vdvr/stop.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -135,6 +136,7 @@ void certify_again(const Shown& shown, const CertifiedPicture& picture, const Vd
 Again made_again(const CommonOptions& common, const CertifiedPicture& picture, const VdvrFile& file,
                  const std::string& name, const Progress& progress) {
   Device device = open_device(common);
+  require_trusted(device, "verifying a picture");
   const Shown shown(device, file, picture.options, name);
   Again again;
   again.same_device = device.info().name == picture.device && device.info().driver == picture.driver;

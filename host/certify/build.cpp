@@ -23,6 +23,7 @@
 #include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"
 
@@ -322,6 +323,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
                            const BuildOptions& options, const std::optional<BuildShare>& share,
                            const Progress& progress) {
   opencl::State& state = device.state();
+  require_trusted(device, "certifying a volume");
   BuildResult result;
   Stopwatch watch(result.seconds);
   HostMemory host(state);

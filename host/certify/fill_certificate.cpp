@@ -10,6 +10,7 @@
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr {
 namespace {
@@ -42,7 +43,7 @@ Vec3 position_of(const Inputs& in, const MixedVolume& volume, const BrickMeasure
 
 }  // namespace
 
-Certificate fill_certificate(const Inputs& in, const Device& device, const ProjectionSet& scan,
+Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionSet& scan,
                              const FilteredScan& filtered, const BuildOptions& options,
                              const Measured& measured, const SamplerTerms& sampler, double epsilon_abs) {
   const Plan& plan = in.plan;
@@ -105,6 +106,7 @@ Certificate fill_certificate(const Inputs& in, const Device& device, const Proje
   if (in.crew) name_kinds(*in.crew, c);
   c.version = VDVR_VERSION;
   c.notes = plan.notes;
+  c.notes.push_back("the device was tested when it was opened, and passed: " + test_of(device).names());
   for (const std::string& note : scan.report.notes)
     if (std::find(c.notes.begin(), c.notes.end(), note) == c.notes.end()) c.notes.push_back(note);
   if (c.comparison)

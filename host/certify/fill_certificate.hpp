@@ -51,7 +51,7 @@ struct Measured {
   std::int64_t repaired = 0;  // bricks that closing raised
 };
 
-Certificate fill_certificate(const Inputs& in, const Device& device, const ProjectionSet& scan,
+Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionSet& scan,
                              const FilteredScan& filtered, const BuildOptions& options,
                              const Measured& measured, const SamplerTerms& sampler, double epsilon_abs);
 

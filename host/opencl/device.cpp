@@ -1,4 +1,4 @@
-// Enumerates and chooses OpenCL devices, and keeps the account of allocations.
+// Chooses and opens OpenCL devices, and keeps the account of allocations.
 #include "vdvr/device.hpp"
 
 #include <fmt/format.h>
@@ -9,9 +9,11 @@
 #include <cctype>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "host/opencl/device_end.hpp"
 #include "host/opencl/state.hpp"
+#include "host/opencl/trust.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -153,34 +155,20 @@ namespace {
 struct FoundDevice {
   cl::Device device;
   DeviceInfo info;
-  std::string trouble;  // a call that failed while it was described; empty where none did
+  std::string trouble;  // a call that failed; empty where none did
 };
-using Found = std::vector<FoundDevice>;
-
-// Which 3D images can be read with the linear filter. Opens a context, and so is asked of few.
-void ask_image_formats(const cl::Device& device, DeviceInfo& d) {
-  if (!d.images) return;
-  const cl::Context context(device);
-  std::vector<cl::ImageFormat> formats;
-  context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
-  const auto has = [&](cl_channel_type type) {
-    return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
-      return f.image_channel_order == CL_R && f.image_channel_data_type == type;
-    });
-  };
-  d.linear_float_image = has(CL_FLOAT);
-  d.linear_u16_image = has(CL_UNORM_INT16);
-  d.linear_u8_image = has(CL_UNORM_INT8);
-}
 
 std::string trimmed(std::string s) {
   while (!s.empty() && (s.back() == '\0' || std::isspace(static_cast<unsigned char>(s.back())))) s.pop_back();
   return s;
 }
 
+std::string trouble_of(const cl::Error& e) {
+  return fmt::format("{}: {}", e.what(), opencl::code_name(e.err()));
+}
+
 // What is known before a call fails stays.
-void describe(const cl::Platform& platform, const cl::Device& device, DeviceInfo& d) {
-  d.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
+void describe(const cl::Device& device, DeviceInfo& d) {
   d.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
   d.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
   d.version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
@@ -202,9 +190,20 @@ void describe(const cl::Platform& platform, const cl::Device& device, DeviceInfo
   }
 }
 
-// A platform or a device that fails a call ends nobody's work: it keeps its number, with its trouble.
-Found enumerate() {
-  Found found;
+std::vector<cl::Device> devices_of(const cl::Platform& platform) {
+  std::vector<cl::Device> devices;
+  try {
+    platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+  } catch (const cl::Error& e) {
+    if (e.err() != CL_DEVICE_NOT_FOUND) throw;
+  }
+  return devices;
+}
+
+// All devices of all platforms, in a stable order: places are `--device` numbers, so that whoever cannot be
+// used keeps one. A platform whose devices cannot be asked for has one place.
+std::vector<FoundDevice> find_devices() {
+  std::vector<FoundDevice> found;
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);
@@ -212,26 +211,53 @@ Found enumerate() {
     return found;  // the loader reports "no platform" as an error
   }
   for (const auto& platform : platforms) {
+    DeviceInfo info;
+    info.index = static_cast<int>(found.size());
     std::vector<cl::Device> devices;
     try {
-      platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
-    } catch (const cl::Error&) {
+      info.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
+      devices = devices_of(platform);
+    } catch (const cl::Error& e) {
+      info.name = "a platform without devices";
+      found.push_back({{}, info, trouble_of(e)});
       continue;
     }
     for (const auto& device : devices) {
-      FoundDevice one{device, {}, ""};
-      one.info.index = static_cast<int>(found.size());
+      FoundDevice one{device, info, ""};
+      DeviceInfo& d = one.info;
+      d.index = static_cast<int>(found.size());
       try {
         if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
-        describe(platform, device, one.info);
+        describe(device, d);
       } catch (const cl::Error& e) {
-        one.trouble = fmt::format("{}: {}", e.what(), opencl::code_name(e.err()));
-        if (one.info.name.empty()) one.info.name = "a device without a name";
+        one.trouble = trouble_of(e);
+        if (d.name.empty()) d.name = "a device without a name";
       }
       found.push_back(std::move(one));
     }
   }
   return found;
+}
+
+// Which 3D images can be read with the linear filter. Opens a context of its own.
+void ask_image_formats(FoundDevice& found) {
+  DeviceInfo& d = found.info;
+  if (!d.images || !found.trouble.empty()) return;
+  try {
+    const cl::Context context(found.device);
+    std::vector<cl::ImageFormat> formats;
+    context.getSupportedImageFormats(CL_MEM_READ_ONLY, CL_MEM_OBJECT_IMAGE3D, &formats);
+    const auto has = [&](cl_channel_type type) {
+      return std::any_of(formats.begin(), formats.end(), [&](const cl::ImageFormat& f) {
+        return f.image_channel_order == CL_R && f.image_channel_data_type == type;
+      });
+    };
+    d.linear_float_image = has(CL_FLOAT);
+    d.linear_u16_image = has(CL_UNORM_INT16);
+    d.linear_u8_image = has(CL_UNORM_INT8);
+  } catch (const cl::Error& e) {
+    found.trouble = trouble_of(e);
+  }
 }
 
 std::string lower(std::string s) {
@@ -252,55 +278,95 @@ bool matches(const DeviceInfo& d, const std::string& selector) {
 
 }  // namespace
 
+std::vector<ListedDevice> describe_devices() {
+  std::vector<ListedDevice> listed;
+  for (FoundDevice& found : find_devices()) {
+    ask_image_formats(found);
+    listed.push_back({found.info, found.trouble});
+  }
+  return listed;
+}
+
 std::vector<DeviceInfo> Device::list() {
   std::vector<DeviceInfo> infos;
-  for (FoundDevice& found : enumerate()) {
-    if (!found.trouble.empty()) continue;
-    try {
-      ask_image_formats(found.device, found.info);
-    } catch (const cl::Error&) {
-      continue;  // whoever opens it is told
-    }
-    infos.push_back(found.info);
-  }
+  for (const ListedDevice& listed : describe_devices())
+    if (listed.trouble.empty()) infos.push_back(listed.info);
   return infos;
 }
 
-Device::Device(const std::string& selector, std::uint64_t max_memory_bytes)
-    : state_(std::make_shared<opencl::State>()) {
-  Found found = enumerate();
-  if (found.empty())
-    throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
-  auto chosen = found.end();
-  if (selector.empty()) {
-    const auto is_well = [](const FoundDevice& f) { return f.trouble.empty(); };
-    chosen = std::find_if(found.begin(), found.end(),
-                          [&](const FoundDevice& f) { return is_well(f) && f.info.is_gpu; });
-    if (chosen == found.end()) chosen = std::find_if(found.begin(), found.end(), is_well);
-    if (chosen == found.end()) chosen = found.begin();
-  } else {
-    chosen = std::find_if(found.begin(), found.end(),
-                          [&](const FoundDevice& f) { return matches(f.info, selector); });
-  }
-  if (chosen == found.end()) {
-    std::string names;
-    for (const FoundDevice& f : found)
-      names += fmt::format("\n  {}: {} ({})", f.info.index, f.info.name, f.info.platform);
-    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
-  }
-  if (!chosen->trouble.empty())
-    throw DeviceError(fmt::format("device {}, '{}', cannot be used: {}; choose another `device`",
-                                  chosen->info.index, chosen->info.name, chosen->trouble));
+namespace {
+
+// Those that the selector means, the best first.
+std::vector<FoundDevice> chosen_from(const std::vector<FoundDevice>& all, const std::string& selector) {
+  std::vector<FoundDevice> chosen;
+  for (const FoundDevice& found : all)
+    if (selector.empty() || matches(found.info, selector)) chosen.push_back(found);
+  if (selector.empty())
+    std::stable_partition(chosen.begin(), chosen.end(), [](const FoundDevice& f) { return f.info.is_gpu; });
+  return chosen;
+}
+
+// Throws DeviceError, BuildError or ResourceError where the device cannot be used.
+std::shared_ptr<opencl::State> opened(FoundDevice found) {
+  auto state = std::make_shared<opencl::State>();
+  DeviceTest test;
   try {
-    ask_image_formats(chosen->device, chosen->info);
-    state_->device = chosen->device;
-    state_->info = chosen->info;
-    state_->context = cl::Context(state_->device);
-    state_->queue = cl::CommandQueue(state_->context, state_->device);
+    ask_image_formats(found);
+    if (!found.trouble.empty())
+      throw DeviceError(fmt::format("device {}, '{}', cannot be used: {}; choose another `device`",
+                                    found.info.index, found.info.name, found.trouble));
+    state->device = found.device;
+    state->info = found.info;
+    state->context = cl::Context(state->device);
+    state->queue = cl::CommandQueue(state->context, state->device);
+    test = opencl::test_device(*state);
   } catch (const cl::Error& e) {
     throw DeviceError(
-        fmt::format("cannot open '{}': {} {}", chosen->info.name, e.what(), opencl::code_name(e.err())));
+        fmt::format("cannot open '{}': {} {}", found.info.name, e.what(), opencl::code_name(e.err())));
   }
+  if (!test.passed() && !opencl::untrusted_are_opened())
+    throw DeviceError(fmt::format(
+        "'{}' (driver {}) does not compute as certificates assume: {}; choose another `device`, or "
+        "draw with `untrusted_device`",
+        found.info.name, found.info.driver, test.failures()));
+  if (!test.passed()) opencl::tell(fmt::format("'{}' is not trusted: {}", found.info.name, test.failures()));
+  opencl::keep_test(*state, std::move(test));
+  return state;
+}
+
+}  // namespace
+
+Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
+  const std::vector<FoundDevice> all = find_devices();
+  if (all.empty())
+    throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
+  const std::vector<FoundDevice> chosen = chosen_from(all, selector);
+  if (chosen.empty()) {
+    std::string names;
+    for (const FoundDevice& found : all)
+      names += fmt::format("\n  {}: {} ({})", found.info.index, found.info.name, found.info.platform);
+    throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
+  }
+  std::vector<std::string> passed_over;
+  for (const FoundDevice& found : chosen) {
+    try {
+      state_ = opened(found);
+      break;
+    } catch (const Error& e) {
+      const bool of_device =
+          e.kind() == ErrorKind::device || e.kind() == ErrorKind::build || e.kind() == ErrorKind::resource;
+      if (!of_device || chosen.size() == 1) throw;
+      passed_over.emplace_back(e.what());
+    }
+  }
+  if (!state_) {
+    std::string reasons;
+    for (const std::string& reason : passed_over) reasons += "\n  " + reason;
+    throw DeviceError(fmt::format("no device that `device` '{}' means can be used:{}", selector, reasons));
+  }
+  for (const std::string& reason : passed_over)
+    opencl::tell(fmt::format("{}; going on with '{}'", reason, state_->info.name));
+  // The test's own buffers are gone, and count for nothing.
   const std::uint64_t device_memory = state_->info.global_memory;
   state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));
 }

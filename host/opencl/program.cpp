@@ -65,8 +65,9 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
   if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
     return found->second;
 
-  cl::Program built(state.context, resolve_source(name + ".cl"));
+  cl::Program built;
   try {
+    built = cl::Program(state.context, resolve_source(name + ".cl"));
     built.build({state.device}, options.c_str());
   } catch (const cl::Error& e) {
     // LLVM's own handler removes the files of a compilation that a signal interrupts, which then fails.

@@ -14,6 +14,7 @@
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/region_of_interest.hpp"
 #include "vdvr/slice_frame.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr {
 namespace {
@@ -197,6 +198,7 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
 ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress) {
+  require_trusted(device, "measuring against F");
   const SliceFrame frame = frame_of(volume.grid, options, certificate.epsilon_abs);
   const SlicePlace place = place_of(frame, options);
   const PixelGrid pixels = pixel_grid(volume.grid, options, place);

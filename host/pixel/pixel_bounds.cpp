@@ -18,6 +18,7 @@
 #include "host/sampler/picture_parts.hpp"
 #include "shared/certify_params.h"
 #include "vdvr/certify_picture.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/stop.hpp"
 
@@ -374,6 +375,7 @@ PixelBounds certify_pixels(Device& device, const ResidentVolume& volume, const s
                            const RenderOptions& options, const CertifyPictureOptions& certify,
                            const Progress& progress) {
   const Impl& v = volume.impl();
+  require_trusted(device, "certifying a picture");
   check_options(options);
   const SamplerKind sampler = choose_sampler(device, volume, options.sampler).first;
   const Subject subject{drawn_field(volume), *v.facts, sampler,
@@ -392,6 +394,7 @@ PixelBounds certify_pixels(Device& device, const PagedVolume& volume, const std:
                            const RenderOptions& options, const CertifyPictureOptions& certify,
                            const Progress& progress) {
   const PagedVolume::Impl& v = volume.impl();
+  require_trusted(device, "certifying a picture");
   check_options(options);
   const SamplerKind sampler = choose_sampler(options.sampler).first;
   const Subject subject{

@@ -22,6 +22,7 @@
 #include "host/verify/verify_terms.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/reconstruct.hpp"
@@ -359,6 +360,7 @@ void add_differences(VerifyResult& r) {
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                     const Certificate& stored, const VerifyOptions& options, const Progress& progress) {
   opencl::State& state = device.state();
+  require_trusted(device, "verifying a certificate");
   ParallelGeometry used = scan.geometry;
   if (stored.field.center) used.center = *stored.field.center;
   check_scan(used);

@@ -4,7 +4,7 @@
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/device.hpp"
+#include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -70,10 +70,35 @@ std::string filter_text(const Json& p) {
                      p["constant_error"].get<double>());
 }
 
+/// What a device was asked when it was opened.
+void add_test(Json& entry, const DeviceTest& test) {
+  Json checks = Json::array();
+  for (const DeviceCheck& check : test.checks)
+    checks.push_back({{"name", check.name}, {"passed", check.found.empty()}, {"found", check.found}});
+  entry["test"] = {{"passed", test.passed()},
+                   {"remembered", test.remembered},
+                   {"seconds", test.seconds},
+                   {"checks", checks}};
+}
+
+void print_test(const Json& d) {
+  const Json& test = d["test"];
+  fmt::print("  test         {}{}\n",
+             test["passed"].get<bool>() ? "passed" : "failed: nothing is certified with it",
+             test["remembered"].get<bool>() ? ", remembered" : "");
+  for (const Json& check : test["checks"])
+    fmt::print("    {:<18} {}\n", check["name"].get<std::string>(),
+               check["passed"].get<bool>() ? "as it should be" : check["found"].get<std::string>());
+}
+
 void print_device(const Json& d) {
   const auto text = [&](const char* key) { return d[key].get<std::string>(); };
   const auto memory = [&](const char* key) { return bytes_text(d[key].get<std::uint64_t>()); };
   fmt::print("{}: {} ({}, {})\n", d["index"].get<int>(), text("name"), text("type"), text("platform"));
+  if (d.contains("trouble")) {
+    fmt::print("  cannot be used: {}\n", text("trouble"));
+    return;
+  }
   fmt::print("  version      {}, driver {}\n", text("version"), text("driver"));
   fmt::print("  compute      {} units, work-groups up to {}\n", d["compute_units"].get<int>(),
              d["max_work_group"].get<int>());
@@ -81,6 +106,7 @@ void print_device(const Json& d) {
              memory("max_allocation"), memory("local_memory"));
   fmt::print("  image3d      up to {}\n", d["image3d_max"].dump());
   fmt::print("  sampler      {}\n", text("sampler"));
+  if (d.contains("test")) print_test(d);
   if (!d.contains("probe")) return;
   const Json& p = d["probe"];
   fmt::print("  probe        {} chosen; buffer {:.4g} samples/s", p["chosen"].get<std::string>(),
@@ -91,24 +117,45 @@ void print_device(const Json& d) {
   for (const char* type : {"f32", "u16", "u8"}) fmt::print("  filter {:<6}{}\n", type, filter_text(p[type]));
 }
 
+void add_probe(Json& entry, Device& device) {
+  add_test(entry, test_of(device));
+  entry["probe"] = probe_json(probe_sampler(device));
+}
+
+/// What cannot be opened is shown with the reason, beside the others.
+Json listed_json(const ListedDevice& listed, bool probe, const CommonOptions& common) {
+  Json entry = device_json(listed.info);
+  std::string trouble = listed.trouble;
+  if (probe && trouble.empty()) {
+    try {
+      Device device(std::to_string(listed.info.index), common.max_memory);
+      add_probe(entry, device);
+    } catch (const Error& e) {
+      if (e.kind() != ErrorKind::device && e.kind() != ErrorKind::build) throw;
+      trouble = e.what();
+    }
+  }
+  if (!trouble.empty()) entry["trouble"] = trouble;
+  return entry;
+}
+
 }  // namespace
 
 int devices_command(Arguments& args) {
-  args.flag("probe", "measure the sampler's error and bandwidth (of --device, or of all)");
+  args.flag("probe",
+            "test the arithmetic, and measure the sampler's error and bandwidth (of --device, or of all)");
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  std::vector<DeviceInfo> infos = Device::list();
-  if (args.has("device")) infos = {open_device(common).info()};
-
+  open_untrusted_devices(true);  // it is here that one sees what failed
   Json list = Json::array();
-  for (const DeviceInfo& info : infos) {
-    Json entry = device_json(info);
-    if (args.has("probe")) {
-      Device device(std::to_string(info.index), common.max_memory);
-      entry["probe"] = probe_json(probe_sampler(device));
-    }
-    list.push_back(entry);
+  if (args.has("device")) {
+    Device device = open_device(common);
+    list.push_back(device_json(device.info()));
+    if (args.has("probe")) add_probe(list.back(), device);
+  } else {
+    for (const ListedDevice& listed : describe_devices())
+      list.push_back(listed_json(listed, args.has("probe"), common));
   }
   print_result(common, Json{{"devices", list}}, [&] {
     if (list.empty()) fmt::print("no OpenCL device; install one, for a CPU the package pocl-opencl-icd\n");

@@ -19,6 +19,7 @@
 #include "vdvr/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
 #include "vdvr/volume_file.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -37,6 +38,7 @@ int render_bound(const CommonOptions& common, const RenderOptions& o, const std:
   const bool image3d = o.sampler == SamplerKind::image3d;
   const auto on_device = [&] {
     Device device = open_device(common);
+    require_trusted(device, "bounding a slice");
     return certificate_on(device, scene.volume, *scene.certificate);
   };
   const Certificate certificate = image3d ? on_device() : *scene.certificate;
@@ -229,6 +231,7 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
 
 int render_command(Arguments& args) {
   add_render_options(args);
+  add_untrusted(args);
   add_common(args);
   if (args.asks("tf", "list")) {
     fmt::print("transfer functions by name, stretched over the volume's own values:\n{}", preset_table());
@@ -236,6 +239,7 @@ int render_command(Arguments& args) {
   }
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
+  untrusted_option(args);
   RenderOptions o = render_options(args);
   check_combination(args, o);
   const Overlay overlay = overlay_options(args, o.mode);
@@ -262,6 +266,7 @@ int render_command(Arguments& args) {
   const std::string method = method_option(args);
   ProgressLine progress(args.who(), common.quiet);
   Source source(args, common, method, args.has("unverified"), progress.callback());
+  if (asks_certify(args)) source.require_trusted("certifying a picture");
   const Scene& scene = source.scene();
   const Brightness bright = brightness_of(scene.volume);
   o.surfaces = surfaces_for(args, bright.threshold);
@@ -279,7 +284,7 @@ int render_command(Arguments& args) {
   const bool comparison = scene.certificate && scene.certificate->comparison;
   std::vector<std::string> notes = notes_on(args, o, source);
   // The base samples alone are another field than the one certified.
-  const bool certified = scene.verified && method == "vdvr" && !comparison;
+  const bool certified = scene.verified && method == "vdvr" && !comparison && source.trusted();
   o.skip_empty = !args.has("no-skip");
 
   if (asks_certify(args) && !certifies) {
@@ -310,10 +315,11 @@ int render_command(Arguments& args) {
   progress.clear();
 
   const std::string& sampler_reason = safe.reason.empty() ? result.sampler_reason : safe.reason;
-  const std::string stamp = method == "d2vr" ? "D2VR, straight from the projections: no certificate"
-                            : certified      ? "certified"
-                            : comparison     ? "for comparison: no certificate"
-                            : scene.verified ? "base samples alone: no certificate"
+  const std::string stamp = method == "d2vr"    ? "D2VR, straight from the projections: no certificate"
+                            : certified         ? "certified"
+                            : !source.trusted() ? "by a device that failed its test: no certificate"
+                            : comparison        ? "for comparison: no certificate"
+                            : scene.verified    ? "base samples alone: no certificate"
                             : scene.certificate
                                 ? "UNVERIFIED: the content was not compared with the certificate"
                                 : "no certificate";
@@ -342,7 +348,8 @@ int render_command(Arguments& args) {
       {"picture_tolerance", ray_certificate.beyond ? tolerance_json(*ray_certificate.beyond) : Json()},
       {"resident_bytes", source.bytes()},
       {"paging", paging_json(source.paging())},
-      {"device", source.device().info().name}};
+      {"device", source.device().info().name},
+      {"device_trusted", source.trusted()}};
   print_result(common, json, [&] {
     fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
                turntable ? fmt::format(", {} pictures", frames) : "", stamp);

@@ -12,6 +12,7 @@
 #include "vdvr/live_json.hpp"
 #include "vdvr/live_renderer.hpp"
 #include "vdvr/stop.hpp"
+#include "vdvr/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -37,8 +38,12 @@ ServerOptions server_options(const Arguments& args) {
 }
 
 /// What the certificate says, in words.
-Json certificate_words(const Scene& scene) {
+Json certificate_words(const Scene& scene, const DeviceTest& test) {
   Json lines = Json::array();
+  if (!test.passed())
+    lines.push_back(
+        "The device that draws failed its test: nothing below is said of these pictures. It errs in " +
+        test.failures() + ".");
   if (!scene.certificate || scene.certificate->comparison) {
     lines.push_back("This volume has no certificate: nothing says how far it lies from what was measured.");
     return lines;
@@ -67,11 +72,12 @@ Json certificate_words(const Scene& scene) {
   return lines;
 }
 
-std::string scene_json(const std::filesystem::path& path, const Scene& scene, const LiveScene& live) {
+std::string scene_json(const std::filesystem::path& path, const Scene& scene, const DeviceTest& test,
+                       const LiveScene& live) {
   Json json = Json::parse(to_json(live));
   json["file"] = path.filename().string();
   json["version"] = VDVR_VERSION;
-  json["words"] = certificate_words(scene);
+  json["words"] = certificate_words(scene, test);
   json["first"] = Json::parse(to_json(first_state(live, 512, 512)));
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -88,9 +94,11 @@ int serve_command(Arguments& args) {
               "several times")
       .flag("unverified", "show although content and certificate do not match");
   add_volume_input(args);
+  add_untrusted(args);
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
+  untrusted_option(args);
   ServerOptions options = server_options(args);
   const auto path = args.path("FILE");
 
@@ -98,7 +106,7 @@ int serve_command(Arguments& args) {
   const Scene scene = open_scene(path, args, "vdvr", args.has("unverified"));
   Device device = open_device(common);
   LiveRenderer renderer(device, scene.volume, scene.certificate);
-  options.scene = scene_json(path, scene, renderer.scene());
+  options.scene = scene_json(path, scene, test_of(device), renderer.scene());
   Server server(renderer, options);
   progress.clear();
   throw_if_stopped();

@@ -1,0 +1,24 @@
+// Small files that spare the next process some work, in $XDG_CACHE_HOME/vdvr or ~/.cache/vdvr. Whatever fails
+// is as if there were no cache: whoever reads one checks what it holds. Called by trust.cpp and
+// binary_cache.cpp of host/opencl.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace vdvr {
+
+/// Empty where there is none: no such variable, or VDVR_CACHE=off.
+std::filesystem::path cache_folder();
+
+/// `name`: below the folder, as "devices/0f3a".
+std::optional<std::string> read_cached(const std::string& name);
+/// Whole or not at all, whoever else writes it.
+void write_cached(const std::string& name, const std::string& bytes) noexcept;
+
+/// Removes the files of a folder of the cache that were longest unread, until they take at most `bytes`.
+void shrink_cache(const std::string& folder, std::uint64_t bytes) noexcept;
+
+}  // namespace vdvr
