@@ -5,7 +5,7 @@
 #include "device/lanes.h"
 
 // Maxima drop NaN: what is no number counts as infinite.
-inline VEC finite_or_infinite(VEC v) { return v <= (VEC)(FLT_MAX) ? v : (VEC)(INFINITY); }
+static inline VEC finite_or_infinite(VEC v) { return v <= (VEC)(FLT_MAX) ? v : (VEC)(INFINITY); }
 
 // Largest |d| over the columns of VDVR_LANES rows: sup[view][z].
 __kernel void row_sup(__global float* sup, __global const float* d, int views, int columns, int z_padded) {

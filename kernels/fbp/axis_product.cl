@@ -10,7 +10,8 @@
 #include "shared/axis_product.h"
 
 // The last columns, fewer than 16.
-inline float element(__global const float* s, __global const float* v, int terms, int columns, int s_term) {
+static inline float element(__global const float* s, __global const float* v, int terms, int columns,
+                            int s_term) {
   float total = 0.0f;
   for (int first = 0; first < terms; first += 32) {
     const int last = min(first + 32, terms);

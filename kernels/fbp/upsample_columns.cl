@@ -49,7 +49,7 @@
 #define OTHER_ROWS(u) WIDE(LOAD(rows + (size_t)(u)*16 + 8))
 
 // Two stages of radix 2 at once, decimation in frequency: frequencies come out in bit-reversed order.
-inline void forward(__global double* mine, __global const double2* root, int length, int from) {
+static inline void forward(__global double* mine, __global const double2* root, int length, int from) {
   for (int size = from, step = length / from; size >= 4; size /= 4, step *= 4) {
     const int quarter = size / 4;
     for (int first = 0; first < length; first += size)
@@ -70,7 +70,7 @@ inline void forward(__global double* mine, __global const double2* root, int len
 }
 
 // The last stage, where the length is no power of four; its own inverse but for a factor.
-inline void pairs(__global double* mine, int length) {
+static inline void pairs(__global double* mine, int length) {
   for (int i = 0; i < length; i += 2) {
     COMPLEX(a, i)
     COMPLEX(b, i + 1)
@@ -80,7 +80,7 @@ inline void pairs(__global double* mine, int length) {
 }
 
 // The inverse of `forward`, times the length.
-inline void inverse(__global double* mine, __global const double2* root, int length, int from) {
+static inline void inverse(__global double* mine, __global const double2* root, int length, int from) {
   for (int size = from, step = length / from; size <= length; size *= 4, step /= 4) {
     const int quarter = size / 4;
     for (int first = 0; first < length; first += size)
@@ -101,8 +101,8 @@ inline void inverse(__global double* mine, __global const double2* root, int len
 }
 
 // The first stage, on the rows followed by zeros: there are at most a third as many as the length.
-inline void spread(__global double* mine, __global const float* rows, __global const double2* root,
-                   int columns, int length) {
+static inline void spread(__global double* mine, __global const float* rows, __global const double2* root,
+                          int columns, int length) {
   const int quarter = length / 4;
   for (int j = 0; j < quarter; ++j) {
     const SUM a_re = j < columns ? ROWS(j) : (SUM)(0.0), a_im = j < columns ? OTHER_ROWS(j) : (SUM)(0.0);
@@ -118,8 +118,8 @@ inline void spread(__global double* mine, __global const float* rows, __global c
 
 // Detector columns and the values half-way between, mirrored at the detector's edges: element `margin` is
 // the edge, which is half-way.
-inline void take_half_columns(__global double* halves, __global const double* mine,
-                              __global const float* rows, VdvrFinerColumns shape) {
+static inline void take_half_columns(__global double* halves, __global const double* mine,
+                                     __global const float* rows, VdvrFinerColumns shape) {
   const int period = 4 * shape.columns;
   for (int e = 0; e < 2 * shape.columns + 1 + 2 * shape.margin; ++e) {
     int m = (e - shape.margin) % period;
@@ -155,8 +155,8 @@ inline void take_half_columns(__global double* halves, __global const double* mi
 #define PUT_PHASE(r) STORE_COLUMN(column + phase + r, re##r, im##r)
 
 // taps[phase][VDVR_TAPS]; phase 0 is a copy.
-inline void interpolate(__global float* target, __global const double* halves, __global const double* taps,
-                        VdvrFinerColumns shape) {
+static inline void interpolate(__global float* target, __global const double* halves,
+                               __global const double* taps, VdvrFinerColumns shape) {
   const int phases = shape.rate / 2, before = (shape.pad + phases - 1) / phases;
   for (int i = -before; shape.pad + i * phases < shape.count; ++i) {
     const int column = shape.pad + i * phases;

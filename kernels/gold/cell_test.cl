@@ -7,46 +7,16 @@
 // [block][brick z][brick y][brick x]. A brick's results are those of its own cells, in whatever block they
 // are computed. Called by host/gold/cell_test.cpp.
 #include "device/lanes.h"
-#include "device/largest.h"
 #include "shared/cell_test.h"
 #include "shared/gold_shape.h"
 #include "shared/mixed_sampler.h"
-
-#if VDVR_LANES == 1
-#define READ(p) (*(p))
-#define WRITE(v, p) (*(p) = (v))
-#define INT int
-#define INDEX 0
-#define LARGEST(v) (v)
-#elif VDVR_LANES == 4
-#define READ(p) vload4(0, p)
-#define WRITE(v, p) vstore4(v, 0, p)
-#define INT int4
-#define INDEX (int4)(0, 1, 2, 3)
-#define LARGEST(v) fmax(fmax((v).x, (v).y), fmax((v).z, (v).w))
-#elif VDVR_LANES == 8
-#define READ(p) vload8(0, p)
-#define WRITE(v, p) vstore8(v, 0, p)
-#define INT int8
-#define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
-#define LARGEST(v) largest_of_8(v)
-#else
-#define READ(p) vload16(0, p)
-#define WRITE(v, p) vstore16(v, 0, p)
-#define INT int16
-#define INDEX (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-#define LARGEST(v) largest_of_16(v)
-#endif
-
-// What goes through memory is a third of the time.
-#define ALWAYS_INLINE __attribute__((always_inline))
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
 
 // Positive floats order as their bits do. Most do not raise the maximum: a plain read spares them the atomic.
-inline void raise(volatile __global int* target, float v) {
+static inline void raise(volatile __global int* target, float v) {
   if (as_int(v) > *target) atomic_max(target, as_int(v));
 }
 
@@ -64,9 +34,10 @@ typedef struct {
 } Place;
 
 // False where there is no such brick, or nobody wants it.
-inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold,
-                       __global const float* margin, __global const uint* bricks, VdvrGrid grid,
-                       __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s) {
+static inline bool find_place(Place* p, int x, int y, int layer, __global const float* gold,
+                              __global const float* margin, __global const uint* bricks, VdvrGrid grid,
+                              __global const int4* first_brick, __global const uchar* selected,
+                              VdvrGoldShape s) {
   p->block = layer / s.bricks_z;
   p->x = x;
   p->y = y;
@@ -100,7 +71,7 @@ typedef struct {
   int per_interval;
   float interval;
 } Column;
-inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
+static inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate) {
   const int g = grid.granularity;
   const float cx = (float)(p->bx * g) + (float)ix / (float)rate,
               cy = (float)(p->by * g) + (float)iy / (float)rate;
@@ -111,7 +82,7 @@ inline Column column_of(const Place* p, int ix, int iy, VdvrGrid grid, int rate)
   c.interval = 1.0f / (float)c.per_interval;
   return c;
 }
-inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
+static inline float field_at(const Place* p, const Column* c, __global const uchar* samples, int k) {
   // The last node belongs to the interval below it.
   const int index = k < p->last_z ? k / c->per_interval : (p->last_z - 1) / c->per_interval;
   return vdvr_lerp(vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index),
@@ -122,8 +93,8 @@ inline float field_at(const Place* p, const Column* c, __global const uchar* sam
 #if VDVR_LANES > 1
 // V at VDVR_LANES + 1 nodes from `begin` on, interval by interval: two planes serve all nodes between them.
 // Beyond the last node anything finite. `out` has room for eight more.
-inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples,
-                                      int begin, float* out) {
+static inline ALWAYS_INLINE void field_along(const Place* p, const Column* c, __global const uchar* samples,
+                                             int begin, float* out) {
   const int end = min(begin + VDVR_LANES, p->last_z), per = c->per_interval;
   int index = min(begin, p->last_z - 1) / per;
   float low = vdvr_sample_in_plane(samples, p->brick, c->x, c->y, index);
@@ -158,7 +129,7 @@ typedef struct {
   float8 high_0, high_1, high_2;  // and begin + 1 .. 8
 } Planes;
 
-inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
+static inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 from_plane, int per) {
   const int8 second = from_plane >= per;
   const float8 t = convert_float8(from_plane - (second ? (int8)per : (int8)0)) * (1.0f / (float)per);
   const float8 none = (float8)(0.0f);
@@ -167,7 +138,7 @@ inline ALWAYS_INLINE void weights_of(float8* w0, float8* w1, float8* w2, int8 fr
   *w2 = second ? t : none;
 }
 
-inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, int begin) {
+static inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, int begin) {
   Planes f;
   f.per_x = (rate << grid.coarse_x) >> p->brick.level_x;
   f.per_y = (rate << grid.coarse_y) >> p->brick.level_y;
@@ -184,14 +155,14 @@ inline ALWAYS_INLINE Planes planes_of(const Place* p, VdvrGrid grid, int rate, i
   return f;
 }
 
-inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
+static inline ALWAYS_INLINE float stored(__global const uchar* samples, const VdvrBrick* b, size_t i) {
   if (VDVR_HOLDS(*b, VDVR_F32)) return ((__global const float*)samples)[i];
   const float code =
       VDVR_HOLDS(*b, VDVR_U16) ? (float)((__global const ushort*)samples)[i] : (float)samples[i];
   return code * b->scale + b->bias;
 }
-inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples, const VdvrBrick* b,
-                                      size_t i) {
+static inline ALWAYS_INLINE float4 planes_at(const Planes* f, __global const uchar* samples,
+                                             const VdvrBrick* b, size_t i) {
   return (float4)(stored(samples, b, i), stored(samples, b, i + f->to_1), stored(samples, b, i + f->to_2),
                   0.0f);
 }
@@ -216,7 +187,7 @@ typedef struct {
   FOR_PARTS(DECLARE)
 } Corners;
 #define LARGER(part) out.part = MORE(a.part, b.part);
-inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
+static inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
   Corners out;
   FOR_PARTS(LARGER)
   return out;
@@ -226,7 +197,7 @@ inline ALWAYS_INLINE Corners larger(Corners a, Corners b) {
 typedef struct {
   VEC low, high;
 } Ends;
-inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
+static inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
   Ends e;
   e.low = READ(c);
   e.high = READ(c + 1);
@@ -234,7 +205,8 @@ inline ALWAYS_INLINE Ends gold_at(__global const float* c) {
 }
 
 // Of both ends of edges along z from node z of a column on, between the columns before and after it in x.
-inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after, int to_y) {
+static inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends here, Ends after,
+                                            int to_y) {
   const VEC low2 = 2.0f * here.low, high2 = 2.0f * here.high;
   const VEC x0 = before.low + after.low - low2, x1 = before.high + after.high - high2,
             y0 = READ(c - to_y) + READ(c + to_y) - low2, y1 = READ(c + 1 - to_y) + READ(c + 1 + to_y) - high2,
@@ -253,8 +225,8 @@ inline ALWAYS_INLINE Corners ends_of(__global const float* c, Ends before, Ends 
   return out;
 }
 // V - gold there.
-inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends gold, INT low_tested,
-                                     INT high_tested) {
+static inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends gold, INT low_tested,
+                                            INT high_tested) {
   const VEC unlimited = (VEC)(INFINITY);
   VEC e0 = low_v - gold.low, e1 = high_v - gold.high;
   // NaN would drop out of a maximum.
@@ -265,7 +237,7 @@ inline ALWAYS_INLINE void add_errors(Corners* out, VEC low_v, VEC high_v, Ends g
 }
 
 // The part of a closed brick that a node lies on along one axis: 0 low border, 1 inside, 2 high border.
-inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
+static inline int part_of(int i, int last) { return i == 0 ? 0 : (i == last ? 2 : 1); }
 
 // One bit for each of a brick's 27 parts (corners, edges, faces, inside) that hold a corner of this cell at
 // which its test fails.
@@ -285,8 +257,19 @@ int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, 
   return parts;
 }
 
-// One work-item does VDVR_LANES heights of a brick. violated: the failing parts, where test.parts asks for
-// them.
+// Cells along x of a work-item. Few, so that what it keeps of the row before stays in registers, or all of a
+// brick: then no column is looked at twice.
+#ifndef VDVR_CELLS_X
+#define VDVR_CELLS_X VDVR_BRICK_NODES
+#endif
+#if VDVR_CELLS_X < VDVR_BRICK_NODES
+#define UNROLL_X _Pragma("unroll")
+#else
+#define UNROLL_X
+#endif
+
+// One work-item does VDVR_LANES heights of VDVR_CELLS_X cells along x of a brick. violated: the failing
+// parts, where test.parts asks for them.
 __kernel void cell_test(volatile __global int* total, volatile __global int* error,
                         volatile __global int* slack_max, volatile __global int* violated,
                         __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
@@ -295,11 +278,13 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                         __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
                         VdvrCellTest test) {
   const int begin = (int)get_global_id(0) * VDVR_LANES;
-  const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
+  const int runs_x = (VDVR_BRICK_NODES + VDVR_CELLS_X - 1) / VDVR_CELLS_X,
+            bricks_across = (int)get_global_id(1) / runs_x, by = bricks_across / s.bricks_x,
+            first_x = ((int)get_global_id(1) - bricks_across * runs_x) * VDVR_CELLS_X;
   Place p;
   if (!find_place(&p, bricks_across - by * s.bricks_x, by, (int)get_global_id(2), gold, margin, bricks, grid,
                   first_brick, selected, s) ||
-      begin >= p.last_z)
+      begin >= p.last_z || first_x >= p.last_x)
     return;
   const float tolerance = tolerances[p.slot];
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
@@ -309,7 +294,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
             end_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last) & inside;
   VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
   int parts = 0;
-  Corners before[VDVR_BRICK_NODES];
+  Corners before[VDVR_CELLS_X];
 #if VDVR_LANES == 8
   const bool by_planes = (s.rate << grid.coarse_z) >> p.brick.level_z >= 4;
   Planes f;
@@ -317,7 +302,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
 #endif
   for (int iy = 0; iy <= p.last_y; ++iy) {
     Corners left;
-    __global const float* c = p.gold + (size_t)iy * p.row * s.gold_stride + begin;
+    __global const float* c = p.gold + ((size_t)iy * p.row + first_x) * s.gold_stride + begin;
     Ends gold_before = gold_at(c - to_x), gold = gold_at(c);
 #if VDVR_LANES == 8
     // Samples below and above this row, at the near and the far end of an interval of columns.
@@ -335,7 +320,10 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + 1);
     }
 #endif
-    for (int ix = 0; ix <= p.last_x; ++ix) {
+    UNROLL_X
+    for (int cell_x = 0; cell_x <= VDVR_CELLS_X; ++cell_x) {
+      const int ix = first_x + cell_x;
+      if (ix > p.last_x) break;
       const size_t column = (size_t)iy * p.row + ix;
       const int tested = p.margin[column] >= s.lowest;
       const Ends gold_after = gold_at(c + to_x);
@@ -374,10 +362,10 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       c += to_x;
       gold_before = gold;
       gold = gold_after;
-      if (ix > 0) {
+      if (cell_x > 0) {
         const Corners face = larger(left, here);
         if (iy > 0) {
-          const Corners all = larger(before[ix - 1], face);
+          const Corners all = larger(before[cell_x - 1], face);
           VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * test.curvature + rest,
               above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * test.curvature + rest;
           // Whatever is no number here is no bound.
@@ -406,7 +394,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           }
           largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));
         }
-        before[ix - 1] = face;
+        before[cell_x - 1] = face;
       }
       left = here;
     }
