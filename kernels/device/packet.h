@@ -2,9 +2,6 @@
 // lanes themselves (GPUs), 8 or 16 those whose work-items are threads (CPUs). Every lane does the same
 // operations in the same order, whatever the others do, so that the number of lanes never changes a bit.
 // Included by raycast.cl and d2vr.cl.
-//
-// A mask is what comparisons give: 0 or 1 in scalars, 0 or -1 in vectors. Combine masks by & and |, ask them
-// by ANY, ALL, NOT and PICK.
 #ifndef VDVR_PACKET_H
 #define VDVR_PACKET_H
 
@@ -12,6 +9,7 @@
 #ifndef VDVR_LANES
 #define VDVR_LANES 1
 #endif
+#include "device/masks.h"
 
 // LANE(v, n): component n of a vector. EACH(F): the statements F(n) of every lane. GATHER(T, p, i): elements
 // i of the array p. COLUMNS, ROWS: where the lanes' pixels lie in the packet's PACKET_X x PACKET_Y.
@@ -24,12 +22,8 @@
 #define PACKET_Y 1
 #define COLUMNS 0
 #define ROWS 0
-#define ANY(m) (m)
-#define NOT(m) (!(m))
 #else
 #define LANE(v, n) (v).s##n
-#define ANY(m) any_lane(m)
-#define NOT(m) (~(m))
 // No number is negative, and such a one needs no sign in an address.
 #define AT(p, i) (p)[(uint)(i)]
 #if VDVR_LANES == 4
@@ -84,24 +78,6 @@ typedef PACKET(uchar) U8;
 #define PACKET_HINT __attribute__((vec_type_hint(V)))
 #endif
 
-// Without a branch per lane, which the any() of some compilers has.
-#if VDVR_LANES > 1
-RAY_INLINE int any_lane4(int4 m) {
-  const ulong2 halves = as_ulong2(m);
-  return (halves.x | halves.y) != 0;
-}
-#if VDVR_LANES == 4
-#define any_lane(m) any_lane4(m)
-#elif VDVR_LANES == 8
-#define any_lane(m) any_lane8(m)
-RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
-#else
-#define any_lane(m) any_lane16(m)
-RAY_INLINE int any_lane8(int8 m) { return any_lane4(m.lo | m.hi); }
-RAY_INLINE int any_lane16(int16 m) { return any_lane8(m.lo | m.hi); }
-#endif
-#endif
-
 #if VDVR_LANES == 1
 typedef ulong Offset;
 #define TO_OFFSET(i) ((ulong)(i))
@@ -112,8 +88,6 @@ typedef I Offset;
 #define TO_ULONG(i) ((ulong)(uint)(i))  // of one lane; no offset is negative
 #endif
 
-// m ? a : b, lane by lane.
-#define PICK(m, a, b) select((b), (a), (m))
 // Without the NaN rules of fmin, fmax and clamp, which cost branches; no operand is NaN.
 #define LEAST(a, b) ((a) < (b) ? (a) : (b))
 #define MOST(a, b) ((a) > (b) ? (a) : (b))

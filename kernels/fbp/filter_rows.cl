@@ -15,13 +15,6 @@
 #error "VDVR_STEP must be 1 (any kernel) or 2 (even taps are zero but the centre)"
 #endif
 
-// A scalar's truth is 1, a vector's -1, and any() reads sign bits.
-#if VDVR_LANES == 1
-#define ANY_BROKEN(v) (!isfinite(v))
-#else
-#define ANY_BROKEN(v) (!all(isfinite(v)))
-#endif
-
 // Eight columns share each vector of `in`. Named sums, not arrays: compilers keep these in registers.
 #define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
 #define ZERO(r) SUM total##r = (SUM)(0.0f);
@@ -44,7 +37,7 @@
   if (i + VDVR_STEP * r < columns) {                                             \
     const int u = i + VDVR_STEP * r;                                             \
     const VEC value = NARROW(weight * total##r);                                 \
-    if (ANY_BROKEN(value)) broken[k] = 1;                                        \
+    if (!ALL(isfinite(value))) broken[k] = 1;                                    \
     PUT_AT(value, u)                                                             \
     if (first_column < 0) PUT_AT(value, -1 - u)                                  \
     if (first_column + out_columns > columns) PUT_AT(value, 2 * columns - 1 - u) \

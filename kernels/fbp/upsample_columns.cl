@@ -105,10 +105,10 @@ static inline void spread(__global double* mine, __global const float* rows, __g
                           int columns, int length) {
   const int quarter = length / 4;
   for (int j = 0; j < quarter; ++j) {
-    const SUM a_re = j < columns ? ROWS(j) : (SUM)(0.0), a_im = j < columns ? OTHER_ROWS(j) : (SUM)(0.0);
+    const SUM a_re = j < columns ? ROWS(j) : (SUM)(0.0f), a_im = j < columns ? OTHER_ROWS(j) : (SUM)(0.0f);
     const bool has_b = j + quarter < columns;
-    const SUM b_re = has_b ? ROWS(j + quarter) : (SUM)(0.0),
-              b_im = has_b ? OTHER_ROWS(j + quarter) : (SUM)(0.0);
+    const SUM b_re = has_b ? ROWS(j + quarter) : (SUM)(0.0f),
+              b_im = has_b ? OTHER_ROWS(j + quarter) : (SUM)(0.0f);
     KEEP(j, a_re + b_re, a_im + b_im)
     TURN(j + quarter, a_re - b_re, a_im - b_im, root[2 * j])
     TURN(j + 2 * quarter, a_re + b_im, a_im - b_re, root[j])
@@ -140,7 +140,7 @@ static inline void take_half_columns(__global double* halves, __global const dou
 }
 
 #define FOR_PHASES(M) M(0) M(1) M(2)
-#define CLEAR(r) SUM re##r = (SUM)(0.0), im##r = (SUM)(0.0);
+#define CLEAR(r) SUM re##r = (SUM)(0.0f), im##r = (SUM)(0.0f);
 #define ADD(r)                                              \
   {                                                         \
     const SUM w = (SUM)(taps[(phase + r) * VDVR_TAPS + t]); \

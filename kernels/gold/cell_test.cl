@@ -382,7 +382,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           const VEC both = select(-unlimited, MORE(all.ep + below, all.em + above), counts);
           largest_total = MORE(largest_total, both);
           largest_error = MORE(largest_error, select(-unlimited, MORE(all.ep, all.em), counts));
-          if (test.parts && any(both > tolerance)) {
+          if (test.parts && ANY(both > tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
             WRITE(below, belows);

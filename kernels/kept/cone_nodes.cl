@@ -91,18 +91,18 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
 #if VDVR_UPRIGHT
       const REAL inverse = (REAL)1 / l_plane, u = u_plane * inverse + v->part_u, whole_u = floor(u);
       const int column = (int)v->whole_u + (int)whole_u - 2;
-      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - (REAL)0.5));
+      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
       const SUM v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
 #else
       const SUM inverse = (REAL)1 / (v->step_lambda[2] * dz + l_plane),
                 u8 = (v->step_u[2] * dz + u_plane) * inverse + v->part_u, whole_u = floor(u8),
                 v8 = (v->step_v[2] * dz + v_plane) * inverse + v->part_v;
       const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
-      const VEC g_u = NARROW(u8 - whole_u - (REAL)0.5);
+      const VEC g_u = NARROW(u8 - whole_u - 0.5f);
 #endif
       const SUM whole_v = floor(v8);
       const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
-      const VEC g_v = NARROW(v8 - whole_v - (REAL)0.5);
+      const VEC g_v = NARROW(v8 - whole_v - 0.5f);
 #if VDVR_UPRIGHT
       FOR_LANES(UPRIGHT_PART)
 #else

@@ -124,8 +124,7 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
   } else {
     const OpenBrick around = open_brick(bricks, grid, brick_at(grid, c));
     const Sampled there = sample_open(field, &around, grid, c);
-    gradient =
-        gradient_at(field, bricks, grid, &around, &there, c, cells_per_length, (I)(VDVR_LANES > 1 ? -1 : 1));
+    gradient = gradient_at(field, bricks, grid, &around, &there, c, cells_per_length, NOT((I)(0)));
 #if VDVR_UNIFORM
     value = there.value;
 #else

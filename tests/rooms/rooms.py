@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom.
+"""Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom. And of kernels what no
+compiler on a CPU holds: masks are asked by device/masks.h alone, and no constant is in double precision.
 
   rooms.py ROOT               one line per fault; exit 1 if there is any
   rooms.py ROOT --self-test   plants one fault of each kind in a copy and checks that it is found
@@ -23,6 +24,10 @@ SEVERAL_SOURCES = {
     "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
     "host/opencl/device_end.hpp": ["device.cpp"],
 }
+# any() and all() are never true of one lane; devices without double precision warn of its constants.
+MASK_HEADER = "masks.h"
+BARE_QUESTION = re.compile(r"\b(any|all)\s*\(")
+DOUBLE_CONSTANT = re.compile(r"(?<![\w.])(?:(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+|0x[\da-fA-F.]+p[+-]?\d+)(?![\w.])")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
 
@@ -133,6 +138,11 @@ def faults_of_kernels(root):
                 yield f"{name}: includes {included}"
             elif room == "shared" and not included.startswith("shared/"):
                 yield f"{name}: the host would have to compile {included}"
+        text = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.S)
+        if path.name != MASK_HEADER and (found := BARE_QUESTION.search(text)):
+            yield f"{name}: asks a mask by {found[1]}(), which is never true of one lane"
+        if found := DOUBLE_CONSTANT.search(text):
+            yield f"{name}: {found[0]} is in double precision"
 
 
 def plant(root, path, text):
@@ -155,6 +165,8 @@ FAULTS = [
     ("kernels/fbp/lonely.cl", "\n", "nobody builds the program"),
     ("kernels/loose.cl", "\n", "lies in no room"),
     ("kernels/shared/untested.h", '#include "device/lanes.h"\n', "the host would have to compile"),
+    ("kernels/gold/cell_test.cl", "int f(int4 m) { return any(m); }\n", "never true of one lane"),
+    ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
 ]
 
 

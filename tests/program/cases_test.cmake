@@ -1,0 +1,10 @@
+# One case of tests/program/cases, by its run.py. Skipped where numpy, h5py and tifffile cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
+find_python_with(case_${CASE}_test 240 h5py numpy tifffile)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/cases/run.py" "${CASE}" "${VDVR}" "${WORK}/${CASE}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "the case ${CASE} failed with ${code}")
+endif()
