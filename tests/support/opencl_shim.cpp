@@ -16,6 +16,8 @@
 //   VDVR_SHIM_FILTER_CUT=1        these are cut, not rounded, to so many bits
 //   VDVR_SHIM_FILTER_U8=1         of 8-bit images each lerp is rounded to 8 bits too
 //   VDVR_SHIM_BUILD_OPTIONS=TEXT  more options for every program
+// What is built:
+//   VDVR_SHIM_PROGRAMS=DIR        every program, as NAME.cl and its options as NAME.opt (scripts/offline-gpu)
 // Limits and faults:
 //   VDVR_SHIM_MAX_ALLOC, VDVR_SHIM_GLOBAL_MEM   bytes
 //   VDVR_SHIM_IMAGE3D=N                         largest extent of a 3D image
@@ -29,6 +31,8 @@
 #include <cctype>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <functional>
 #include <string>
 
 #include "tests/support/next_function.hpp"
@@ -203,6 +207,23 @@ std::string as_the_device_compiles(std::string source) {
   return source;
 }
 
+// --- what is built ---
+
+void write_down(cl_program program, const char* options) {
+  const char* folder = std::getenv("VDVR_SHIM_PROGRAMS");
+  size_t size = 0;
+  if (folder == nullptr || clGetProgramInfo(program, CL_PROGRAM_SOURCE, 0, nullptr, &size) != CL_SUCCESS ||
+      size <= 1)
+    return;
+  std::string source(size, '\0');
+  if (clGetProgramInfo(program, CL_PROGRAM_SOURCE, size, source.data(), nullptr) != CL_SUCCESS) return;
+  source.pop_back();
+  const std::string all = options == nullptr ? "" : options;
+  const std::string name = std::string(folder) + "/" + std::to_string(std::hash<std::string>{}(source + all));
+  std::ofstream(name + ".cl") << source;
+  std::ofstream(name + ".opt") << all;
+}
+
 // --- what is refused ---
 
 bool refused(size_t bytes) {
@@ -314,6 +335,7 @@ cl_int clBuildProgram(cl_program program, cl_uint count, const cl_device_id* dev
   if (std::getenv("VDVR_SHIM_BREAK_BUILD") != nullptr) all += " -Dget_global_id=no_such_function";
   if (lacks("VDVR_SHIM_DENORMALS")) all += " -cl-denorms-are-zero";
   if (const char* more = std::getenv("VDVR_SHIM_BUILD_OPTIONS")) all += std::string(" ") + more;
+  write_down(program, all.c_str());
   return real(program, count, devices, all.c_str(), done, user);
 }
 
