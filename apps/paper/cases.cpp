@@ -89,6 +89,7 @@ RenderOptions timing_view(const Grid& grid) {
 
 Speed measure_speed(const std::function<RenderResult(const RenderOptions&)>& draw, RenderOptions options,
                     const Grid& grid, int frames, const Progress& progress) {
+  if (frames < 1) return {};
   draw(options);  // builds kernels and lets the sampler be chosen
   std::vector<double> seconds, samples;
   for (int f = 0; f < frames; ++f) {

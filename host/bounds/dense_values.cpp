@@ -1,7 +1,6 @@
 // Launches `turn` of kernels/bounds/projection_bounds.cl between two passes of upsample_columns.cpp.
 #include "host/bounds/dense_values.hpp"
 
-#include "host/bounds/projection_bounds.hpp"
 #include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 
@@ -42,18 +41,20 @@ const opencl::DeviceArray<float>& DenseValues::operator()(std::int64_t first, st
   return values_;
 }
 
-double DenseValues::rounding(double samples, double sup) {
-  const ParallelGeometry& g = scan_.geometry;
-  const double gain_v = lebesgue_constant(g.rows);
-  const double columns = column_error(upsampler_, g.columns, columns_, samples, sup), largest = sup + columns;
-  return gain_v * columns + transform_error(g.rows, rows_.rate, largest, gain_v * largest) +
-         static_cast<double>(g.views()) * gain_v * product_underflow(g, upsampler_.gain_u());
-}
-
 void DenseValues::resize(opencl::DeviceArray<float>& array, std::uint64_t size, const char* what) {
   if (array.size() == size) return;
   array = {};  // before the next one is allocated
   array = opencl::DeviceArray<float>(state_, size, what);
+}
+
+double dense_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+                      const UpsampledColumns& rows, double samples, double sup, Fp64 fp64) {
+  const ParallelGeometry& g = scan.geometry;
+  const double gain_v = lebesgue_constant(g.rows);
+  const double of_columns = column_error(upsampler, g.columns, columns, samples, sup, fp64),
+               largest = sup + of_columns;
+  return gain_v * of_columns + transform_error(g.rows, rows.rate, largest, gain_v * largest) +
+         static_cast<double>(g.views()) * gain_v * product_underflow(g, upsampler.gain_u());
 }
 
 }  // namespace vdvr

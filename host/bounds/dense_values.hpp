@@ -3,6 +3,7 @@
 // cone_tiles.cpp.
 #pragma once
 
+#include "host/bounds/projection_bounds.hpp"
 #include "host/fbp/filter_projections.hpp"
 
 namespace vdvr {
@@ -25,10 +26,6 @@ class DenseValues {
   [[nodiscard]] const UpsampledColumns& columns() const { return columns_; }
   [[nodiscard]] const UpsampledColumns& rows() const { return rows_; }
 
-  /// What the values err, of views whose samples sum up to `samples` and whose sups, on the detector's rows,
-  /// to `sup`: columns by a part of their own, which the series along v makes grow, and rows by theirs.
-  [[nodiscard]] double rounding(double samples, double sup);
-
  private:
   [[nodiscard]] std::int64_t chunks() const { return (columns_.count + 15) / 16; }
   void resize(opencl::DeviceArray<float>& array, std::uint64_t size, const char* what);
@@ -41,5 +38,10 @@ class DenseValues {
   std::vector<double> own_rows_;
   opencl::DeviceArray<float> turned_, values_;
 };
+
+/// What such values err, of views whose samples sum up to `samples` and whose sups, on the detector's rows,
+/// to `sup`: columns by a part of their own, which the series along v makes grow, and rows by theirs.
+double dense_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
+                      const UpsampledColumns& rows, double samples, double sup, Fp64 fp64 = Fp64::as_here);
 
 }  // namespace vdvr

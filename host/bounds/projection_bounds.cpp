@@ -128,8 +128,10 @@ double transform_error(std::int64_t n, int rate, double largest, double sup) {
 }
 
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
-                    double largest, double sup) {
-  if (!upsampler.transforms(columns))
+                    double largest, double sup, Fp64 fp64) {
+  const bool transforms =
+      fp64 == Fp64::as_here ? upsampler.transforms(columns) : fp64 == Fp64::present && columns.rate % 2 == 0;
+  if (!transforms)
     return unit_roundoff * (product_error(detector_columns, upsampler.run()) + 2) * upsampler.gain_u() *
            largest;
   return transform_error(detector_columns, columns.rate, largest, sup);
@@ -209,7 +211,8 @@ class ValuesByView {
   }
   /// Of views whose samples sum up to `samples`.
   [[nodiscard]] double rounding(double samples, double views) {
-    return dense_ ? grid_.rise * dense_->rounding(samples, upsampler_.gain_u() * samples)
+    return dense_ ? grid_.rise * dense_rounding(upsampler_, scan_, dense_->columns(), dense_->rows(), samples,
+                                                upsampler_.gain_u() * samples)
                   : derivative_rounding(upsampler_, scan_, grid_.columns, 0, samples, views);
   }
 
@@ -433,7 +436,7 @@ double interpolation_error(const ParallelGeometry& g, const FieldSups& sups, int
 
 ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                          const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                         Interpolation interpolation) {
+                         Interpolation interpolation, Fp64 fp64) {
   const ParallelGeometry& g = scan.geometry;
   const double gain_u = upsampler.gain_u();
   double samples = 0;
@@ -444,7 +447,7 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   const double largest = std::min(gain_u * samples, sups.value);
   ChainErrors out;
   out.ramp = filter_error_bound(upsampler, scan);
-  out.columns = w.gain * column_error(upsampler, g.columns, columns, samples, sups.value);
+  out.columns = w.gain * column_error(upsampler, g.columns, columns, samples, sups.value, fp64);
   // Six taps: a view's by themselves, in compensated runs of such sums, and their own roundings known; else a
   // rounding for each run, and eight for weights.
   const double terms = interpolation == Interpolation::six_taps ? compensated_runs(views / run, w.taps + run)
@@ -460,7 +463,7 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
 
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                        Interpolation interpolation) {
+                        Interpolation interpolation, Fp64 fp64) {
   const ParallelGeometry& g = scan.geometry;
   const double gain_u = upsampler.gain_u(), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
@@ -470,7 +473,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).
   const double upsampling = unit_roundoff * (product_error(g.rows, row_run) + 2) * gain_v * gain_u * samples +
-                            column_error(upsampler, g.columns, columns, sups.value, sups.value);
+                            column_error(upsampler, g.columns, columns, sups.value, sups.value, fp64);
   // One rounding per multiply-add of a run from the view that a term enters at, one per run, and the weights'
   // own.
   const double runs =

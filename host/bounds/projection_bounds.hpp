@@ -49,10 +49,14 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan);
 
 constexpr double unit_roundoff = 0x1p-24;
 
+/// Whose rounding a bound is of: this device's, or that of another by ColumnMethod::accurate, which has
+/// double precision or lacks it.
+enum class Fp64 { as_here, present, absent };
+
 /// How much an upsampled column may err, weights not included, where the rows of its view are at most
 /// `largest` at the detector's columns and its own is at most `sup` between them.
 double column_error(Upsampler& upsampler, std::int64_t detector_columns, const UpsampledColumns& columns,
-                    double largest, double sup);
+                    double largest, double sup, Fp64 fp64 = Fp64::as_here);
 
 /// What n samples of at most `largest`, of a signal of at most `sup`, err once transforms have made them
 /// `rate` times finer (upsample_columns.hpp).
@@ -77,12 +81,12 @@ struct ChainErrors {
 };
 ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                          const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                         Interpolation interpolation);
+                         Interpolation interpolation, Fp64 fp64 = Fp64::as_here);
 
 /// fp32 rounding of the whole chain from filter to back-projection, largest over the samples of such blocks.
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
-                        Interpolation interpolation);
+                        Interpolation interpolation, Fp64 fp64 = Fp64::as_here);
 
 /// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, e the proved worst error of a
 /// wave (error_map.hpp), for interpolation in u at each rate and for gold at each rate. Cost: views * rows *

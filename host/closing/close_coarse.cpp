@@ -65,9 +65,7 @@ class Closer {
   void fill_edge(std::size_t a) {
     Few<int, 8> levels;
     for (const std::int64_t i : entity_.incident())
-      if (stored_.level[at(i)][2 - a] <= own_.level[a]) levels.push_back(stored_.level[at(i)][2 - a]);
-    std::sort(levels.begin(), levels.end());
-    levels.cut_from(std::unique(levels.begin(), levels.end()));
+      if (stored_.level[at(i)][2 - a] <= own_.level[a]) levels.insert_ascending(stored_.level[at(i)][2 - a]);
     for (std::size_t n = 1; n < levels.size(); ++n) {
       const std::int64_t coarse = std::int64_t{1} << (own_.level[a] - levels[n - 1]);
       Index3 step{1, 1, 1};

@@ -52,7 +52,14 @@ class Few {
   [[nodiscard]] const T* end() const { return items_.data() + size_; }
   [[nodiscard]] T* begin() { return items_.data(); }
   [[nodiscard]] T* end() { return items_.data() + size_; }
-  void cut_from(const T* first) { size_ = static_cast<std::size_t>(first - items_.data()); }
+  /// Keeps an ascending list so, each item once.
+  void insert_ascending(const T& item) {
+    T* place = std::lower_bound(begin(), end(), item);
+    if (place != end() && *place == item) return;
+    std::move_backward(place, end(), end() + 1);
+    *place = item;
+    ++size_;
+  }
 
  private:
   std::array<T, most> items_{};

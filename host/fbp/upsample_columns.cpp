@@ -141,6 +141,8 @@ void ColumnUpsampling::operator()(const opencl::DeviceArray<float>& out, const V
   const std::uint64_t tasks = count(views * chunks) * 8 / lanes;
   std::uint64_t slots = std::min(tasks, std::uint64_t{state_.info.compute_units} * (lanes == 1 ? 128 : 4));
   slots = opencl::round_up(std::clamp<std::uint64_t>(most_scratch / (8 * slot), 1, slots), width);
+  // A slot more or less changes no value, and a GPU may allow little in one piece.
+  while (slots > width && 8 * slots * slot > state_.info.max_allocation) slots -= width;
   if (scratch_.size() < slots * slot) {
     scratch_ = {};  // before the next one is allocated
     scratch_ = opencl::DeviceArray<double>(state_, slots * slot, "rows between columns");

@@ -52,11 +52,12 @@ GoldStream::GoldStream(opencl::State& state, const FilteredScan& scan, const Fie
   lattice_ = source_->kept.lattice(settings.grid, settings.rate);
   errors_ = source_->kept.errors(lattice_);
   if (settings.finer_rate > settings.rate) {
-    finer_.emplace();
-    finer_->lattice = source_->kept.lattice(settings.grid, settings.finer_rate);
-    finer_->errors = source_->kept.errors(finer_->lattice);
-    finer_->of_curvature =
+    Finer finer;
+    finer.lattice = source_->kept.lattice(settings.grid, settings.finer_rate);
+    finer.errors = source_->kept.errors(finer.lattice);
+    finer.of_curvature =
         std::pow(static_cast<float>(settings.rate) / static_cast<float>(settings.finer_rate), 2.0f);
+    finer_ = std::move(finer);
   }
   // Second differences look one node beyond a block, fits further.
   if (settings.midrange)

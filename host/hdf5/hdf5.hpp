@@ -6,6 +6,8 @@
 // The HDF5 library is not thread-safe: one thread at a time.
 #pragma once
 
+// The functions and structures that HDF5 1.10 has; later releases keep them under this name.
+#define H5_USE_110_API
 #include <hdf5.h>
 
 #include <bit>

@@ -169,6 +169,7 @@ void LinkedFiles::walk(Place& place, const std::string& path) const {
     if (info.type == H5L_TYPE_HARD) {
       place.object = Handle(H5Oopen(place.object.id(), step.c_str(), H5P_DEFAULT), H5Oclose);
       place.path = here;
+      if (!place.object) place.problem = fmt::format("{}: cannot be opened (HDF5: {})", shown, reason());
       continue;
     }
     const std::string value = value_of(place.object.id(), step, info.u.val_size);

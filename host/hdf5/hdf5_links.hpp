@@ -35,7 +35,7 @@ struct Place {
   FilePointer file;                                                    ///< that holds the object
   std::string path;                                                    ///< within it
   std::vector<std::pair<std::string, std::filesystem::path>> through;  ///< name and path of each file passed
-  std::string problem;                                                 ///< of a link out of a file
+  std::string problem;  ///< of a link out of a file, or of an object that is there and does not open
 };
 
 /// Name in the hash, path: every file of a scan whose content was used.

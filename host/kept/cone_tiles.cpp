@@ -272,26 +272,29 @@ double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
   return static_cast<double>(together + (views + together - 1) / together);
 }
 
-ConeTiles::Errors ConeTiles::errors(std::int64_t together) {
+ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
   const ParallelGeometry& g = scan_.geometry;
   const SixTaps& six = six_tap_facts();
   const double square = six.norm * six.norm, views = static_cast<double>(g.views());
   Errors out;
   // I_u I_v - 1 = (I_u - 1) + I_u (I_v - 1).
   out.interpolation = six.sup * (1 + six.norm) * sup_;
+  const bool here = fp64 == Fp64::as_here, in_double = here ? in_double_ : fp64 == Fp64::present,
+             dense = here ? dense_.has_value() : in_double && g.rows >= fewest_rows;
   double entries = 0;
-  if (dense_) entries = dense_->rounding(sup_, sup_);
+  if (dense) entries = dense_rounding(upsampler_, scan_, columns_, rows_, sup_, sup_, fp64);
   else {
     const double gain = upsampler_.gain_u(), largest = lebesgue_constant(g.rows) * sup_;
     entries = unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * largest +
-              column_error(upsampler_, g.columns, columns_, largest, gain * largest);
+              column_error(upsampler_, g.columns, columns_, largest, gain * largest, fp64);
   }
   // Places: numerator, lambda, quotient and sum; relative to what they move the values by, pi / 8 a column.
-  const double unit = in_double_ ? 0x1p-53 : unit_roundoff;
+  // Blocks are this device's: in double precision they do not matter, and those of single are smaller.
+  const double unit = in_double ? 0x1p-53 : unit_roundoff;
   const double position = 2 * unit * (16 * block_reach_ + 4) * pi / density * sup_;
   // Six products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
   // lambda^-2, which a float place makes err more.
-  const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double_ ? 3 : 24);
+  const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
   out.rounding = square * entries + position + 2 * six.norm * six.rounding * sup_ +
                  1.01 * unit_roundoff * roundings * square * sup_ +
                  views * largest_weight_ * (2 * product_underflow(g, upsampler_.gain_u()) + 16 * 0x1p-126);

@@ -65,8 +65,8 @@ class ConeTiles {
     double interpolation = 0, rounding = 0;
   };
   [[nodiscard]] Errors errors() { return errors(views_together_); }
-  /// The same where memory had allowed so many views at once, from 1 to most_views.
-  [[nodiscard]] Errors errors(std::int64_t together);
+  /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device.
+  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here);
   static constexpr std::int64_t most_views = 16;
   /// Roundings of a sum over views, of which so many are added up before they are added to the others.
   [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);

@@ -84,7 +84,7 @@ void KeptGold::keep_heights(double reach) {
     set_spacing();
   }
   const ConeLattice& lattice = cone_->lattice();
-  run_.emplace();
+  run_ = Run{};
   run_->low = lattice.low;
   run_->count = 8 * lattice.groups;
   run_->stride = lattice.stride;

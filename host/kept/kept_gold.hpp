@@ -70,9 +70,9 @@ class KeptGold {
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
   /// What fourth differences of gold on that lattice err, xx, yy, zz, xy, xz, yz: of F^, rounding included.
   [[nodiscard]] std::array<double, 6> fourth_errors(const GoldLattice& lattice);
-  /// The least and the most that `rounding` of these would be, whatever memory allows: of cone beam it
-  /// depends on how many views lie on the device together.
-  [[nodiscard]] std::pair<double, double> rounding_by_memory(const GoldLattice& lattice);
+  /// The least and the most that `rounding` of these would be: on this device whatever memory allows, which
+  /// of cone beam says how many views lie there together; else on any, with double precision or without.
+  [[nodiscard]] std::pair<double, double> rounding_elsewhere(const GoldLattice& lattice, bool this_device);
 
   /// How all that can be kept would lie in memory that other devices of this machine have too; none where
   /// this device does not compute in the host's memory, where it would take most of what is left, or where
@@ -180,6 +180,7 @@ class KeptGold {
   };
   ConeParts cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
   GoldErrors cone_errors(const GoldLattice& lattice);
+  GoldErrors parallel_errors(const GoldLattice& lattice, Fp64 fp64);
   void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);
   opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
   /// Where the scan lies there and the device computes in the host's memory; else none.

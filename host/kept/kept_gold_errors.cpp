@@ -83,24 +83,32 @@ std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   return out;
 }
 
-std::pair<double, double> KeptGold::rounding_by_memory(const GoldLattice& lattice) {
+std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattice, bool this_device) {
   const double own = errors(lattice).rounding;
-  if (!cone_) return {own, own};
-  const std::int64_t views = scan_.geometry.views();
-  const double nodes = filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
-                       filter_of(lattice.phases[2], 2).norm,
-               now = cone_->errors().rounding;
   std::pair<double, double> out{own, own};
-  for (std::int64_t together = 1; together <= std::min(views, ConeTiles::most_views); ++together) {
-    const double other = own + nodes * (cone_->errors(together).rounding - now);
-    out.first = std::min(out.first, other);
-    out.second = std::max(out.second, other);
+  const auto take = [&](double other) { out = {std::min(out.first, other), std::max(out.second, other)}; };
+  const std::vector<Fp64> devices =
+      this_device ? std::vector{Fp64::as_here} : std::vector{Fp64::present, Fp64::absent};
+  for (const Fp64 fp64 : devices) {
+    if (!cone_) {
+      take(parallel_errors(lattice, fp64).rounding);
+      continue;
+    }
+    const double nodes = filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
+                         filter_of(lattice.phases[2], 2).norm,
+                 now = cone_->errors().rounding;
+    for (std::int64_t together = 1; together <= std::min(scan_.geometry.views(), ConeTiles::most_views);
+         ++together)
+      take(own + nodes * (cone_->errors(together, fp64).rounding - now));
   }
   return out;
 }
 
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {
-  if (cone_) return cone_errors(lattice);
+  return cone_ ? cone_errors(lattice) : parallel_errors(lattice, Fp64::as_here);
+}
+
+GoldErrors KeptGold::parallel_errors(const GoldLattice& lattice, Fp64 fp64) {
   const ParallelGeometry& g = scan_.geometry;
   const GoldFilter &x = filter_of(lattice.phases[0], 0), &y = filter_of(lattice.phases[1], 1),
                    &z = filter_of(few_rows() ? 1 : lattice.phases[2], 2);
@@ -112,7 +120,8 @@ GoldErrors KeptGold::errors(const GoldLattice& lattice) {
   const double nodes = x.norm * y.norm;
   const double curved = (bend(x) * y.norm + x.norm * bend(y) + nodes * bend_z) / 8;
 
-  const ChainErrors chain = chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_);
+  const ChainErrors chain =
+      chain_errors(upsampler_, scan_, sups_, columns_, blocks_of({}), interpolation_, fp64);
   const double gain_v = cosine_gain(g.rows);
   const double filters = ((1 + x.sup) * (1 + y.sup) * (1 + z.sup) - 1) * S;
   GoldErrors out;

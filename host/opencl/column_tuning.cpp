@@ -28,6 +28,8 @@ const ColumnTuning recorded[] = {
 
 }  // namespace
 
-ColumnTuning column_tuning(const DeviceInfo& device) { return recorded[device.is_gpu ? 1 : 0]; }
+bool carries_lanes(const DeviceInfo& device) { return device.is_cpu && device.platform != "rusticl"; }
+
+ColumnTuning column_tuning(const DeviceInfo& device) { return recorded[carries_lanes(device) ? 0 : 1]; }
 
 }  // namespace vdvr

@@ -25,4 +25,9 @@ struct ColumnTuning {
 
 ColumnTuning column_tuning(const DeviceInfo& device);
 
+/// Whether a work-item of many lanes becomes vector instructions: of processors, by PoCL's and Intel's
+/// compilers. Others get a lane a work-item. Mesa's rusticl is one: it joins work-items itself, states a
+/// vector width of 1, and does not finish the kernels of 16 lanes.
+bool carries_lanes(const DeviceInfo& device);
+
 }  // namespace vdvr

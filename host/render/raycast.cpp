@@ -10,6 +10,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "host/opencl/column_tuning.hpp"
 #include "host/render/check_render_options.hpp"
 #include "host/render/raycast_params.hpp"
 #include "vdvr/error.hpp"
@@ -61,7 +62,7 @@ int lanes_for(const opencl::State& state, std::uint64_t highest_place, std::uint
   const bool lit = gradient == GradientKind::stored;  // then LitLayout::is_addressable() holds
   if (sampler == SamplerKind::image3d || (!lit && highest_place > most) || record_words > most) return 1;
   // Lit samples come in wide loads, of which twice as many keep the shuffles busy.
-  return tuning.lanes.value_or(!state.info.is_cpu ? 1 : gradient == GradientKind::stored ? 16 : 8);
+  return tuning.lanes.value_or(!carries_lanes(state.info) ? 1 : gradient == GradientKind::stored ? 16 : 8);
 }
 int lanes_for(const Impl& v, SamplerKind sampler, GradientKind gradient, const RaycastTuning& tuning) {
   return lanes_for(*v.state, v.field.highest_place, v.field.bricks.size(), sampler, gradient, tuning);

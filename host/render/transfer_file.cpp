@@ -35,7 +35,7 @@ const json& member(const json& object, const char* key) {
   return object[key];
 }
 
-const json& list_of(const json& object, const char* key, const std::string& of_what) {
+const json& list_of(const json& object, const char* key, const char* of_what) {
   const bool there = object.is_object() && object.contains(key) && object[key].is_array();
   if (!there || object[key].empty()) throw FileError(fmt::format("'{}' must be a list of {}", key, of_what));
   if (object[key].size() > 6 * kMostPoints)

@@ -56,43 +56,51 @@ struct Filtered {
 /// Rounding as build bounds it, of blocks of samples with this spacing, so many along their sides; `base` is
 /// the grid that sets how far columns reach.
 double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double side, int upsampling,
-                     Interpolation interpolation) {
+                     Interpolation interpolation, Fp64 fp64) {
   const auto n = static_cast<std::int64_t>(side);
   const ColumnBlocks blocks{n, n, spacing[0], spacing[1], {}, {}};
   return arithmetic_bound(f.upsampler, f.scan, f.sups, columns_for(f.scan.geometry, base, upsampling), blocks,
-                          interpolation);
+                          interpolation, fp64);
 }
 
-/// The field at the grid's samples as build makes it, and what it errs.
+/// The field at the grid's samples as build makes it, and what it errs, here and where the file was built.
 struct BaseAgain {
   Volume base;
-  double rounding = 0, projection = 0;
+  double rounding = 0, rounding_of_build = 0, projection = 0;
 };
 
 // Of parallel beam a reconstruction with six taps at 8x, of cone beam gold at the samples.
-BaseAgain base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, const Progress& progress) {
+BaseAgain base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, bool same_device,
+                     const Progress& progress) {
   if (f.is_cone()) {
-    const GoldErrors errors = kept.errors(kept.lattice(v.grid, 1));
+    const GoldLattice lattice = kept.lattice(v.grid, 1);
+    const GoldErrors errors = kept.errors(lattice);
     return {base_of_gold(f.state, kept, Coverage(f.scan.geometry, f.scan.views), v.grid,
                          kept_margin(v.grid, 1), progress),
-            errors.rounding + errors.ramp, errors.interpolation};
+            errors.rounding + errors.ramp, kept.rounding_elsewhere(lattice, same_device).second + errors.ramp,
+            errors.interpolation};
   }
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2);
-  return {reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress),
-          arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps),
+  const auto rounding = [&](Fp64 fp64) {
+    return arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps, fp64);
+  };
+  const double here = rounding(Fp64::as_here);
+  return {reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress), here,
+          same_device ? here : std::max(rounding(Fp64::present), rounding(Fp64::absent)),
           six_tap_facts().sup * f.sups.value};
 }
 
 // One made again has the same interpolation error but for rounding, and the extremes of two fields differ by
 // no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
-                   const Certificate& c, KeptGold& kept, const Progress& progress) {
-  const BaseAgain again = base_again(f, v, kept, progress);
+                   const Certificate& c, KeptGold& kept, bool same_device, const Progress& progress) {
+  const BaseAgain again = base_again(f, v, kept, same_device, progress);
   const CoveredRange range = covered_range(again.base, Coverage(f.scan.geometry, f.scan.views));
   const double found = range.high - range.low;
-  if (!(std::abs(c.reference_range - found) <= 4 * again.rounding))
+  const double apart = 2 * (again.rounding + again.rounding_of_build);
+  if (!(std::abs(c.reference_range - found) <= apart))
     out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
-                              f.world(found), f.world(4 * again.rounding)));
+                              f.world(found), f.world(apart)));
   // F itself at the two extremes, by other means: the range cannot be smaller.
   const std::array points{to_world(v.grid.position(range.low_at), f.units),
                           to_world(v.grid.position(range.high_at), f.units)};
@@ -119,7 +127,7 @@ class Totals {
       if (!gold) continue;
       const GoldLattice lattice = kept().lattice(v.grid, gold->settings().rate);
       const double ramp = kept().errors(lattice).ramp;
-      const auto [least, most] = kept().rounding_by_memory(lattice);
+      const auto [least, most] = kept().rounding_elsewhere(lattice, same_device);
       least_arithmetic_ = std::max(least_arithmetic_, least + ramp);
       most_arithmetic_ = std::max(most_arithmetic_, most + ramp);
     }
@@ -149,7 +157,7 @@ class Totals {
     run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
       if (m.total >= 0) {
         error_ = std::max(error_, static_cast<double>(m.error));
-        most_ = std::max(most_, static_cast<double>(m.error) + 2 * arithmetic());
+        most_ = std::max(most_, static_cast<double>(m.error) + arithmetic() + arithmetic_of_build());
       }
       if (!agrees(m)) low.push_back(m);
     });
@@ -183,6 +191,10 @@ class Totals {
   }
 
   [[nodiscard]] double arithmetic() const { return gold_.arithmetic(); }
+  // Of a device without double precision it is several times as large, and its certificate says so.
+  [[nodiscard]] double arithmetic_of_build() const {
+    return same_device_ ? arithmetic() : std::max(arithmetic(), stored_.budget.arithmetic.value);
+  }
 
   // A node takes T and P from the cells around it in its block, and blocks are cut to the bricks asked for:
   // of a brick alone the total is the least that build can have found, by one rate of gold or the other.
@@ -221,9 +233,9 @@ class Totals {
   // by 1.5 A. One device computes a brick in two boxes alike, but for how products along z are cut into runs:
   // far below 2^-15 of the largest sample (see build's classify).
   [[nodiscard]] double tolerance(const BrickMeasure& m) const {
-    const double gold = 5 * arithmetic();
-    // Build may have had other memory: a total has its rounding in nodes and in differences, 5.25 times at
-    // most.
+    const double gold = 2.5 * (arithmetic() + arithmetic_of_build());
+    // Build may have had other memory, or double precision that this device lacks: a total has its rounding
+    // in nodes and in differences, 5.25 times at most.
     return (same_device_ ? std::min(gold, 0x1p-15 * largest_) : gold) +
            5.25 * (arithmetic() - least_arithmetic_) +
            table_rounding * static_cast<double>(std::max(m.total, 0.0f));
@@ -255,7 +267,7 @@ class Totals {
 
   void compare_largest(Differences& out, bool exhaustive) const {
     const double value = stored_.measured_max;
-    if (!(value >= error_ - 2 * arithmetic()) || (exhaustive && !(value <= most_)))
+    if (!(value >= error_ - arithmetic() - arithmetic_of_build()) || (exhaustive && !(value <= most_)))
       out.push_back(fmt::format("measured_max is {}, not {}{}", f_.world(value),
                                 exhaustive ? "" : "at least ", f_.world(error_)));
   }
@@ -266,7 +278,7 @@ class Totals {
   DeviceField field_;
   GoldRates gold_;
   bool same_device_;
-  // What the arithmetic term is, whatever memory allows.
+  // What the arithmetic term is, whatever memory allows, and of another device whatever its precision.
   double least_arithmetic_ = 0, most_arithmetic_ = 0;
   double largest_ = 0;  // sample of the base
   double error_ = 0;    // largest seen on the gold that certifies
@@ -280,7 +292,7 @@ void compare_in_units(Differences& out, Device& device, const ProjectionSet& sca
   Filtered f(device.state(), scan, units, stored.field, stored.rates.interpolation, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
   Totals totals(f, volume, stored, same_device);
-  compare_range(out, f, exact, volume, stored, totals.kept(), progress);
+  compare_range(out, f, exact, volume, stored, totals.kept(), same_device, progress);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
     out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
   totals.compare(out, selected, exhaustive, progress);

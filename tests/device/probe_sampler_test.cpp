@@ -1,6 +1,9 @@
 #define BOOST_TEST_MODULE probe_sampler
 #include <boost/test/unit_test.hpp>
 
+#include <cmath>
+#include <cstdlib>
+
 #include "vdvr/raycast.hpp"
 
 using namespace vdvr;
@@ -24,6 +27,18 @@ BOOST_AUTO_TEST_CASE(charged_delta_is_never_below_what_was_measured) {
       BOOST_TEST(p.image3d_rate > 0);
       BOOST_TEST(p.chosen == (p.image3d_rate > p.buffer_rate ? "image3d" : "buffer"));
     }
+  }
+}
+
+// A unit that is known, because tests/support/opencl_shim.cpp is it.
+BOOST_AUTO_TEST_CASE(weights_of_so_many_bits_are_charged_for_all_that_they_may_err) {
+  const char *bits = std::getenv("VDVR_SHIM_FILTER_BITS"), *cut = std::getenv("VDVR_SHIM_FILTER_CUT");
+  if (bits == nullptr) return;
+  Device device;
+  const SamplerProbe p = probe_filters(device);
+  for (const SampleType type : {SampleType::f32, SampleType::u16, SampleType::u8}) {
+    BOOST_TEST(p.of(type).image3d);
+    BOOST_TEST(p.of(type).delta >= std::ldexp(cut != nullptr ? 1 : 0.5, -std::atoi(bits)));
   }
 }
 

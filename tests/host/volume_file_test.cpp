@@ -381,9 +381,19 @@ BOOST_AUTO_TEST_CASE(hdf5_datasets_that_are_no_volume_are_refused) {
   // Numbers longer than any machine's, for which HDF5 would copy far beyond a short chunk.
   const hid_t wide = H5Tcopy(H5T_STD_U8LE);
   H5Tset_size(wide, 24);
+  H5Tset_precision(wide, 192);
   write_hdf5(path, wide, {4, 4, 4});
   H5Tclose(wide);
   refused("/volume", "24 bytes long");
+
+  // There, but of a type of version 15, which no HDF5 has.
+  write_hdf5(path, H5T_STD_U8LE, {4, 4, 4});
+  bytes = support::bytes_of(path);
+  const auto type = bytes.find(std::string("\x10\0\0\0\x01\0\0\0\0\0\x08\0", 12));
+  BOOST_REQUIRE(type != std::string::npos);
+  bytes[type] = '\xf0';
+  static_cast<void>(folder.file("v.h5", bytes));
+  refused("/volume", "cannot be opened (HDF5: ");
 }
 
 BOOST_AUTO_TEST_CASE(tiff_slices_are_stacked_along_z_in_natural_order) {

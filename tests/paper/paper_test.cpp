@@ -64,7 +64,7 @@ void check_measure(const json& now, const json& then, double arithmetic, const s
 }
 
 /// The case of these settings and tolerance in Table 2.
-const json& case_of(const json& numbers, const std::string& settings, double epsilon) {
+const json& case_of(const json& numbers, const char* settings, double epsilon) {
   for (const auto& c : numbers.at("table_2_marschner_lobb"))
     if (c.at("settings") == settings && c.at("epsilon") == epsilon) return c;
   BOOST_FAIL("no case " << settings << " at " << epsilon);

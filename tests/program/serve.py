@@ -247,6 +247,11 @@ class Stranger:
         name = self.random.choice(["Range: bytes=", "Cookie: ", "Accept-Encoding: ", "Connection: ", "Host: "])
         s.sendall(self.head("GET", self.path(), name + "0-1," * self.random.randrange(100, 4000)))
 
+    def send_head_without_end(self, s):
+        s.sendall(b"GET " + self.path().encode() + b" HTTP/1.1\r\n")
+        for i in range(2000):  # 16 MB, of which 16 KiB are read
+            s.sendall(f"X-{i}: {'y' * 8000}\r\n".encode())
+
     def send_without_end(self, s):
         s.sendall(b"GET " + self.path().encode() + b" HTTP/1.1\r\nHost: x")
 
@@ -327,6 +332,30 @@ def half_open(served, n):
     return sockets
 
 
+def check_drips(served, truth):
+    """Heads that come byte by byte hold nobody up, and end: no limit on the time between bytes sees them."""
+    sockets, cut, stop = half_open(served, 24), set(), threading.Event()
+
+    def drip():
+        while not stop.wait(0.2):
+            for s in sockets:
+                try:
+                    s.sendall(b"a")
+                except OSError:
+                    cut.add(s)
+
+    dripping = threading.Thread(target=drip)
+    dripping.start()
+    took = check_alive(served, truth, "beside heads that come byte by byte")
+    check(took < 5, f"beside heads that come byte by byte a frame took {took:.1f} s")
+    time.sleep(6)  # a request has 5 s
+    stop.set()
+    dripping.join()
+    for s in sockets:
+        s.close()
+    check(len(cut) == len(sockets), f"{len(sockets) - len(cut)} of {len(sockets)} endless heads are still read")
+
+
 def test_hostile(vdvr, folder):
     volume = make_volume(vdvr, folder)
     with Served(vdvr, volume) as served:
@@ -356,6 +385,7 @@ def test_hostile(vdvr, folder):
         check(took < 5, f"beside half-open connections a frame took {took:.1f} s")
         for s in sockets:
             s.close()
+        check_drips(served, truth)
         for _ in range(100):
             if served.open_files() <= files:
                 break

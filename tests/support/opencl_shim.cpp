@@ -179,12 +179,14 @@ float4 __attribute__((overloadable)) shim_read(__read_only image3d_t image, floa
   float along_x[4];
   for (int i = 0; i < 4; ++i) {
     const int4 low = first + (int4)(0, i & 1, i >> 1, 0);
-    along_x[i] = shim_lerp(shim_read(image, low).x, shim_read(image, low + (int4)(1, 0, 0, 0)).x, t.x, rounds);
+    const float before = shim_read(image, low).x, after = shim_read(image, low + (int4)(1, 0, 0, 0)).x;
+    along_x[i] = shim_lerp(before, after, t.x, rounds);
   }
   const float near = shim_lerp(along_x[0], along_x[1], t.y, rounds),
               far = shim_lerp(along_x[2], along_x[3], t.y, rounds);
   return (float4)(shim_lerp(near, far, t.z, rounds), 0.0f, 0.0f, 1.0f);
 }
+#undef read_imagef
 #define read_imagef(image, sampler, at) shim_read(image, at)
 #endif
 )";

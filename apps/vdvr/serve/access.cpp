@@ -145,14 +145,6 @@ std::optional<RequestHead> parse_head(std::string_view text) {
   return head;
 }
 
-std::string plain_head(const RequestHead& h) {
-  std::string text = fmt::format("{} {} HTTP/1.1\r\nHost: {}\r\n", h.method, h.target, h.host);
-  if (h.method == "POST")
-    text += fmt::format("Content-Type: application/json\r\nContent-Length: {}\r\n", h.content_length);
-  if (h.close) text += "Connection: close\r\n";
-  return text + "\r\n";
-}
-
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
@@ -192,7 +184,7 @@ int refusal_of(const RequestHead& head, const Access& access) {
   if (head.method != "POST") return 0;
   // Only such a type makes a browser ask before it sends what another page wants to be sent.
   if (lower(head.content_type) != "application/json") return 415;
-  return head.content_length > 65536 ? 413 : 0;
+  return head.content_length > kMostBody ? 413 : 0;
 }
 
 Target target_of(std::string_view text) {

@@ -17,13 +17,11 @@ struct RequestHead {
   bool close = false;  ///< the connection ends with the answer
 };
 
-inline constexpr std::size_t kMostHead = 16384, kMostTarget = 200;
+inline constexpr std::size_t kMostHead = 16384, kMostTarget = 200, kMostBody = 65536;
 
 /// `text`: from the request line to the empty line, both included. Nothing where it is no HTTP/1 request, a
 /// header is malformed, one that must be single comes twice, or the body has no plain length.
 std::optional<RequestHead> parse_head(std::string_view text);
-/// The same head as text with what RequestHead holds alone: what the HTTP library gets to see.
-std::string plain_head(const RequestHead& head);
 
 struct Access {
   std::string token;

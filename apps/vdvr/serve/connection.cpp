@@ -18,6 +18,43 @@ constexpr auto kIdle = 15s, kRequest = 5s, kAnswer = 20s;
 // How soon a thread sees that the server ends.
 constexpr int kSliceMs = 100;
 
+constexpr const char* kSafeHeaders =
+    "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: "
+    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"
+    "X-Content-Type-Options: nosniff\r\n"
+    "X-Frame-Options: DENY\r\n"
+    "Referrer-Policy: no-referrer\r\n"  // the address is the key
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Cross-Origin-Opener-Policy: same-origin\r\n"
+    "Cache-Control: no-store\r\n";
+
+const char* name_of(int status) {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 403:
+      return "Forbidden";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 409:
+      return "Conflict";
+    case 413:
+      return "Content Too Large";
+    case 415:
+      return "Unsupported Media Type";
+    case 429:
+      return "Too Many Requests";
+    case 500:
+      return "Internal Server Error";
+    case 503:
+      return "Service Unavailable";
+    default:
+      return "Bad Request";
+  }
+}
+
 }  // namespace
 
 // --- the open ones ---
@@ -37,16 +74,23 @@ void Connections::mark_known(Place place) {
   place->known = true;
 }
 
-void Connections::turn_one_away() {
+void Connections::make_way(std::ptrdiff_t wanted) {
   const std::scoped_lock lock(mutex_);
-  const auto stranger =
-      std::find_if(entries_.begin(), entries_.end(), [](const Entry& e) { return !e.known && !e.leaving; });
-  if (stranger == entries_.end()) return;
-  stranger->leaving = true;
-  ::shutdown(stranger->socket, SHUT_RDWR);
+  wanted -= std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.leaving; });
+  for (Entry& e : entries_) {
+    if (wanted <= 0) return;
+    if (e.known || e.leaving) continue;
+    e.leaving = true;
+    ::shutdown(e.socket, SHUT_RDWR);
+    --wanted;
+  }
 }
 
 // --- one ---
+
+Answer refusal(int status, const std::string& why) {
+  return {status, "text/plain; charset=utf-8", (why.empty() ? name_of(status) : why) + "\n"};
+}
 
 bool Connection::wait(short events, Clock::time_point deadline) const {
   while (!ending_) {
@@ -60,96 +104,60 @@ bool Connection::wait(short events, Clock::time_point deadline) const {
   return false;
 }
 
-ssize_t Connection::fetch(char* to, std::size_t size, Clock::time_point deadline) {
+bool Connection::fetch(Clock::time_point deadline) {
+  std::array<char, 4096> chunk{};
   while (wait(POLLIN, deadline)) {
-    const ssize_t got = ::recv(socket_, to, size, MSG_DONTWAIT);
-    if (got >= 0) return got;
-    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return -1;
+    const ssize_t got = ::recv(socket_, chunk.data(), chunk.size(), MSG_DONTWAIT);
+    if (got > 0) pending_.append(chunk.data(), static_cast<std::size_t>(got));
+    if (got >= 0) return got > 0;
+    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return false;
   }
-  return -1;
+  return false;
 }
 
-Connection::Head Connection::receive(RequestHead& head) {
-  std::array<char, 4096> chunk{};
+Connection::Received Connection::receive(RequestHead& head) {
   deadline_ = Clock::now() + (pending_.empty() ? kIdle : kRequest);
   std::size_t end;
   while ((end = pending_.find("\r\n\r\n")) == std::string::npos) {
-    if (pending_.size() > kMostHead) return Head::bad;
+    if (pending_.size() > kMostHead) return Received::nonsense;
     const bool first = pending_.empty();
-    const ssize_t got = fetch(chunk.data(), chunk.size(), deadline_);
-    if (got <= 0) return Head::closed;
-    pending_.append(chunk.data(), static_cast<std::size_t>(got));
+    if (!fetch(deadline_)) return Received::nothing;
     if (first) deadline_ = Clock::now() + kRequest;
   }
   const auto parsed = parse_head(std::string_view(pending_).substr(0, end + 4));
   pending_.erase(0, end + 4);
-  if (!parsed) return Head::bad;
+  if (!parsed) return Received::nonsense;
   head = *parsed;
-  head_ = plain_head(head);
-  head_read_ = 0;
-  body_left_ = head.content_length;
-  return Head::good;
+  return Received::request;
 }
 
-void Connection::refuse(int status) {
-  static const std::array<std::pair<int, const char*>, 7> names{{{403, "Forbidden"},
-                                                                 {404, "Not Found"},
-                                                                 {405, "Method Not Allowed"},
-                                                                 {413, "Content Too Large"},
-                                                                 {415, "Unsupported Media Type"},
-                                                                 {429, "Too Many Requests"},
-                                                                 {503, "Service Unavailable"}}};
-  const char* name = "Bad Request";
-  for (const auto& [number, text] : names)
-    if (number == status) name = text;
-  const std::string answer = fmt::format(
-      "HTTP/1.1 {} {}\r\nContent-Type: text/plain\r\nX-Content-Type-Options: nosniff\r\n"
-      "Cache-Control: no-store\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{}\n",
-      status, name, std::char_traits<char>::length(name) + 1, name);
-  write(answer.data(), answer.size());
+std::optional<std::string> Connection::receive_body(const RequestHead& head) {
+  while (pending_.size() < head.content_length)
+    if (!fetch(deadline_)) return std::nullopt;
+  const auto size = static_cast<std::size_t>(head.content_length);
+  std::string body = pending_.substr(0, size);
+  pending_.erase(0, size);
+  return body;
 }
 
-ssize_t Connection::read(char* to, std::size_t size) {
-  if (head_read_ < head_.size()) {
-    const std::size_t n = std::min(size, head_.size() - head_read_);
-    std::copy_n(head_.data() + head_read_, n, to);
-    head_read_ += n;
-    return static_cast<ssize_t>(n);
-  }
-  size = static_cast<std::size_t>(std::min<std::uint64_t>(size, body_left_));
-  if (size == 0) return 0;
-  if (!pending_.empty()) {
-    size = std::min(size, pending_.size());
-    std::copy_n(pending_.data(), size, to);
-    pending_.erase(0, size);
-    body_left_ -= size;
-    return static_cast<ssize_t>(size);
-  }
-  const ssize_t got = fetch(to, size, deadline_);
-  if (got > 0) body_left_ -= static_cast<std::uint64_t>(got);
-  return got;
+bool Connection::send(const Answer& answer, bool with_body, bool close) {
+  std::string text = fmt::format("HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\n{}{}\r\n",
+                                 answer.status, name_of(answer.status), answer.type, answer.body.size(),
+                                 kSafeHeaders, close ? "Connection: close\r\n" : "");
+  if (with_body) text += answer.body;
+  return write(text);
 }
 
-ssize_t Connection::write(const char* from, std::size_t size) {
+bool Connection::write(const std::string& text) {
   const auto deadline = Clock::now() + kAnswer;
   std::size_t sent = 0;
-  while (sent < size) {
-    if (!wait(POLLOUT, deadline)) return -1;
-    const ssize_t n = ::send(socket_, from + sent, size - sent, MSG_DONTWAIT | MSG_NOSIGNAL);
+  while (sent < text.size()) {
+    if (!wait(POLLOUT, deadline)) return false;
+    const ssize_t n = ::send(socket_, text.data() + sent, text.size() - sent, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (n > 0) sent += static_cast<std::size_t>(n);
-    else if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return -1;
+    else if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return false;
   }
-  return static_cast<ssize_t>(size);
-}
-
-// Nothing here looks at them: who asks is told by the token.
-void Connection::get_remote_ip_and_port(std::string& ip, int& port) const {
-  ip.clear();
-  port = 0;
-}
-void Connection::get_local_ip_and_port(std::string& ip, int& port) const {
-  ip.clear();
-  port = 0;
+  return true;
 }
 
 }  // namespace vdvr::cli

@@ -1,14 +1,13 @@
-// One connection of a client, with an end to everything: how long it may be idle, how long a request and an
-// answer may take, how much may be sent. The HTTP library reads and writes through it. Called by server.cpp.
+// One connection of a client by HTTP/1.1, with an end to everything: how long it may be idle, how long a
+// request and an answer may take, how much may be sent. Called by server.cpp.
 #pragma once
-
-#include <httplib.h>
 
 #include <atomic>
 #include <chrono>
-#include <cstdint>
+#include <cstddef>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "apps/vdvr/serve/access.hpp"
@@ -27,47 +26,46 @@ class Connections {
   Place add(int socket);
   void remove(Place place);
   void mark_known(Place place);
-  /// Closes the oldest stranger's connection, if there is one: its thread ends soon.
-  void turn_one_away();
+  /// Sees to it that so many connections are about to end, as far as there are strangers' ones: the oldest
+  /// first.
+  void make_way(std::ptrdiff_t wanted);
 
  private:
   std::mutex mutex_;
   std::list<Entry> entries_;
 };
 
-class Connection : public httplib::Stream {
+/// What is answered.
+struct Answer {
+  int status = 200;
+  std::string type, body;  ///< the media type, and its bytes
+};
+/// A line of text: `why`, or the status's own name.
+Answer refusal(int status, const std::string& why = "");
+
+class Connection {
  public:
   Connection(int socket, const std::atomic<bool>& ending) : socket_(socket), ending_(ending) {}
 
-  enum class Head { good, bad, closed };
-  /// Waits for the next request's head, and hands the library no more of it than plain_head.
-  Head receive(RequestHead& head);
-  /// Whether the library has read the whole body, so that another request may follow.
-  [[nodiscard]] bool is_drained() const { return body_left_ == 0; }
-  /// A refusal without a body worth reading.
-  void refuse(int status);
-
-  [[nodiscard]] bool is_readable() const override { return true; }
-  [[nodiscard]] bool is_writable() const override { return true; }
-  ssize_t read(char* to, std::size_t size) override;
-  ssize_t write(const char* from, std::size_t size) override;
-  void get_remote_ip_and_port(std::string& ip, int& port) const override;
-  void get_local_ip_and_port(std::string& ip, int& port) const override;
-  [[nodiscard]] socket_t socket() const override { return socket_; }
+  enum class Received { request, nonsense, nothing };
+  /// Waits for the next request's head. `nothing` where the client or the server ends, or time is over.
+  Received receive(RequestHead& head);
+  /// The body that the head announced; nothing where it does not come in time.
+  std::optional<std::string> receive_body(const RequestHead& head);
+  /// False where the client does not take it. Without the body for the method HEAD.
+  bool send(const Answer& answer, bool with_body, bool close);
 
  private:
   using Clock = std::chrono::steady_clock;
   /// False at the deadline, or when the server ends.
   [[nodiscard]] bool wait(short events, Clock::time_point deadline) const;
-  /// Bytes read, 0 at the end of the stream, -1 at the deadline.
-  ssize_t fetch(char* to, std::size_t size, Clock::time_point deadline);
+  /// Appends what comes to what is pending; false at the end of the stream, and at the deadline.
+  bool fetch(Clock::time_point deadline);
+  bool write(const std::string& text);
 
   int socket_;
   const std::atomic<bool>& ending_;
   std::string pending_;  ///< received, not yet read
-  std::string head_;     ///< for the library
-  std::size_t head_read_ = 0;
-  std::uint64_t body_left_ = 0;
   Clock::time_point deadline_{};
 };
 

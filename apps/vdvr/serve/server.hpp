@@ -1,5 +1,6 @@
 // `vdvr serve` as a server: who is let in (access.hpp), what a connection may cost (connection.hpp), whose
-// frame is next (drawing.hpp), what is answered. HTTP itself is cpp-httplib's. Called by commands/serve.cpp.
+// frame is next (drawing.hpp), what is answered. HTTP/1.1 is spoken by ourselves: cpp-httplib reads heads
+// without end, and a slow one for ever (docs/serve.md). Called by commands/serve.cpp.
 #pragma once
 
 #include <memory>
