@@ -164,7 +164,7 @@ FAULTS = [
     ("tests/loose_test.cpp", "\n", "lies loose in tests/"),
     ("kernels/fbp/lonely.cl", "\n", "nobody builds the program"),
     ("kernels/loose.cl", "\n", "lies in no room"),
-    ("kernels/shared/untested.h", '#include "device/largest.h"\n', "the host would have to compile"),
+    ("kernels/shared/untested.h", '#include "device/lanes.h"\n', "the host would have to compile"),
     ("kernels/gold/cell_test.cl", "int f(int4 m) { return any(m); }\n", "never true of one lane"),
     ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
 ]
