@@ -1,7 +1,9 @@
 // How `verify` back-projects nodes of cone beam, apart from everything that build uses: lambda^-2 q(u, v) by
 // eight points of Lagrange both ways (docs/error-bounds.md, "What verify does", "Cone beam").
 // Layouts: float table[view][column][row]; View numbers[tile][block][view]; int2 tiles[tile] = first node x,
-// y; float nodes[y][x][all_heights]. Called by host/witness/verify_cone_nodes.cpp.
+// y; float nodes[y][x][all_heights]. What reads like kept/cone_nodes.cl is written a second time: a fault in
+// a shared line would be in what is certified and in what it is held to. Called by
+// host/witness/verify_cone_nodes.cpp.
 #include "device/lanes.h"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
