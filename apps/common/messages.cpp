@@ -7,7 +7,8 @@ namespace vdvr::cli {
 namespace {
 
 const std::set<std::string>& fields_with_options() {
-  static const std::set<std::string> names{"angles_file",
+  static const std::set<std::string> names{"angle_unit",
+                                           "angles_file",
                                            "azimuth",
                                            "base",
                                            "beam",

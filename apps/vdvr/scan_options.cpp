@@ -23,7 +23,9 @@ std::optional<double> level(const Arguments& args, const std::string& name, doub
 
 void add_scan(Arguments& args) {
   args.group("Input (what its files do not say, or say otherwise)")
-      .value("angles-file", "FILE", "for stacks and HDF5 files: angles in degrees, one per view")
+      .value("angles-file", "FILE",
+             "for stacks and HDF5 files: angles, one per view; degrees, unless --angle-unit says otherwise")
+      .value("angle-unit", "degrees|radians", "of the angles, whatever the file of them says")
       .value("beam", "cone|parallel",
              "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
       .value("entry", "NAME", "the group of an HDF5 file that holds the scan, where there are several")
@@ -51,6 +53,12 @@ InputStatement input_statement(const Arguments& args, const InputStatement& stor
     throw InputError("--transmission and --line-integrals exclude each other");
   if (args.has("transmission")) s.values = SampleValues::transmission;
   if (args.has("line-integrals")) s.values = SampleValues::line_integrals;
+  if (args.has("angle-unit")) {
+    s.angle_unit = angle_unit_of(args.text("angle-unit"));
+    if (!s.angle_unit)
+      throw InputError(
+          fmt::format("--angle-unit: '{}'; it must be degrees or radians", args.text("angle-unit")));
+  }
   return s;
 }
 

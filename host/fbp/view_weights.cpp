@@ -81,7 +81,7 @@ void require_directions(const ViewWeights& weights) {
   if (degrees(weights.seen_rad) <= 1.01 * longest_turn_deg)
     throw InputError(fmt::format(
         "all {} views lie within {:.2f} degrees: a volume from so short an arc is worthless. If these angles "
-        "are radians, say so (the attribute units = \"rad\" of an HDF5 file's angles), or give degrees",
+        "are radians, say so by `angle_unit` radians",
         weights.weight.size(), degrees(weights.seen_rad)));
 }
 

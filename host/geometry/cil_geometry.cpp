@@ -128,6 +128,7 @@ ConeViews cil_geometry(const std::filesystem::path& path, const StackShape& stac
   if (static_cast<std::int64_t>(angles.size()) != stack.views)
     about.fail(fmt::format("'angles' has {} values for {} projections", angles.size(), stack.views));
   const double first = about.number_or("initial_angle", 0), unit = unit_of_angles(about);
+  if (unit == 1) require_radians(path.string(), "'angles'", angles, "'angle_unit' says radian");
   const DetectorVectors standing_still = standing(about);
   ConeViews out;
   for (std::size_t k = 0; k < angles.size(); ++k)

@@ -51,8 +51,11 @@ ConeViews circular_geometry(const Description& about, const StackShape& stack,
     view.out_of_plane_rad = out_of_plane * radians;
   }
   const int sense = sense_of(about, out.notes);
-  for (std::size_t k = 0; k < theta_deg.size(); ++k) {
-    view.theta_rad = sense * theta_deg[k] * radians;
+  std::vector<double> theta_rad;
+  for (const double theta : theta_deg) theta_rad.push_back(theta * radians);
+  require_radians(where, "angles", theta_rad, not_radians);
+  for (std::size_t k = 0; k < theta_rad.size(); ++k) {
+    view.theta_rad = sense * theta_rad[k];
     out.views.push_back(checked_view(view, where, static_cast<std::int64_t>(k)));
   }
   out.source_to_detector = view.source_to_detector;

@@ -77,7 +77,8 @@ void require_views(const std::string& where, const std::string& what, std::int64
                                 what, stack.views));
 }
 
-void require_radians(const std::string& where, const std::string& what, const std::vector<double>& angles) {
+void require_radians(const std::string& where, const std::string& what, const std::vector<double>& angles,
+                     const std::string& remedy) {
   if (angles.size() < 3) return;
   const double span = std::abs(angles.back() - angles.front()),
                step = span / static_cast<double>(angles.size() - 1);
@@ -85,10 +86,8 @@ void require_radians(const std::string& where, const std::string& what, const st
   if (!(span >= least)) return;
   for (const double end : {span, span + step})
     if (std::abs(end - half_turn * std::round(end / half_turn)) <= 0.01 * step)
-      throw FileError(fmt::format(
-          "{}: {} run over {:g} in steps of {:.4g}: these are degrees, but the format has radians; multiply "
-          "them by pi / 180",
-          where, what, span, step));
+      throw FileError(fmt::format("{}: {} run over {:g} in steps of {:.4g}: these are degrees, but {}", where,
+                                  what, span, step, remedy));
 }
 
 void require_detector(const std::string& where, std::int64_t columns, std::int64_t rows,

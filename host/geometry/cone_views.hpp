@@ -47,7 +47,10 @@ void require_views(const std::string& where, const std::string& what, std::int64
                    const StackShape& stack);
 /// Throws FileError where angles that a format has in radians are degrees: they reach beyond 14 turns, and
 /// end on a multiple of 180, or a step before it, to a hundredth of the step.
-void require_radians(const std::string& where, const std::string& what, const std::vector<double>& angles);
+void require_radians(const std::string& where, const std::string& what, const std::vector<double>& angles,
+                     const std::string& remedy = "the format has radians; multiply them by pi / 180");
+/// Remedy of that where no format, but a file or a user says radians.
+inline const char* const not_radians = "they were taken for radians; state the unit by `angle_unit` degrees";
 /// The same of the detector.
 void require_detector(const std::string& where, std::int64_t columns, std::int64_t rows,
                       const StackShape& stack);

@@ -41,8 +41,9 @@ RawScan open_data_exchange(const Reader& file, const std::string& group, const H
   scan.columns = data.columns;
   scan.integer = data.data->is_integer();
   scan.projections = all_frames(data, "projection");
-  scan.theta_deg =
-      wanted.own_angles ? read_angles(file, group + "/theta", {data.count}, data) : wanted.angles_deg;
+  scan.theta_deg = wanted.own_angles
+                       ? read_angles(file, group + "/theta", {data.count}, data, wanted.angle_unit)
+                       : wanted.angles_deg;
   scan.center = file.find_real(object, "center");
   const auto pitch_u = file.find_real(object, "pitch_u"), pitch_v = file.find_real(object, "pitch_v");
   scan.pitch_u = pitch_u.value_or(1);

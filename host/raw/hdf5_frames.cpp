@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <array>
-#include <numbers>
 
 #include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
@@ -53,6 +52,18 @@ void read_run(const FrameStack& stack, std::int64_t first, std::int64_t n, doubl
   for (std::int64_t k = 0; k < n; ++k)
     for (std::int64_t v = 0; v < rows; ++v)
       std::copy_n(sinograms.data() + (v * n + k) * columns, columns, out + (k * rows + v) * columns);
+}
+
+// As whoever wrote it spells it: Degrees, DEG, Radians.
+AngleUnit unit_of_angles(const Reader& file, const std::string& object, const std::string& name) {
+  const std::string written = file.find_text(object, "units").value_or("degrees");
+  std::string unit = written;
+  std::transform(unit.begin(), unit.end(), unit.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (unit.rfind("rad", 0) == 0) return AngleUnit::radians;
+  if (unit.rfind("deg", 0) == 0 || unit == "\u00b0" || unit.empty()) return AngleUnit::degrees;
+  throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed (`angle_unit` states which)",
+                              name, written));
 }
 
 }  // namespace
@@ -119,7 +130,8 @@ std::int64_t count_of(const Dataset& data) {
 }
 
 std::vector<double> read_angles(const Reader& file, const std::string& object,
-                                const std::vector<std::int64_t>& counts, const FrameStack& frames) {
+                                const std::vector<std::int64_t>& counts, const FrameStack& frames,
+                                std::optional<AngleUnit> stated) {
   const char* remedy =
       "; state them by `angles_file`, or in scan.json by 'angles' beside 'hdf5', one for each projection";
   if (!file.is_dataset(object)) file.refuse(object, std::string("no such dataset, the angles") + remedy);
@@ -129,17 +141,8 @@ std::vector<double> read_angles(const Reader& file, const std::string& object,
         fmt::format("{}: {} angles for {} frames of {}; one per frame is needed (data in sinogram "
                     "order must say so with an attribute axes = \"y:theta:x\"){}",
                     data.name, count_of(data), frames.count, frames.data->name, remedy));
-  std::vector<double> angles = data.read_all();
-  const std::string stated = file.find_text(object, "units").value_or("degrees");
-  std::string unit = stated;  // as whoever wrote it spells it: Degrees, DEG, Radians
-  std::transform(unit.begin(), unit.end(), unit.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (unit.rfind("rad", 0) == 0) {
-    for (double& a : angles) a *= 180 / std::numbers::pi;
-  } else if (unit.rfind("deg", 0) != 0 && unit != "\u00b0" && !unit.empty()) {
-    throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed", data.name, stated));
-  }
-  return angles;
+  const AngleUnit unit = stated ? *stated : unit_of_angles(file, object, data.name);
+  return in_degrees(data.read_all(), unit);
 }
 
 void require_same_detector(const FrameStack& a, const FrameStack& b) {

@@ -18,6 +18,7 @@ struct Hdf5Wanted {
   std::optional<Beam> beam;  ///< cone: of NXtomo, by its distances; parallel: stated, whatever these say
   bool own_angles = true;    ///< false: the file's are not looked at; these are taken
   std::vector<double> angles_deg;
+  std::optional<AngleUnit> angle_unit;  ///< of the file's own, whatever it says
 };
 
 struct FrameStack {
@@ -36,9 +37,10 @@ void require_same_detector(const FrameStack& a, const FrameStack& b);
 
 /// How many numbers a list holds; looked at before it is read, since a damaged header may claim any.
 std::int64_t count_of(const hdf5::Dataset& data);
-/// Angles in degrees by the dataset's units; degrees where it has none, as both formats prescribe. `counts`:
-/// how many there may be. Throws FileError.
+/// Angles in degrees, of the unit that is `stated`, else by the dataset's units; degrees where it has none,
+/// as both formats prescribe. `counts`: how many there may be. Throws FileError.
 std::vector<double> read_angles(const hdf5::Reader& file, const std::string& object,
-                                const std::vector<std::int64_t>& counts, const FrameStack& frames);
+                                const std::vector<std::int64_t>& counts, const FrameStack& frames,
+                                std::optional<AngleUnit> stated);
 
 }  // namespace vdvr::io

@@ -98,12 +98,13 @@ void note_left_out(const KeyedFrames& frames, RawScan& scan) {
 
 // One angle a frame; or a projection, where the file has no others for it.
 std::vector<double> angles_of(const Reader& file, const std::string& object, const KeyedFrames& frames,
-                              const FrameStack& data, std::vector<std::string>& notes) {
+                              const FrameStack& data, std::optional<AngleUnit> unit,
+                              std::vector<std::string>& notes) {
   const std::vector<std::int64_t>& projections = frames.of_key[0];
   const auto own = static_cast<std::int64_t>(projections.size());
   std::vector<std::int64_t> counts{data.count};
   if (frames.alignment == 0) counts.push_back(own);
-  const std::vector<double> all = read_angles(file, object, counts, data);
+  const std::vector<double> all = read_angles(file, object, counts, data, unit);
   if (static_cast<std::int64_t>(all.size()) != data.count) {
     notes.push_back(
         fmt::format("{} has one angle for each of the {} projections, not for each of the {} frames", object,
@@ -186,7 +187,8 @@ RawScan open_nxtomo(const Reader& file, const TomoEntry& where, const Hdf5Wanted
   const KeyedFrames frames = keyed_frames(file, where.detector, data);
   std::string sample = child_of(file, where.entry, "NXsample", "sample");
   if (sample.empty()) sample = where.entry + "/sample";
-  scan.theta_deg = wanted.own_angles ? angles_of(file, sample + "/rotation_angle", frames, data, scan.notes)
+  scan.theta_deg = wanted.own_angles ? angles_of(file, sample + "/rotation_angle", frames, data,
+                                                 wanted.angle_unit, scan.notes)
                                      : wanted.angles_deg;
   note_left_out(frames, scan);
   scan.projections = frames_of(data, frames.of_key[0], "projection");

@@ -40,8 +40,11 @@ bool is_json(const fs::path& path) {
 }
 
 RawScan open_hdf5(const fs::path& path, const ScanOptions& options) {
-  Hdf5Wanted wanted{options.input.entry, options.beam, !options.angles_file, {}};
-  if (options.angles_file) wanted.angles_deg = read_numbers(*options.angles_file);
+  const InputStatement& stated = options.input;
+  Hdf5Wanted wanted{stated.entry, options.beam, !options.angles_file, {}, stated.angle_unit};
+  if (options.angles_file)
+    wanted.angles_deg =
+        in_degrees(read_numbers(*options.angles_file), stated.angle_unit.value_or(AngleUnit::degrees));
   RawScan raw = open_hdf5_scan(path, {}, options.follow_links, wanted);
   const auto angles = static_cast<std::int64_t>(wanted.angles_deg.size());
   if (options.angles_file && angles != raw.projections.count)
@@ -76,7 +79,8 @@ RawScan open_files(const fs::path& path, const ScanOptions& options, bool& folde
   if (raster) {
     if (!options.angles_file)
       throw InputError(path.string() + ": a stack needs its angles; give them with `angles_file`");
-    return open_raster_scan(path, *options.angles_file);
+    return open_raster_scan(path, *options.angles_file,
+                            options.input.angle_unit.value_or(AngleUnit::degrees));
   }
   if (is_json(path)) {
     if (path.filename() != "scan.json")

@@ -115,9 +115,10 @@ RawScan open_raster_stack(const std::filesystem::path& path, std::uint64_t max_m
   return scan;
 }
 
-RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file) {
+RawScan open_raster_scan(const std::filesystem::path& path, const std::filesystem::path& angles_file,
+                         AngleUnit unit) {
   RawScan scan = open_raster_stack(path, 0);
-  scan.theta_deg = read_numbers(angles_file);
+  scan.theta_deg = in_degrees(read_numbers(angles_file), unit);
   if (static_cast<std::int64_t>(scan.theta_deg.size()) != scan.projections.count)
     throw FileError(fmt::format("{}: {} angles for the {} views of {}", angles_file.string(),
                                 scan.theta_deg.size(), scan.projections.count, path.string()));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numbers>
 
 namespace vdvr::io {
 
@@ -13,6 +14,12 @@ Frames level_frame(double level, std::int64_t samples, const std::string& name) 
     std::fill_n(out, n * samples, level);
   };
   return frames;
+}
+
+std::vector<double> in_degrees(std::vector<double> angles, AngleUnit unit) {
+  if (unit == AngleUnit::radians)
+    for (double& angle : angles) angle *= 180 / std::numbers::pi;
+  return angles;
 }
 
 void select_views(RawScan& scan, const ViewRanges& wanted) {

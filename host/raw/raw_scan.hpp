@@ -26,6 +26,9 @@ struct Frames {
 /// Frames that all hold one number: flats and darks of which only the level is known.
 Frames level_frame(double level, std::int64_t samples, const std::string& name);
 
+/// Angles of this unit, in degrees.
+std::vector<double> in_degrees(std::vector<double> angles, AngleUnit unit);
+
 /// What makes a scan one of cone beam.
 struct RawCone {
   ConeViews geometry;                    ///< one view for each projection
@@ -43,6 +46,7 @@ struct SamplePositions {
 struct RawScan {
   std::string format;  ///< "data-exchange", "nxtomo", "scan.json", "mha", "nrrd"
   std::int64_t rows = 0, columns = 0;
+  AngleUnit angle_unit = AngleUnit::degrees;     ///< of angles that options or scan.json bring
   std::vector<double> theta_deg;                 ///< parallel beam: one a view
   std::optional<RawCone> cone;                   ///< then `center` is where scan.json moves the axis to
   Frames projections, flats, darks;              ///< flats and darks: count 0 where there are none

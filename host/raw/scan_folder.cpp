@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 std::set<std::string> known_members() {
   std::set<std::string> known{"projections", "hdf5",       "flats", "darks", "angles",      "angle_range",
                               "use",         "center",     "pitch", "unit",  "air_columns", "description",
-                              "comment",     "redundancy", "beam",  "entry"};
+                              "comment",     "redundancy", "beam",  "entry", "angle_unit"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -173,14 +173,35 @@ bool brings_angles(const Description& about) {
   return kind && (*kind != "geometry" || circular_description(about).has("angles"));
 }
 
-RawScan open_hdf5(const Description& about, const ScanOptions& options, bool cone) {
+// By option, else by scan.json. A format that has a unit of its own is not told another.
+std::optional<AngleUnit> stated_angle_unit(const Description& about, const ScanOptions& options) {
+  std::optional<AngleUnit> unit;
+  if (about.has("angle_unit")) {
+    unit = angle_unit_of(about.text("angle_unit"));
+    if (!unit)
+      about.fail(fmt::format("'angle_unit' is \"{}\"; it must be \"degrees\" or \"radians\"",
+                             about.text("angle_unit")));
+  }
+  if (options.input.angle_unit) unit = options.input.angle_unit;
+  const auto kind = cone_kind(about);
+  if (!unit || !kind || *kind == "geometry") return unit;
+  const std::string says =
+      fmt::format("the format of '{}' says what its angles are counted in; leave ", *kind);
+  if (about.has("angle_unit")) about.fail(says + "'angle_unit' out");
+  throw InputError(fmt::format("{}: {}`angle_unit` out", (about.folder() / "scan.json").string(), says));
+}
+
+RawScan open_hdf5(const Description& about, const ScanOptions& options, bool cone,
+                  std::optional<AngleUnit> unit) {
   Hdf5Wanted wanted;
+  wanted.angle_unit = unit;
   wanted.entry = options.input.entry;
   if (wanted.entry.empty() && about.has("entry")) wanted.entry = about.text("entry");
   if (cone) wanted.beam = Beam::cone;
   else if (options.beam || about.has("beam") || cone_kind(about)) wanted.beam = Beam::parallel;
   wanted.own_angles = !about.has("angles") && !brings_angles(about);
   RawScan of_angles;
+  of_angles.angle_unit = unit.value_or(AngleUnit::degrees);
   if (about.has("angles")) wanted.angles_deg = listed_angles(about, of_angles);
   const std::string name = about.text("hdf5");
   RawScan scan = open_hdf5_scan(about.inside(name, "hdf5"), about.folder(), options.follow_links, wanted);
@@ -211,7 +232,7 @@ void set_angles(const Description& about, RawScan& scan) {
   if (about.has("redundancy")) about.fail("'redundancy' goes with cone-beam geometry");
   if (about.has("angles")) scan.theta_deg = listed_angles(about, scan);
   else if (about.has("angle_range")) about.fail("'angle_range' needs 'angles'");
-  else if (!about.has("hdf5")) about.fail("'angles' is missing: a file of degrees, or a list");
+  else if (!about.has("hdf5")) about.fail("'angles' is missing: a file of numbers, or a list");
   if (static_cast<std::int64_t>(scan.theta_deg.size()) != scan.projections.count)
     about.fail(fmt::format("{} angles for {} projections; 'angle_range' selects entries of 'angles'",
                            scan.theta_deg.size(), scan.projections.count));
@@ -245,9 +266,10 @@ RawScan open_scan_folder(const fs::path& folder, const ScanOptions& options) {
     about.fail("needs one of 'projections' and 'hdf5'");
   const bool distances = wants_distances(about, options.beam);
   require_entry_of_hdf5(about, options);
+  const auto angle_unit = stated_angle_unit(about, options);
   RawScan scan;
   if (about.has("hdf5")) {
-    scan = open_hdf5(about, options, distances);
+    scan = open_hdf5(about, options, distances, angle_unit);
   } else {
     const auto names = own_projections ? nikon_projections(*nikon, about) : about.matches("projections");
     const bool stack = names.size() == 1 && is_raster_file(folder / names.front());
@@ -257,6 +279,7 @@ RawScan open_scan_folder(const fs::path& folder, const ScanOptions& options) {
   set_counts(about, nikon, options.max_memory_bytes, scan);
   scan.format = "scan.json";
   scan.folder = folder;
+  scan.angle_unit = angle_unit.value_or(AngleUnit::degrees);
   use_file(scan, about, "scan.json");
   set_geometry(about, scan);
   if (distances) set_cone(about, "beam", scan);

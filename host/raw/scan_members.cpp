@@ -27,7 +27,7 @@ std::vector<std::string> names_of_views(const RawScan& scan) {
 }
 
 std::vector<double> angles_of(const Description& about, const Description& root, RawScan& scan) {
-  if (about.is_list("angles")) return about.numbers("angles");
+  if (about.is_list("angles")) return in_degrees(about.numbers("angles"), scan.angle_unit);
   const std::string name = about.text("angles");
   std::error_code error;
   if (name == "names" && !fs::exists(root.inside(name, "angles"), error)) {
@@ -36,11 +36,11 @@ std::vector<double> angles_of(const Description& about, const Description& root,
     if (found.empty())
       about.fail(fmt::format("{} are to be taken from the names of the projections, but {}",
                              about.quoted("angles"), why));
-    return found;
+    return in_degrees(found, scan.angle_unit);
   }
-  const auto angles = read_numbers(root.inside(name, "angles"));
+  auto angles = read_numbers(root.inside(name, "angles"));
   use_file(scan, root, name);
-  return angles;
+  return in_degrees(std::move(angles), scan.angle_unit);
 }
 
 // Names that hold an angle say the same as the angles.

@@ -17,6 +17,23 @@ constexpr std::array<std::pair<SampleValues, const char*>, 3> names{
      {SampleValues::transmission, "transmission"},
      {SampleValues::line_integrals, "line integrals"}}};
 
+constexpr std::array<std::pair<AngleUnit, const char*>, 2> units{
+    {{AngleUnit::degrees, "degrees"}, {AngleUnit::radians, "radians"}}};
+
+template <class T, std::size_t n>
+const char* name_of(const std::array<std::pair<T, const char*>, n>& list, T value) {
+  for (const auto& [one, name] : list)
+    if (one == value) return name;
+  return "";
+}
+
+template <class T, std::size_t n>
+std::optional<T> named(const std::array<std::pair<T, const char*>, n>& list, const std::string& text) {
+  for (const auto& [one, name] : list)
+    if (text == name) return one;
+  return {};
+}
+
 std::int64_t bound_of(const std::string& text, const std::string& range, std::int64_t if_empty) {
   if (text.empty()) return if_empty;
   std::int64_t value = 0;
@@ -38,17 +55,13 @@ std::pair<std::int64_t, std::int64_t> range_of(const std::string& text) {
 
 }  // namespace
 
-const char* text_of(SampleValues values) {
-  for (const auto& [one, name] : names)
-    if (one == values) return name;
-  return "";
-}
+const char* text_of(SampleValues values) { return name_of(names, values); }
 
-std::optional<SampleValues> sample_values_of(const std::string& text) {
-  for (const auto& [one, name] : names)
-    if (text == name) return one;
-  return {};
-}
+std::optional<SampleValues> sample_values_of(const std::string& text) { return named(names, text); }
+
+const char* text_of(AngleUnit unit) { return name_of(units, unit); }
+
+std::optional<AngleUnit> angle_unit_of(const std::string& text) { return named(units, text); }
 
 ViewRanges view_ranges_of(const std::string& text) {
   ViewRanges ranges;
@@ -93,6 +106,7 @@ std::string text_of(const InputStatement& s) {
   if (s.dark) add(fmt::format("darks {}", *s.dark));
   if (s.flat) add(fmt::format("flats {}", *s.flat));
   if (s.values) add(text_of(*s.values));
+  if (s.angle_unit) add(fmt::format("angles in {}", text_of(*s.angle_unit)));
   return text.empty() ? "none" : text;
 }
 

@@ -16,6 +16,7 @@ nlohmann::json json_of(const InputStatement& s) {
   if (s.dark) json["dark"] = *s.dark;
   if (s.flat) json["flat"] = *s.flat;
   if (s.values) json["values"] = text_of(*s.values);
+  if (s.angle_unit) json["angle_unit"] = text_of(*s.angle_unit);
   return json;
 }
 
@@ -43,6 +44,8 @@ InputStatement input_statement_of(const nlohmann::json& json) {
       s.flat = level(name, value);
     } else if (name == "values" && value.is_string() && sample_values_of(value.get<std::string>())) {
       s.values = sample_values_of(value.get<std::string>());
+    } else if (name == "angle_unit" && value.is_string() && angle_unit_of(value.get<std::string>())) {
+      s.angle_unit = angle_unit_of(value.get<std::string>());
     } else {
       throw InputError(fmt::format("input: member '{}' is not known to this version", name));
     }

@@ -69,6 +69,7 @@ ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
       throw FileError(fmt::format("{}: angle {} is {}", name, k, raw.theta_deg[k]));
     g.theta_rad.push_back(raw.theta_deg[k] * (std::numbers::pi / 180));
   }
+  io::require_radians(name, "angles", g.theta_rad, io::not_radians);
   return g;
 }
 

@@ -20,6 +20,12 @@ enum class SampleValues { counts, transmission, line_integrals };
 VDVR_API const char* text_of(SampleValues values);
 VDVR_API std::optional<SampleValues> sample_values_of(const std::string& text);
 
+/// What the angles of a scan are counted in.
+enum class AngleUnit { degrees, radians };
+/// "degrees", "radians".
+VDVR_API const char* text_of(AngleUnit unit);
+VDVR_API std::optional<AngleUnit> angle_unit_of(const std::string& text);
+
 /// Half-open ranges of projections, counted from 0 as the file has them.
 using ViewRanges = std::vector<std::pair<std::int64_t, std::int64_t>>;
 /// As an end: up to the last.
@@ -37,12 +43,13 @@ struct InputStatement {
   std::optional<double> dark;  ///< counts without beam, in place of darks
   std::optional<double> flat;  ///< counts of the open beam, in place of flats
   std::optional<SampleValues> values;
+  std::optional<AngleUnit> angle_unit;  ///< whatever the file of the angles says
 
   [[nodiscard]] bool none() const { return *this == InputStatement{}; }
   bool operator==(const InputStatement&) const = default;
 };
 
-/// "entry entry0001; views 0:40,41:90; darks 0; line integrals"; "none".
+/// "entry entry0001; views 0:40,41:90; darks 0; line integrals; angles in radians"; "none".
 VDVR_API std::string text_of(const InputStatement& statement);
 
 }  // namespace vdvr

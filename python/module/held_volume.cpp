@@ -29,8 +29,8 @@ RenderResult HeldVolume::render(const std::shared_ptr<Device>& device, const Ren
   auto safe = safe_.find(options.sampler);
   if (safe == safe_.end())
     safe = safe_
-               .emplace(options.sampler,
-                        safe_sampler(*device_, file_.volume, certificate(), options.sampler, file_.altered))
+               .emplace(options.sampler, safe_sampler(*device_, file_.volume, certificate(), options.sampler,
+                                                      !file_.altered.empty()))
                .first;
   RenderOptions drawn = options;
   drawn.sampler = safe->second.sampler;

@@ -164,6 +164,9 @@ void add_projections(nb::module_& m) {
       .value("counts", SampleValues::counts)
       .value("transmission", SampleValues::transmission)
       .value("line integrals", SampleValues::line_integrals);
+  nb::enum_<AngleUnit>(m, "AngleUnit")
+      .value("degrees", AngleUnit::degrees)
+      .value("radians", AngleUnit::radians);
   nb::class_<InputStatement>(m, "InputStatement")
       .def(nb::init<>())
       .def_rw("entry", &InputStatement::entry)
@@ -171,6 +174,7 @@ void add_projections(nb::module_& m) {
       .def_rw("dark", &InputStatement::dark)
       .def_rw("flat", &InputStatement::flat)
       .def_rw("values", &InputStatement::values)
+      .def_rw("angle_unit", &InputStatement::angle_unit)
       .def("__str__", [](const InputStatement& s) { return text_of(s); });
   nb::class_<Understood>(m, "Understood", "What was understood of a scan's files.")
       .def(nb::init<>())

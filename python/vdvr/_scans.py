@@ -157,6 +157,7 @@ def read_scan(
     *,
     center: Optional[float] = None,
     angles_file: Optional[Path] = None,
+    angle_unit: Optional[str] = None,
     beam: Optional[str] = None,
     binning: int = 1,
     median: int = 1,
@@ -181,7 +182,8 @@ def read_scan(
     Parameters
     ----------
     center : column of the axis, in columns of the prepared projections; by default the file's, else found.
-    angles_file : of an MHA or NRRD stack, or an HDF5 file: degrees, one a view.
+    angles_file : of an MHA or NRRD stack, or an HDF5 file: one angle a view.
+    angle_unit : "degrees" or "radians", of the angles, whatever their file says.
     beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
     binning : columns and rows that become one.
     median, gaussian : side of the median's window; standard deviations in columns and rows.
@@ -203,7 +205,7 @@ def read_scan(
     options.center = None if center is None else number(center, "center")
     options.angles_file = None if angles_file is None else angles_file
     options.beam = None if beam is None else choice(_core.Beam, beam, "beam")
-    options.input = _statement(entry, views, darks, flats, transmission, line_integrals)
+    options.input = _statement(entry, views, darks, flats, transmission, line_integrals, angle_unit)
     options.follow_links = follow_links
     options.max_memory_bytes = _core.half_of_free_memory() if max_memory is None else int(max_memory)
     preparation = _core.Preparation()
@@ -231,6 +233,7 @@ def _statement(
     flats: Union[str, float, None],
     transmission: bool,
     line_integrals: bool,
+    angle_unit: Optional[str],
 ) -> "_core.InputStatement":
     """What the caller says of an input that its files do not say, or say otherwise."""
     if transmission and line_integrals:
@@ -249,6 +252,8 @@ def _statement(
         stated.values = choice(_core.SampleValues, "transmission", "values")
     if line_integrals:
         stated.values = choice(_core.SampleValues, "line integrals", "values")
+    if angle_unit is not None:
+        stated.angle_unit = choice(_core.AngleUnit, angle_unit, "angle_unit")
     return stated
 
 

@@ -12,7 +12,7 @@ std::vector<std::string> seeds(const std::filesystem::path& folder) {
          "ElementDataFile = LOCAL\nabcdefghijkl";
   return {"# degrees\n0 45\n90, 135\n", "0\n4.5e1\n-90\n+135.0 # the last\n",
           "\xef\xbb\xbf"
-          "0,0\r\n1,5\r\n3,0\r\n4,5\r\n",
+          "0.0\r\n45.0,\r\n90.0;\r\n135.0\r\n",
           "# \xb0\n0;1;2;3\n"};
 }
 

@@ -1,5 +1,6 @@
 """Angles that cannot be what they say. Right: all views at one angle are refused; radians without a unit are refused; degrees
-where ASTRA means radians are refused; units spelled with capitals are read."""
+where ASTRA means radians are refused, and so are degrees that a file calls radians; units spelled with capitals are read; what
+is stated wins."""
 import json
 
 import h5py
@@ -20,6 +21,14 @@ def make(folder):
     write('radians', np.radians(DEGREES), None)
     for name, theta in (('Degrees', DEGREES), ('DEG', DEGREES), ('Radians', np.radians(DEGREES))):
         write(name, theta, name)
+    # Steps of 1 degree and a half turn, as a file may hold them by mistake.
+    write('wrong_unit', DEGREES, 'rad')
+    np.savetxt(folder / 'radians.txt', np.radians(DEGREES))
+    listed = folder / 'listed'
+    listed.mkdir()
+    write_mha(listed / 's.mha', disc().astype('f4'))
+    (listed / 'scan.json').write_text(json.dumps(
+        {'projections': 's.mha', 'description': 'line integrals', 'angles': np.radians(DEGREES).tolist(), 'angle_unit': 'radians'}))
     scan = folder / 'astra_deg'
     scan.mkdir()
     write_mha(scan / 's.mha', disc().astype('f4'))
@@ -37,3 +46,10 @@ def check(program):
     program.expect(not (program.folder / 'v.mha').exists(), 'a refused scan left a volume')
     for name in ('Degrees', 'DEG', 'Radians'):
         program.disc(f'{name}.h5')
+    program.refused('reconstruct', 'wrong_unit.h5', '-o', 'v.mha', names=['--angle-unit degrees'])
+    program.disc('wrong_unit.h5', '--angle-unit', 'degrees')
+    program.disc('radians.h5', '--angle-unit', 'radians')
+    program.disc('zeros.h5', '--angles-file', 'radians.txt', '--angle-unit', 'radians')
+    program.disc('listed')
+    program.refused('info', 'radians.h5', '--angle-unit', 'turns', names=['degrees or radians'])
+    program.refused('info', 'astra_deg', '--angle-unit', 'degrees', names=['astra', 'angle-unit'])
