@@ -1,7 +1,7 @@
 // Launches `turn` of kernels/bounds/projection_bounds.cl between two passes of upsample_columns.cpp.
 #include "host/bounds/dense_values.hpp"
 
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 
 namespace vdvr {
@@ -33,8 +33,8 @@ const opencl::DeviceArray<float>& DenseValues::operator()(std::int64_t first, st
   resize(values_, count(chunks() * views * rows_.count * 16), "dense values");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> turn(state_, "bounds/projection_bounds",
                                                                       "turn");
-  turn({{count(V), count(chunks()), count(views)}, {1, 1, 1}}, turned_.buffer(), slab.values.buffer(),
-       to_int(views), to_int(columns_.count), to_int(V));
+  turn(opencl::in_groups(state_.info, {count(V), count(chunks()), count(views)}), turned_.buffer(),
+       slab.values.buffer(), to_int(views), to_int(columns_.count), to_int(V));
   along_v_(values_, {0, count(rows_.count * 16), count(views * rows_.count * 16)}, turned_,
            {0, count(V * 16), count(views * V * 16)}, rows_, views, chunks());
   opencl::finish(state_, "dense values");  // before the slab goes

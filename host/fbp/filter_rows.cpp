@@ -17,7 +17,7 @@
 #include "host/opencl/column_tuning.hpp"
 #include "host/opencl/fft.hpp"
 #include "host/opencl/host_fft.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "shared/filter_rows.h"
@@ -364,7 +364,7 @@ class ProductFilter : public RowFilter {
               std::int64_t out_columns, const VdvrChunks& places) const {
     const ColumnTuning tuning = column_tuning(state_.info);
     // As many bytes in a vector of sums; of two lanes there is no vector.
-    const int lanes = !is_double<Real> ? tuning.lanes : tuning.lanes >= 8 ? tuning.lanes / 2 : 1;
+    const int lanes = is_double<Real> ? opencl::lanes_of(state_.info, tuning.lanes / 2) : tuning.lanes;
     opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, Real, VdvrFilteredRows> kernel(
         state_, "fbp/filter_rows", "filter_rows",
         {{"VDVR_LANES", std::to_string(lanes)},

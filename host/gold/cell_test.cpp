@@ -4,8 +4,7 @@
 #include <bit>
 #include <string>
 
-#include "host/opencl/column_tuning.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 
 namespace vdvr {
@@ -36,20 +35,22 @@ CellTestResults cell_test(opencl::State& state, const DeviceField& field, const 
   slack.fill(-1);
   violated.fill(0);
   opencl::Defines defines = field.defines;
-  // Eight at most: the corners' parts are as many registers.
-  const std::int64_t most = std::min<std::int64_t>({column_tuning(state.info).lanes, 8, brick_nodes}),
-                     lanes = most >= 8   ? 8
-                             : most >= 4 ? 4
-                                         : 1;
+  // Eight at most: the corners' parts are as many registers. On a GPU a row of a brick is cut into pieces for
+  // the same reason.
+  const std::int64_t lanes = opencl::lanes_of(state.info, to_int(std::min<std::int64_t>(8, brick_nodes))),
+                     cells_x = lanes == 1 ? std::min<std::int64_t>(4, brick_nodes) : brick_nodes;
   defines.emplace_back("VDVR_LANES", std::to_string(lanes));
+  defines.emplace_back("VDVR_CELLS_X", std::to_string(cells_x));
   defines.emplace_back("VDVR_BRICK_NODES", std::to_string(brick_nodes));
   defines.emplace_back("VDVR_WINDOWED", test.windowed != 0 ? "1" : "0");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer,
                  cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldShape, VdvrCellTest>
       kernel(state, "gold/cell_test", "cell_test", defines);
-  kernel({{count((brick_nodes + lanes - 1) / lanes), across, layers}, {1, 1, 1}}, total.buffer(),
-         error.buffer(), slack.buffer(), violated.buffer(), field.samples.buffer(), field.bricks.buffer(),
-         field.grid, gold.gold.buffer(), gold.addend.buffer(), gold.tolerances.buffer(), gold.margin.buffer(),
+  const std::uint64_t heights = count((brick_nodes + lanes - 1) / lanes),
+                      rows = across * count((brick_nodes + cells_x - 1) / cells_x);
+  kernel(opencl::in_groups(state.info, {heights, rows, layers}), total.buffer(), error.buffer(),
+         slack.buffer(), violated.buffer(), field.samples.buffer(), field.bricks.buffer(), field.grid,
+         gold.gold.buffer(), gold.addend.buffer(), gold.tolerances.buffer(), gold.margin.buffer(),
          gold.first_brick.buffer(), selected.buffer(), s, test);
   CellTestResults out{floats(total), floats(error), floats(slack), {}};
   out.violated.assign(out.total.size(), 0);

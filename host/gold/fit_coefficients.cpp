@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "host/opencl/column_tuning.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 
 namespace vdvr {
@@ -31,6 +30,9 @@ void grow(opencl::State& state, opencl::DeviceArray<T>& array, std::uint64_t siz
 }
 
 }  // namespace
+
+LatticeFit::LatticeFit(opencl::State& state, const GoldBlocks& blocks)
+    : state_(state), defines_(opencl::height_defines(state.info, 16)), blocks_(blocks) {}
 
 void LatticeFit::shape_for(const Index3& spacing) {
   const GoldBlocks& b = blocks_;
@@ -99,7 +101,7 @@ void LatticeFit::mark(const std::vector<NodeBox>& wanted, int steps) {
         host_needed_[at((w.block * l.cy + y) * l.cx + x)] |= runs;
   }
   grow(state_, wanted_, host_wanted_.size(), "nodes where samples are fitted");
-  wanted_.write(host_wanted_);
+  opencl::write_later<cl_uint>(state_, wanted_, host_wanted_);
   list(nodes_, host_wanted_, deep, wide);
   list(samples_, host_needed_, l.cy, l.cx);
 }
@@ -116,7 +118,7 @@ void LatticeFit::list(Columns& columns, const std::vector<cl_uint>& runs, std::i
   }
   columns.count = static_cast<std::int64_t>(marked.size());
   grow(state_, columns.on_device, std::max<std::size_t>(1, marked.size()), "columns that are fitted");
-  columns.on_device.write(marked);
+  opencl::write_later<VdvrMarkedColumn>(state_, columns.on_device, marked);
 }
 
 void LatticeFit::reserve(std::uint64_t gold, int steps) {
@@ -125,12 +127,13 @@ void LatticeFit::reserve(std::uint64_t gold, int steps) {
   grow(state_, level_.samples, columns * count(l.cz), "samples of a level");
   grow(state_, level_.along, columns * count(blocks_.gold_stride) + room, "interpolated columns");
   if (steps == 0) return;
+  grow(state_, before_, columns * count(l.cz), "samples before a step");
   grow(state_, errors_, gold, "errors of an interpolant");
   grow(state_, low_, columns * count(blocks_.gold_stride), "smallest errors");
   grow(state_, high_, columns * count(blocks_.gold_stride), "largest errors");
 }
 
-// One step.
+// One step, whose interpolant it leaves.
 void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
                      float curvature) {
   const GoldBlocks& b = blocks_;
@@ -138,21 +141,34 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
   const VdvrGoldBlocks blocks = blocks_on_device();
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks,
                  VdvrLattice, cl_float>
-      err(state_, "gold/fit_coefficients", "lattice_errors");
+      err(state_, "gold/fit_coefficients", "lattice_errors", defines_);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int,
                  VdvrGoldBlocks, VdvrLattice>
-      pool(state_, "gold/fit_coefficients", "pool_errors");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks, VdvrLattice,
-                 cl_float>
-      shift(state_, "gold/fit_coefficients", "shift_lattice");
-  const std::uint64_t chunks = count(b.gold_stride / 16), nodes = count(nodes_.count),
-                      samples = count(samples_.count);
-  err({{chunks, nodes, 1}, {1, 16, 1}}, errors_.buffer(), level_.along.buffer(), gold.buffer(),
-      margin.buffer(), nodes_.on_device.buffer(), to_int(nodes_.count), blocks, l, curvature);
-  pool({{chunks, samples, 1}, {1, 16, 1}}, low_.buffer(), high_.buffer(), errors_.buffer(), margin.buffer(),
-       wanted_.buffer(), samples_.on_device.buffer(), to_int(samples_.count), blocks, l);
-  shift({{count(l.cz), samples, 1}, {16, 4, 1}}, level_.samples.buffer(), low_.buffer(), high_.buffer(),
-        samples_.on_device.buffer(), to_int(samples_.count), blocks, l, share);
+      pool(state_, "gold/fit_coefficients", "pool_errors", defines_);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int,
+                 VdvrGoldBlocks, VdvrLattice, cl_float>
+      shift(state_, "gold/fit_coefficients", "shift_lattice", defines_);
+  const std::uint64_t runs = count(b.gold_stride / opencl::lanes_of(state_.info, 16));
+  err(opencl::in_groups(state_.info, {runs, count(nodes_.count), 1}, {1, 16, 1}), errors_.buffer(),
+      level_.along.buffer(), gold.buffer(), margin.buffer(), nodes_.on_device.buffer(), to_int(nodes_.count),
+      blocks, l, curvature);
+  pool(opencl::in_groups(state_.info, {runs, count(samples_.count), 1}, {1, 16, 1}), low_.buffer(),
+       high_.buffer(), errors_.buffer(), margin.buffer(), wanted_.buffer(), samples_.on_device.buffer(),
+       to_int(samples_.count), blocks, l);
+  shift(parts_of_columns(), level_.along.buffer(), before_.buffer(), level_.samples.buffer(), low_.buffer(),
+        high_.buffer(), samples_.on_device.buffer(), to_int(samples_.count), samples_each(), blocks, l,
+        share);
+  std::swap(level_.samples, before_);
+}
+
+// On a CPU a work-item walks along a column, on a GPU it does a sample of it.
+cl_int LatticeFit::samples_each() const { return opencl::items_along(state_.info) > 1 ? 1 : level_.shape.cz; }
+
+opencl::Range LatticeFit::parts_of_columns() const {
+  const cl_int each = samples_each();
+  return opencl::in_groups(
+      state_.info, {count(std::int64_t{(level_.shape.cz + each - 1) / each}), count(samples_.count), 1},
+      {1, 16, 1});
 }
 
 // How many steps a column's samples take part in: all on the boxes, and one less a sample further.
@@ -181,7 +197,7 @@ void LatticeFit::mark_last_steps(const std::vector<NodeBox>& wanted, int steps) 
     for (std::int64_t i = std::int64_t{l.cy} * l.cx - 1; i >= 0; --i) spread(block, i / l.cx, i % l.cx, -1);
   }
   grow(state_, last_, host_last_.size(), "steps of a lattice's columns");
-  last_.write(host_last_);
+  opencl::write_later<cl_int>(state_, last_, host_last_);
   host_needed_.assign(host_last_.begin(), host_last_.end());
   for (cl_uint& needed : host_needed_) needed = needed != static_cast<cl_uint>(none);
   list(samples_, host_needed_, l.cy, l.cx);
@@ -192,7 +208,7 @@ void LatticeFit::fit_at_twice(const opencl::DeviceArray<float>& gold,
                               const opencl::DeviceArray<float>& margin, int steps, float curvature) {
   const VdvrLattice& l = level_.shape;
   const VdvrGoldBlocks blocks = blocks_on_device();
-  const int most = std::min(column_tuning(state_.info).lanes, 8), lanes = most >= 8 ? 8 : most >= 4 ? 4 : 1;
+  const int lanes = opencl::lanes_of(state_.info, 8);
   const opencl::Defines defines{{"VDVR_LANES", std::to_string(lanes)}};
   // A sample more at either end than vectors hold.
   const std::uint64_t stride = opencl::round_up(count(l.cz), 8) + 8,
@@ -212,14 +228,15 @@ void LatticeFit::fit_at_twice(const opencl::DeviceArray<float>& gold,
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGoldBlocks, VdvrLattice,
                  cl_int, cl_int, cl_float>
       fit_step(state_, "gold/fit_at_twice", "fit_step", defines);
-  const opencl::Range samples{{count(l.cz), count(l.cx), rows}, {16, 4, 1}};
+  const opencl::Range samples = opencl::in_groups(state_.info, {count(l.cz), count(l.cx), rows}, {16, 4, 1});
   const std::uint64_t vectors = (count(l.cz) + count(lanes) - 1) / count(lanes);
-  targets({{vectors, wide, deep}, {1, 16, 1}}, targets_.buffer(), gold.buffer(), margin.buffer(),
-          last_.buffer(), blocks, l, along, curvature);
+  targets(opencl::in_groups(state_.info, {vectors, wide, deep}, {1, 16, 1}), targets_.buffer(), gold.buffer(),
+          margin.buffer(), last_.buffer(), blocks, l, along, curvature);
   take(samples, here_.buffer(), gold.buffer(), blocks, l, along);
   for (int step = 0; step < steps; ++step) {
-    fit_step({{vectors, count(l.cx), rows}, {1, 4, 4}}, there_.buffer(), here_.buffer(), targets_.buffer(),
-             margin.buffer(), last_.buffer(), blocks, l, along, step, share);
+    fit_step(opencl::in_groups(state_.info, {vectors, count(l.cx), rows}, {1, 4, 4}), there_.buffer(),
+             here_.buffer(), targets_.buffer(), margin.buffer(), last_.buffer(), blocks, l, along, step,
+             share);
     std::swap(here_, there_);
   }
   give(samples, level_.samples.buffer(), here_.buffer(), blocks, l, along);
@@ -236,24 +253,21 @@ const LevelSamples& LatticeFit::operator()(const opencl::DeviceArray<float>& gol
   reserve(gold.size(), at_twice ? 0 : steps);
   const VdvrLattice& l = level_.shape;
   const VdvrGoldBlocks blocks = blocks_on_device();
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks, VdvrLattice> take(
-      state_, "gold/fit_coefficients", "take_lattice"),
-      interpolate(state_, "gold/fit_coefficients", "interpolate_lattice");
-  const cl::Buffer& columns = samples_.on_device.buffer();
-  const std::uint64_t listed = count(samples_.count);
   const cl_int n = to_int(samples_.count);
   if (at_twice) {
     fit_at_twice(gold, margin, steps, curvature);
-    steps = 0;
-  } else
-    take({{count(l.cz), listed, 1}, {16, 4, 1}}, level_.samples.buffer(), gold.buffer(), columns, n, blocks,
-         l);
-  for (int step = 0;; ++step) {
-    interpolate({{listed, 1, 1}, {32, 1, 1}}, level_.along.buffer(), level_.samples.buffer(), columns, n,
-                blocks, l);
-    if (step == steps) return level_;
-    fit(gold, margin, curvature);
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, VdvrGoldBlocks, VdvrLattice>
+        interpolate(state_, "gold/fit_coefficients", "interpolate_lattice", defines_);
+    interpolate(parts_of_columns(), level_.along.buffer(), level_.samples.buffer(),
+                samples_.on_device.buffer(), n, samples_each(), blocks, l);
+    return level_;
   }
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, VdvrGoldBlocks, VdvrLattice>
+      take(state_, "gold/fit_coefficients", "take_lattice", defines_);
+  take(parts_of_columns(), level_.along.buffer(), level_.samples.buffer(), gold.buffer(),
+       samples_.on_device.buffer(), n, samples_each(), blocks, l);
+  for (int step = 0; step < steps; ++step) fit(gold, margin, curvature);
+  return level_;
 }
 
 }  // namespace vdvr

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/opencl/array.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 #include "vdvr/grid.hpp"
@@ -42,7 +42,7 @@ constexpr int base_fit_steps = 12, level_fit_steps = 2;
 /// Fits lattices of one batch of blocks; keeps its buffers from one to the next.
 class LatticeFit {
  public:
-  LatticeFit(opencl::State& state, const GoldBlocks& blocks) : state_(state), blocks_(blocks) {}
+  LatticeFit(opencl::State& state, const GoldBlocks& blocks);
 
   /// `spacing` along x, y, z; `steps` = 0: gold itself at the nodes. `curvature`: F lies about that many
   /// second differences below gold's interpolant, on average over a gold cell of the grid that is certified.
@@ -65,16 +65,19 @@ class LatticeFit {
   void fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin, float curvature);
   void fit_at_twice(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
                     int steps, float curvature);
+  [[nodiscard]] cl_int samples_each() const;
+  [[nodiscard]] opencl::Range parts_of_columns() const;
   void mark_last_steps(const std::vector<NodeBox>& wanted, int steps);
 
   opencl::State& state_;
+  opencl::Defines defines_;  // of fit_coefficients.cl
   const GoldBlocks& blocks_;
   LevelSamples level_;
   [[nodiscard]] cl_uint runs_between(std::int64_t low, std::int64_t high) const;
 
   std::vector<cl_uint> host_wanted_, host_needed_;
   std::vector<cl_int> host_last_;
-  opencl::DeviceArray<float> errors_, low_, high_;
+  opencl::DeviceArray<float> before_, errors_, low_, high_;
   opencl::DeviceArray<float> targets_, here_, there_;  // of fit_at_twice
   opencl::DeviceArray<cl_uint> wanted_;
   // Marked columns: of gold whose nodes take part, and of the lattice.

@@ -10,7 +10,8 @@
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/cell_test.hpp"
 #include "host/gold/node_slack.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
@@ -81,7 +82,7 @@ opencl::DeviceArray<cl_int4> GoldBatch::places(const std::vector<std::int64_t>& 
     const auto [b, x, y, z] = place(brick);
     out.push_back({{to_int(b), to_int(x), to_int(y), to_int(z)}});
   }
-  return {state_, std::span<const cl_int4>(out), "bricks to test"};
+  return opencl::copied<cl_int4>(state_, out, "bricks to test");
 }
 
 const LevelSamples& GoldBatch::lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
@@ -137,12 +138,13 @@ VdvrGoldShape GoldBatch::shape_on_device() const {
 }
 
 opencl::Defines GoldBatch::brick_nodes() const {
-  return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)}};
+  return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)},
+          {"VDVR_LANES", std::to_string(opencl::lanes_of(state_.info, 16))}};
 }
 
 void GoldBatch::take_addends(const std::vector<float>& addends, const GoldErrors& errors,
                              float of_curvature) {
-  addend_ = opencl::DeviceArray<float>(state_, std::span<const float>(addends), "what bricks add");
+  addend_ = opencl::copied<float>(state_, addends, "what bricks add");
   errors_ = errors;
   of_curvature_ = of_curvature;
   has_slack_ = false;
@@ -165,12 +167,11 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const Nod
                                              const opencl::DeviceArray<std::uint8_t>& selected, bool parts) {
   std::vector<cl_int4> firsts;
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
-  const opencl::DeviceArray<cl_int4> first(state_, std::span<const cl_int4>(firsts), "first bricks");
+  const auto first = opencl::copied<cl_int4>(state_, firsts, "first bricks");
   std::vector<float> tolerances(addend_.size(), static_cast<float>(tolerance.of_all));
   for (const std::int64_t brick : bricks_)
     tolerances[slot(brick)] = static_cast<float>(tolerance.of(at(brick)));
-  const opencl::DeviceArray<float> on_device(state_, std::span<const float>(tolerances),
-                                             "tolerances of bricks");
+  const auto on_device = opencl::copied<float>(state_, tolerances, "tolerances of bricks");
   const auto window = widened_window(errors_, settings_);
   const VdvrCellTest test{.z_first = to_int(shape_.z_first),
                           .z_last = to_int(shape_.z_last),
@@ -200,9 +201,18 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const Nod
   return out;
 }
 
+// On a CPU a work-item walks along a column, on a GPU it does a node of it.
+cl_int GoldBatch::nodes_each() const {
+  return opencl::items_along(state_.info) > 1
+             ? opencl::lanes_of(state_.info, 16)
+             : to_int(std::int64_t{settings_.granularity} * settings_.rate + 1);
+}
+
 opencl::Range GoldBatch::columns_of_bricks(std::uint64_t bricks) const {
-  const std::uint64_t nodes = count(std::int64_t{settings_.granularity} * settings_.rate + 1);
-  return {{nodes, nodes, bricks}, {nodes, 1, 1}};
+  const std::uint64_t nodes = count(std::int64_t{settings_.granularity} * settings_.rate + 1),
+                      each = count(std::int64_t{nodes_each()});
+  return opencl::in_groups(state_.info, {nodes * nodes * ((nodes + each - 1) / each), bricks, 1},
+                           {nodes, 1, 1});
 }
 
 std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& bricks) {
@@ -215,11 +225,11 @@ std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& 
   opencl::DeviceArray<cl_int> errors(state_, bricks.size() * count(std::int64_t{6} * most),
                                      "errors along axes");
   errors.fill(0);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_int, cl_int,
-                 cl_int, cl_int>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl::Buffer, cl::Buffer, VdvrGoldShape, cl_int,
+                 cl_int, cl_int, cl_int>
       kernel(state_, "gold/classify", "axis_errors", brick_nodes());
   kernel(columns_of_bricks(bricks.size()), errors.buffer(), on_device.buffer(),
-         to_int(static_cast<std::int64_t>(bricks.size())), gold_.buffer(), margin_.buffer(),
+         to_int(static_cast<std::int64_t>(bricks.size())), nodes_each(), gold_.buffer(), margin_.buffer(),
          shape_on_device(), to_int(levels[0]), to_int(levels[1]), to_int(levels[2]), most);
   const auto bits = errors.to_host();
   std::vector<AxisErrors> out(bricks.size());
@@ -238,12 +248,13 @@ std::vector<float> GoldBatch::errors_at(const LevelTriple& level, const std::vec
   const LevelSamples& samples = lattice(level, bricks);
   opencl::DeviceArray<cl_int> error(state_, bricks.size(), "brick errors");
   error.fill(-1);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
-                 VdvrGoldShape, VdvrLattice>
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
+                 cl::Buffer, VdvrGoldShape, VdvrLattice>
       level_error(state_, "gold/classify", "level_error", brick_nodes());
   level_error(columns_of_bricks(bricks.size()), error.buffer(), on_device.buffer(),
-              to_int(static_cast<std::int64_t>(bricks.size())), samples.along.buffer(), gold_.buffer(),
-              above_.buffer(), below_.buffer(), margin_.buffer(), shape_on_device(), samples.shape);
+              to_int(static_cast<std::int64_t>(bricks.size())), nodes_each(), samples.along.buffer(),
+              gold_.buffer(), above_.buffer(), below_.buffer(), margin_.buffer(), shape_on_device(),
+              samples.shape);
   std::vector<float> out;
   for (const cl_int b : error.to_host()) out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
   return out;
@@ -361,8 +372,7 @@ std::vector<float> GoldBatch::copy_tiles(const LevelTriple& level, const std::ve
     total += size;
   }
   const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
-  const opencl::DeviceArray<TileRequest> on_device(state_, std::span<const TileRequest>(requests),
-                                                   "tile requests");
+  const auto on_device = opencl::copied<TileRequest>(state_, requests, "tile requests");
   // Samples at the gold rate are gold, and gold lies as its own lattice would.
   const VdvrLattice gold{1,
                          1,

@@ -126,6 +126,8 @@ class GoldBatch {
   [[nodiscard]] Index3 spacing_of(const LevelTriple& level) const;
   /// Place in arrays per brick of the blocks, [block][z][y][x].
   [[nodiscard]] std::size_t slot(std::int64_t brick) const;
+  /// Nodes of a column that a work-item does, of kernels launched so.
+  [[nodiscard]] cl_int nodes_each() const;
   [[nodiscard]] opencl::Range columns_of_bricks(std::uint64_t bricks) const;
   [[nodiscard]] opencl::DeviceArray<cl_int4> places(const std::vector<std::int64_t>& bricks) const;
 

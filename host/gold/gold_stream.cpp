@@ -13,6 +13,7 @@
 #include "host/gold/gold_batch.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_blocks.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/volume/bricks.hpp"
@@ -280,9 +281,12 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
 
   const std::int64_t gold = (b.nx + 2 * halo_) * (b.ny + 2 * halo_), nodes = b.nx * b.ny * slab.stride;
   const std::int64_t per_block = 4 * (gold * b.gold_stride + 4 * nodes);
-  const std::int64_t together = std::clamp<std::int64_t>(
-      std::min<std::int64_t>(64 << 20, static_cast<std::int64_t>(state_.memory.left() / 3)) / per_block, 1,
-      static_cast<std::int64_t>(work.first.size()));
+  // Blocks that go together are told of, launched and asked for together; what fits them takes as much again.
+  const auto left = static_cast<std::int64_t>(state_.memory.left());
+  const std::int64_t bytes = std::max(std::min<std::int64_t>(64 << 20, left / 3),
+                                      std::min<std::int64_t>(256 << 20, left / 8)),
+                     together = std::clamp<std::int64_t>(bytes / per_block, 1,
+                                                         static_cast<std::int64_t>(work.first.size()));
   const std::uint64_t samples = count(together * gold * b.gold_stride + gold_room);
   if (batch.gold_.size() < samples) {
     batch.gold_ = {};  // before the next one is allocated
@@ -327,7 +331,7 @@ void GoldStream::run_blocks(Batch& batch, const Work& work, const std::vector<st
                   work.first.begin() + static_cast<std::ptrdiff_t>(begin + n)},
                  work.z, selected);
     batch.margins_ = margins(batch.first_brick_, nx, ny);
-    batch.margin_.write(batch.margins_);
+    opencl::write_later<float>(state_, batch.margin_, batch.margins_, "coverage margins");
     std::vector<GoldBox> boxes;
     for (std::size_t b = 0; b < n; ++b) boxes.push_back(box(work, work.first[begin + b]));
     source_->kept.fill(lattice_, boxes, batch.gold_, 0, block, batch.shape_.gold_stride);

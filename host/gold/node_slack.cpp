@@ -4,7 +4,8 @@
 #include <algorithm>
 
 #include "host/fbp/back_project.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/round_up.hpp"
 #include "host/volume/bricks.hpp"
@@ -51,7 +52,7 @@ void node_slack(opencl::State& state, const GoldSettings& settings, const SlackS
   for (const auto& f : first_brick)
     ends.push_back({{to_int(std::min(slab.cells_x, grid.cells[0] - f[0] * g) * rate),
                      to_int(std::min(slab.cells_y, grid.cells[1] - f[1] * g) * rate)}});
-  const opencl::DeviceArray<cl_int2> last(state, std::span<const cl_int2>(ends), "block ends");
+  const auto last = opencl::copied<cl_int2>(state, ends, "block ends");
   const std::uint64_t columns = count(b.count * b.nx * b.ny * slab.stride);
   opencl::DeviceArray<float> cells_above(state, columns, "cell slack above"),
       cells_below(state, columns, "cell slack below"),
@@ -62,23 +63,25 @@ void node_slack(opencl::State& state, const GoldSettings& settings, const SlackS
                bricks_y = to_int(shape.bricks[1]), side = to_int(g * rate);
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> expand(
-      state, "gold/node_slack", "expand_addend");
+      state, "gold/node_slack", "expand_addend", opencl::height_defines(state.info, 16));
   expand({{count(slab.stride), count(shape.bricks[0]), count(shape.bricks[1] * b.count)}, {16, 1, 1}},
          rows.buffer(), addend.buffer(), bricks_x, bricks_y, to_int(shape.bricks[2]), side, stride, blocks);
   const auto window = widened_window(shape.errors, settings);
-  const std::array<std::uint64_t, 3> local = column_tuning(state.info).local;
+  const opencl::Defines defines = opencl::height_defines(state.info, 16);
+  const std::int64_t lanes = opencl::lanes_of(state.info, 16);
+  const std::uint64_t heights = count((b.nz + lanes - 1) / lanes);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int, cl_float, cl_float, cl_float>
-      cell_slack(state, "gold/node_slack", "cell_slack");
-  cell_slack({{count((b.nz + 15) / 16), count(b.nx - 1), count((b.ny - 1) * b.count)}, local},
+      cell_slack(state, "gold/node_slack", "cell_slack", defines);
+  cell_slack(opencl::in_groups(state.info, {heights, count(b.nx - 1), count((b.ny - 1) * b.count)}),
              cells_above.buffer(), cells_below.buffer(), gold.buffer(), rows.buffer(), nx, ny, nz,
              to_int(b.halo), to_int(b.gold_stride), stride, side, bricks_x, bricks_y, blocks,
              settings.grid_only ? 0 : 1, settings.window ? 1 : 0, static_cast<cl_float>(window.first),
              static_cast<cl_float>(window.second), shape.curvature);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int,
                  cl_int, cl_int, cl_int, cl_int, cl_float, cl_int, cl_int>
-      nodes(state, "gold/node_slack", "node_slack");
-  nodes({{count((b.nz + 15) / 16), count(b.nx), count(b.ny * b.count)}, local}, above.buffer(),
+      nodes(state, "gold/node_slack", "node_slack", defines);
+  nodes(opencl::in_groups(state.info, {heights, count(b.nx), count(b.ny * b.count)}), above.buffer(),
         below.buffer(), cells_above.buffer(), cells_below.buffer(), margin.buffer(), last.buffer(), nx, ny,
         nz, to_int(b.halo), stride, blocks, b.lowest, to_int(b.z_first), to_int(b.z_last));
 }

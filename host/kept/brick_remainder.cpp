@@ -8,7 +8,8 @@
 #include <stdexcept>
 
 #include "host/fbp/back_project.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/system/round_up.hpp"
@@ -300,18 +301,19 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
                                  grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
                                                        static_cast<double>(rates_[1]),
                                  2 * lowest_)));
-  const opencl::DeviceArray<float> margin(state_, std::span<const float>(margins), "coverage margins");
+  const auto margin = opencl::copied<float>(state_, margins, "coverage margins");
   const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
                                        "fourth differences");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences> kernel(
-      state_, "kept/fourth_differences", "fourth_differences");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences, cl::LocalSpaceArg> kernel(
+      state_, "kept/fourth_differences", "fourth_differences", opencl::height_defines(state_.info, 8));
   const auto side = [&](std::size_t a) { return to_int(granularity_ * rates_[a]); };
   const auto [first_z, last_z] = heights_read(box);
-  kernel({{count(bricks[0]), count(bricks[1]), count(bricks[2])}, {1, 1, 1}}, out.buffer(), gold.buffer(),
-         margin.buffer(),
+  kernel(opencl::shared_groups(state_.info, {count(bricks[0]), count(bricks[1]), count(bricks[2])}),
+         out.buffer(), gold.buffer(), margin.buffer(),
          VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
                                side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
-                               static_cast<float>(lowest_)});
+                               static_cast<float>(lowest_)},
+         opencl::shared_room(state_.info));
   take({first, bricks}, out.to_host());
 }
 

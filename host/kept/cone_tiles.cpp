@@ -9,7 +9,7 @@
 #include "host/bounds/six_taps.hpp"
 #include "host/fbp/back_project.hpp"
 #include "host/fdk/region_parts.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
@@ -196,9 +196,12 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
   const std::int64_t of_tile = blocks.count() * table.views;
   const auto together = static_cast<std::size_t>(std::max<std::int64_t>(
       1, static_cast<std::int64_t>(most_view_bytes / sizeof(ViewNumbers<Real>)) / of_tile));
+  const int lanes = opencl::lanes_of(state_.info, to_int(heights));
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes> kernel(
       state_, "kept/cone_nodes", "cone_nodes",
-      {{"VDVR_DOUBLE", in_double_ ? "1" : "0"}, {"VDVR_UPRIGHT", upright_ ? "1" : "0"}});
+      {{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
+       {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
+       {"VDVR_LANES", std::to_string(lanes)}});
   for (std::size_t first = 0; first < page.first.size(); first += together) {
     const std::size_t n = std::min(together, page.first.size() - first);
     std::vector<ViewNumbers<Real>> numbers(n * at(of_tile));
@@ -225,8 +228,11 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
                                                        "views about blocks");
     const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
     shape.tiles = to_int(static_cast<std::int64_t>(n));
-    kernel({{count(side), count(lattice_.groups), n}, {1, 1, 1}}, page.out->buffer(), table.values.buffer(),
-           views.buffer(), ranges.buffer(), static_cast<cl_ulong>(first) * shape.tile, shape);
+    // On a CPU neighbours in y, which read the same columns and rows, follow one another.
+    kernel(opencl::in_groups(state_.info, {count(side), count(lattice_.groups * heights / lanes), n},
+                             {1, 1, 1}, 1),
+           page.out->buffer(), table.values.buffer(), views.buffer(), ranges.buffer(),
+           static_cast<cl_ulong>(first) * shape.tile, shape);
     opencl::finish(state_, "kept nodes");  // before the views' numbers go
   }
 }

@@ -11,10 +11,12 @@
 namespace vdvr {
 namespace {
 
-// Of the heights made of them: less is made that nobody asks for.
-constexpr std::uint64_t run_page_bytes = std::uint64_t{8} << 20;
+// Of the heights made of them, in bytes: less is made that nobody asks for, but each page that a box reads is
+// a launch. The larger one only as far as it is a small part of the memory that is left, and no more than
+// all.
+constexpr std::uint64_t least_run_page = std::uint64_t{8} << 20, most_run_page = std::uint64_t{64} << 20;
 // Floats on the way from heights to gold: boxes that fit are made together, and stay in caches.
-constexpr std::uint64_t floats_together = std::uint64_t{1} << 20;
+constexpr std::uint64_t floats_together = std::uint64_t{1} << 22;
 
 }  // namespace
 
@@ -66,8 +68,10 @@ void KeptGold::begin_run(std::int64_t low, std::int64_t heights) {
   const HeightWeights weights =
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
-  run.a_page = std::max<std::size_t>(
-      1, (scratch() ? page_bytes : run_page_bytes) / (4 * count(side * side * run.stride)));
+  const std::uint64_t a_tile = 4 * count(side * side * run.stride),
+                      page = std::clamp(state_.memory.left() / 16, least_run_page, most_run_page);
+  run.a_page = scratch() ? page_bytes / a_tile : std::min<std::size_t>(page / a_tile, tiles_.size());
+  run.a_page = std::max<std::size_t>(1, run.a_page);
   run.from_rows.emplace(state_, weights);
   run_ = std::move(run);
 }

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "host/opencl/column_tuning.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
+#include "host/opencl/write_later.hpp"
 #include "host/system/casts.hpp"
 
 namespace vdvr {
@@ -72,8 +73,8 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
 }
 
 AlongZ::AlongZ(opencl::State& state, const HeightWeights& weights)
-    : weights_(state, std::span<const float>(weights.weights), "weights of heights"),
-      first_(state, std::span<const cl_int>(weights.first), "first heights"),
+    : weights_(opencl::copied<float>(state, weights.weights, "weights of heights")),
+      first_(opencl::copied<cl_int>(state, weights.first, "first heights")),
       terms_(weights.terms),
       groups_(weights.groups()) {}
 
@@ -89,13 +90,14 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
     shape.columns_x = std::max(shape.columns_x, p.columns_x);
     shape.columns_y = std::max(shape.columns_y, p.columns_y);
   }
-  const opencl::DeviceArray<VdvrColumns> on_device(state, parts, "columns to interpolate");
+  const auto on_device = opencl::copied<VdvrColumns>(state, parts, "columns to interpolate");
   const int lanes = lanes_along_z(state);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
       state, "kept/interpolate", "along_z", defines(lanes, 1, 2));
-  kernel({{count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
-           count(std::int64_t{shape.columns_y} * shape.parts)},
-          {1, 4, 1}},
+  kernel(opencl::in_groups(state.info,
+                           {count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
+                            count(std::int64_t{shape.columns_y} * shape.parts)},
+                           {1, 4, 1}),
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
 }
 
@@ -109,8 +111,10 @@ void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   const int lanes = column_tuning(state.info).lanes;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(state, "kept/interpolate", "across",
                                                                         defines(lanes, phases_, taps_));
-  kernel({{count(shape.z / lanes), count(shape.others), count(std::int64_t{shape.intervals} * shape.boxes)},
-          {1, 4, 4}},
+  kernel(opencl::in_groups(state.info,
+                           {count(shape.z / lanes), count(shape.others),
+                            count(std::int64_t{shape.intervals} * shape.boxes)},
+                           {1, 4, 4}),
          out.buffer(), in.buffer(), weights_.buffer(), shape);
 }
 

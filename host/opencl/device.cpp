@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cctype>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -76,7 +78,21 @@ std::uint64_t MemoryAccount::limit() const {
   return limit_;
 }
 
+namespace {
+
+// Small buffers come in sizes that many share: an allocation of one's own costs as much as a small kernel.
+constexpr std::uint64_t large_buffer = std::uint64_t{1} << 20;
+std::uint64_t pooled_size(std::uint64_t bytes) {
+  return bytes >= large_buffer ? bytes : std::bit_ceil(std::max<std::uint64_t>(bytes, 256));
+}
+// Of a handful of large ones, and of the small ones together, the pool keeps no more.
+constexpr std::size_t most_large = 12;
+constexpr std::uint64_t most_small_bytes = std::uint64_t{32} << 20;
+
+}  // namespace
+
 cl::Buffer BufferPool::take(std::uint64_t bytes) {
+  bytes = pooled_size(bytes);
   const auto found = buffers_.find(bytes);
   if (found == buffers_.end()) return {};
   cl::Buffer buffer = std::move(found->second);
@@ -86,9 +102,15 @@ cl::Buffer BufferPool::take(std::uint64_t bytes) {
 }
 
 void BufferPool::keep(std::uint64_t bytes, cl::Buffer buffer) {
-  // Small buffers cost nothing to make; a handful of large ones is all that a stage repeats.
-  if (bytes < (1u << 20)) return;
-  if (buffers_.size() >= 12) clear();
+  bytes = pooled_size(bytes);
+  const auto large = buffers_.lower_bound(large_buffer);
+  if (bytes >= large_buffer) {
+    if (static_cast<std::size_t>(std::distance(large, buffers_.end())) >= most_large) clear();
+  } else {
+    std::uint64_t small = bytes;
+    for (auto b = buffers_.begin(); b != large; ++b) small += b->first;
+    if (small > most_small_bytes) clear();
+  }
   buffers_.emplace(bytes, std::move(buffer));
   bytes_ += bytes;
 }
@@ -111,7 +133,7 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   memory.take(bytes, what, pool_.bytes());
   if (buffer() != nullptr) return buffer;
   try {
-    return cl::Buffer(context, CL_MEM_READ_WRITE, bytes);
+    return cl::Buffer(context, CL_MEM_READ_WRITE, pooled_size(bytes));
   } catch (const cl::Error& e) {
     memory.give(bytes);
     throw ResourceError(

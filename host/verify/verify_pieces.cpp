@@ -4,14 +4,14 @@
 #include <bit>
 #include <cmath>
 
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
 #include "shared/verify_pieces.h"
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrPieces) == 64);
+static_assert(sizeof(VdvrPieces) == 68);
 
 VerifyField::Batch VerifyField::make_batch(const Shape& s,
                                            std::span<const std::array<std::int64_t, 2>> blocks,
@@ -142,7 +142,10 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   opencl::DeviceArray<cl_float8> fourth(state_, count(n * side), "fourth differences");
   opencl::DeviceArray<cl_int4> columns(state_, count(n * s.cells * s.cells), "columns of gold cells");
   opencl::DeviceArray<cl_uint> bits(state_, count(n * s.cells * s.cells * s.words), "tested gold cells");
+  bits.fill(0);
   const Layers layers = covered_cells(s);
+  // On a CPU a work-item walks along a column.
+  const cl_int each = opencl::items_along(state_.info) > 1 ? 1 : to_int(side);
   const VdvrPieces pieces{to_int(n),
                           to_int(s.rate),
                           to_int(s.cells),
@@ -158,16 +161,22 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
                           window_ ? 1 : 0,
                           window_ ? std::nextafter(static_cast<float>(window_->first), -INFINITY) : 0.0f,
                           window_ ? std::nextafter(static_cast<float>(window_->second), INFINITY) : 0.0f,
-                          s.correction};
+                          s.correction,
+                          each};
+  opencl::Defines defines = stored_.defines;
+  for (const auto& define : opencl::height_defines(state_.info, 16)) defines.push_back(define);
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces>
-      errors(state_, "verify/verify_pieces", "verify_errors", stored_.defines);
-  errors({{count(side), count(side), count(n)}, {count(side), 1, 1}}, error.buffer(), values.buffer(),
-         stored_.samples.buffer(), stored_.bricks.buffer(), grid, items.buffer(), first.buffer(), pieces);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces> fourths(
-      state_, "verify/verify_pieces", "verify_fourth", stored_.defines);
-  fourths({{count(side), count(n), 1}, {1, 1, 1}}, fourth.buffer(), values.buffer(), tested.buffer(), grid,
-          items.buffer(), first.buffer(), pieces);
+      errors(state_, "verify/verify_pieces", "verify_errors", defines);
+  errors(opencl::in_groups(state_.info, {count((side + each - 1) / each), count(side * side), count(n)},
+                           {1, count(side), 1}),
+         error.buffer(), values.buffer(), stored_.samples.buffer(), stored_.bricks.buffer(), grid,
+         items.buffer(), first.buffer(), pieces);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer, VdvrPieces,
+                 cl::LocalSpaceArg>
+      fourths(state_, "verify/verify_pieces", "verify_fourth", defines);
+  fourths(opencl::shared_groups(state_.info, {1, count(side), count(n)}), fourth.buffer(), values.buffer(),
+          tested.buffer(), grid, items.buffer(), first.buffer(), pieces, opencl::shared_room(state_.info));
 
   const std::vector<cl_float8> rows = fourth.to_host();
   std::vector<double> constants(at(n));
@@ -185,11 +194,11 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
                                                    "constants of pieces");
 
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrGrid, cl::Buffer, cl::Buffer,
-                 cl::Buffer, VdvrPieces>
-      cells(state_, "verify/verify_pieces", "verify_cells", stored_.defines);
-  cells({{count(s.cells), count(s.cells), count(n)}, {count(s.cells), 1, 1}}, columns.buffer(), bits.buffer(),
-        error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
-        device_widening.buffer(), pieces);
+                 cl::Buffer, VdvrPieces, cl::LocalSpaceArg>
+      cells(state_, "verify/verify_pieces", "verify_cells", defines);
+  cells(opencl::shared_groups(state_.info, {1, count(s.cells * s.cells), count(n)}), columns.buffer(),
+        bits.buffer(), error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
+        device_widening.buffer(), pieces, opencl::shared_room(state_.info));
 
   std::vector<Column> host(at(n * s.cells * s.cells));
   {

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <numbers>
 
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/witness/verify_cosines.hpp"
@@ -269,8 +269,10 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                      all = static_cast<std::int64_t>(tiles.size()),
                      together = std::max<std::int64_t>(
                          1, static_cast<std::int64_t>(most_numbers / sizeof(ViewNumbers)) / of_tile);
+  const int lanes = opencl::lanes_of(state_.info, VDVR_VERIFY_CONE_HEIGHTS);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyCone> kernel(
-      state_, "witness/verify_cone", "verify_cone", {{"VDVR_UPRIGHT", upright_ ? "1" : "0"}});
+      state_, "witness/verify_cone", "verify_cone",
+      {{"VDVR_UPRIGHT", upright_ ? "1" : "0"}, {"VDVR_LANES", std::to_string(lanes)}});
   std::mutex lock;
   for (std::int64_t first = 0; first < all; first += together) {
     const std::int64_t n = std::min(together, all - first);
@@ -321,10 +323,10 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                                .blocks = to_int(blocks),
                                .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
-    const std::int64_t groups = up(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / VDVR_VERIFY_CONE_HEIGHTS;
-    kernel(
-        {{count(groups), count(tile), count(n)}, {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}},
-        nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
+    const std::int64_t groups = up(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
+    kernel(opencl::in_groups(state_.info, {count(groups), count(tile), count(n)},
+                             {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}),
+           nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
     opencl::finish(state_, "nodes of the field to verify against");  // before the numbers go
   }
 }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/opencl/kernel.hpp"
+#include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/witness/verify_cosines.hpp"
@@ -192,7 +192,8 @@ void VerifyNodes::make_cone_nodes(const Part& part) {
 void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
   const std::int64_t K = field_.geometry().views();
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
-      state_, "witness/verify_nodes", "verify_nodes");
+      state_, "witness/verify_nodes", "verify_nodes", opencl::height_defines(state_.info, to_int(lanes)));
+  const std::uint64_t in_row = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
   for (std::int64_t first = 0; first < K; first += table.views) {
     fill(table, first_row, first);
     const VdvrVerifyRows rows{.accumulate = first > 0 ? 1 : 0,
@@ -204,8 +205,8 @@ void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
                               .nx = to_int(tile_columns_ * tile),
                               .rows_padded = to_int(rows_padded_),
                               .first_row = to_int(first_row)};
-    kernel({{count(tile), tiles_->size(), 1}, {count(tile), 1, 1}}, nodes_->buffer(), table.device.buffer(),
-           steps_->buffer(), tiles_->buffer(), rows);
+    kernel(opencl::in_groups(state_.info, {in_row, count(tile), tiles_->size()}, {1, count(tile), 1}),
+           nodes_->buffer(), table.device.buffer(), steps_->buffer(), tiles_->buffer(), rows);
   }
 }
 
@@ -271,8 +272,10 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
                                                    "blocks of gold to verify");
   const opencl::DeviceArray<cl_int4> bands(state_, std::span<const cl_int4>(h.bands), "heights to verify");
   const opencl::DeviceArray<float> weights(state_, std::span<const float>(h.weights), "product along z");
+  const opencl::Defines defines = opencl::height_defines(state_.info, to_int(lanes));
+  const std::uint64_t in_group = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights> along(
-      state_, "witness/verify_nodes", "verify_heights");
+      state_, "witness/verify_nodes", "verify_heights", defines);
   const VdvrVerifyHeights shape{.blocks = to_int(blocks),
                                 .nx = to_int(n),
                                 .ny = to_int(n),
@@ -280,8 +283,9 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
                                 .all_x = to_int(tile_columns_ * tile),
                                 .all_y = to_int(tiles_across(part_.ny) * tile),
                                 .rows_padded = to_int(rows_padded_)};
-  const opencl::Range heights{{count(groups), count((n + 7) / 8), count(n * blocks)},
-                              {count(groups), count((n + 7) / 8), 1}};
+  const opencl::Range heights =
+      opencl::in_groups(state_.info, {in_group * count(groups), count((n + 7) / 8), count(n * blocks)},
+                        {count(groups), count((n + 7) / 8), 1});
   if (factor == 1) {
     along(heights, values.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(),
           device_places.buffer(), shape);
@@ -295,7 +299,7 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
   const LagrangeFilter filter = lagrange_filter(to_int(factor));
   const opencl::DeviceArray<float> taps(state_, std::span<const float>(filter.weights), "Lagrange's weights");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(
-      state_, "witness/verify_nodes", "verify_between");
+      state_, "witness/verify_nodes", "verify_between", defines);
   // Blocks begin two places before a node.
   const auto pass = [&](const auto& out, const auto& in, std::int64_t outer, std::int64_t inner,
                         std::uint64_t together) {
@@ -306,8 +310,9 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
                               .factor = to_int(factor),
                               .node = to_int(before),
                               .phase = to_int(factor - 2)};
-    between({{count(inner), count(b.nx), count(outer)}, {count(inner), together, 1}}, out.buffer(),
-            in.buffer(), taps.buffer(), s);
+    between(opencl::in_groups(state_.info, {in_group * count(inner), count(b.nx), count(outer)},
+                              {count(inner), together, 1}),
+            out.buffer(), in.buffer(), taps.buffer(), s);
   };
   pass(second, first, blocks, n * groups, 1);
   pass(values, second, blocks * b.nx, groups, count(b.nx));

@@ -1,7 +1,9 @@
-// One work-item carries VDVR_LANES samples of z: the vector type, and its aligned loads and stores. Tuning;
-// never changes the result. With VDVR_DOUBLE 1 also a vector of sums in double precision, made of samples by
-// WIDE and rounded to samples by NARROW; without it sums are as samples. Included by back_project.cl,
-// batched_product.cl and filter_rows.cl.
+// One work-item carries VDVR_LANES heights: the vector type VEC, INT of its comparisons, INDEX of its lanes,
+// TO_INT and TO_VEC, aligned loads and stores LOAD and STORE, others READ and WRITE, the LARGEST of its
+// lanes, LANE(v, n), one of them, and FOR_LANES(M), M(n) of each, n a hexadecimal digit. Where a work-group
+// shares a column or a brick, VDVR_ALONG work-items of it lie along z (device/shared_column.h). Tuning;
+// neither changes the result. With VDVR_DOUBLE 1 also a vector of sums in double precision, made of samples
+// by WIDE and rounded to samples by NARROW; without it sums are as samples.
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
@@ -9,23 +11,67 @@
 
 #if VDVR_LANES == 1
 #define VEC float
+#define INT int
+#define INDEX 0
+#define LANE(v, n) (v)
+#define TO_INT(v) convert_int(v)
+#define TO_VEC(v) convert_float(v)
 #define LOAD(p) (*(p))
 #define STORE(v, p) (*(p) = (v))
+#define READ(p) (*(p))
+#define WRITE(v, p) (*(p) = (v))
+#define LARGEST(v) (v)
+#define FOR_LANES(M) M(0)
 #elif VDVR_LANES == 4
 #define VEC float4
+#define INT int4
+#define INDEX (int4)(0, 1, 2, 3)
+#define LANE(v, n) (v).s##n
+#define TO_INT(v) convert_int4(v)
+#define TO_VEC(v) convert_float4(v)
 #define LOAD(p) vload4(0, p)
 #define STORE(v, p) vstore4(v, 0, p)
+#define READ(p) vload4(0, p)
+#define WRITE(v, p) vstore4(v, 0, p)
+#define LARGEST(v) largest_of_4(v)
+#define FOR_LANES(M) M(0) M(1) M(2) M(3)
 #elif VDVR_LANES == 8
 #define VEC float8
+#define INT int8
+#define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
+#define LANE(v, n) (v).s##n
+#define TO_INT(v) convert_int8(v)
+#define TO_VEC(v) convert_float8(v)
 #define LOAD(p) vload8(0, p)
 #define STORE(v, p) vstore8(v, 0, p)
-#elif VDVR_LANES != 16
-#error "VDVR_LANES must be 1, 4, 8 or 16"
-#else
+#define READ(p) vload8(0, p)
+#define WRITE(v, p) vstore8(v, 0, p)
+#define LARGEST(v) largest_of_8(v)
+#define FOR_LANES(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+#elif VDVR_LANES == 16
 #define VEC float16
+#define INT int16
+#define INDEX (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define LANE(v, n) (v).s##n
+#define TO_INT(v) convert_int16(v)
+#define TO_VEC(v) convert_float16(v)
 #define LOAD(p) (*(__global const float16*)(p))
 #define STORE(v, p) (*(__global float16*)(p) = (v))
+#define READ(p) vload16(0, p)
+#define WRITE(v, p) vstore16(v, 0, p)
+#define LARGEST(v) largest_of_16(v)
+#define FOR_LANES(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7) M(8) M(9) M(a) M(b) M(c) M(d) M(e) M(f)
+#else
+#error "VDVR_LANES must be 1, 4, 8 or 16"
 #endif
+
+#define ALWAYS_INLINE __attribute__((always_inline))
+static inline ALWAYS_INLINE float largest_of_4(float4 v) {
+  const float2 a = fmax(v.lo, v.hi);
+  return fmax(a.x, a.y);
+}
+static inline ALWAYS_INLINE float largest_of_8(float8 v) { return largest_of_4(fmax(v.lo, v.hi)); }
+static inline ALWAYS_INLINE float largest_of_16(float16 v) { return largest_of_8(fmax(v.lo, v.hi)); }
 
 #ifndef VDVR_DOUBLE
 #define VDVR_DOUBLE 0

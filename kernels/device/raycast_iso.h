@@ -145,13 +145,12 @@ RAY_INLINE Box pass_cells(FIELD, BRICKS, VdvrGrid grid, const VdvrRaycast* p, co
   const V3 low = cell.low;
   const Box box = box_between(
       ray, low, v3(low.x + 1.0f / cell.scale.x, low.y + 1.0f / cell.scale.y, low.z + 1.0f / cell.scale.z));
-  Octet octet;
 #ifdef VDVR_SAMPLER_IMAGE3D
+  Octet octet = {(V)(0.0f)};  // the texture unit is asked, not these
   const I worth = active;
 #else
-  const Octet corners = {sampled->s000, sampled->s001, sampled->s010, sampled->s011,
-                         sampled->s100, sampled->s101, sampled->s110, sampled->s111};
-  octet = corners;
+  Octet octet = {sampled->s000, sampled->s001, sampled->s010, sampled->s011,
+                 sampled->s100, sampled->s101, sampled->s110, sampled->s111};
   V lo, hi;
   octet_range(&octet, &lo, &hi);
   const I worth = active & ((side_of(p, lo - p->slack) != *was) | (side_of(p, hi + p->slack) != *was));

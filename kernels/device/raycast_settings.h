@@ -28,9 +28,9 @@
 
 // Calls in the sampling loop cost as much as a sample; compilers without the attribute inline anyway.
 #if defined(__clang__) || defined(__GNUC__)
-#define RAY_INLINE inline __attribute__((always_inline))
+#define RAY_INLINE static inline __attribute__((always_inline))
 #else
-#define RAY_INLINE inline
+#define RAY_INLINE static inline
 #endif
 
 #endif

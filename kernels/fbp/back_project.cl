@@ -49,7 +49,7 @@
   M(a0, s0, 0, 0)   \
   M(a1, s1, 1, 0)   \
   M(a2, s2, 2, 0) M(a3, s3, 3, 0) M(b0, s4, 0, 1) M(b1, s5, 1, 1) M(b2, s6, 2, 1) M(b3, s7, 3, 1)
-#define LANE(v, i) v.i
+#define OF_TILE(v, i) v.i
 // -1 where true, as vectors have it.
 #define IS_LESS(a, b) ((a) < (b))
 #elif VDVR_TILE == 1
@@ -62,7 +62,7 @@
 #define OFFSET_X 0.0f
 #define OFFSET_Y 0.0f
 #define FOR_TILE(M) M(a0, s0, 0, 0)
-#define LANE(v, i) v
+#define OF_TILE(v, i) v
 #define IS_LESS(a, b) (-((a) < (b)))
 #else
 #error "VDVR_TILE is 1 or 8"
@@ -75,34 +75,34 @@
   if (VDVR_VECTORS == 2) high = fma((VEC)(w), LOAD((q) + above), high);
 #if VDVR_TAPS == 6
 // A view's six products apart: a term meets five additions there, and then one for each view of the run.
-#define ADD(sum, i, c, r)                                               \
-  {                                                                     \
-    __global const float* q = plane + LANE(at, i);                      \
-    VEC low = (VEC)(LANE(w0, i)) * LOAD(q), high = low;                 \
-    if (VDVR_VECTORS == 2) high = (VEC)(LANE(w0, i)) * LOAD(q + above); \
-    TAP(LANE(w1, i), q + 16, low, high)                                 \
-    TAP(LANE(w2, i), q + 32, low, high)                                 \
-    TAP(LANE(w3, i), q + 48, low, high)                                 \
-    TAP(LANE(w4, i), q + 64, low, high)                                 \
-    TAP(LANE(w5, i), q + 80, low, high)                                 \
-    sum##_low += low;                                                   \
-    if (VDVR_VECTORS == 2) sum##_high += high;                          \
+#define ADD(sum, i, c, r)                                                  \
+  {                                                                        \
+    __global const float* q = plane + OF_TILE(at, i);                      \
+    VEC low = (VEC)(OF_TILE(w0, i)) * LOAD(q), high = low;                 \
+    if (VDVR_VECTORS == 2) high = (VEC)(OF_TILE(w0, i)) * LOAD(q + above); \
+    TAP(OF_TILE(w1, i), q + 16, low, high)                                 \
+    TAP(OF_TILE(w2, i), q + 32, low, high)                                 \
+    TAP(OF_TILE(w3, i), q + 48, low, high)                                 \
+    TAP(OF_TILE(w4, i), q + 64, low, high)                                 \
+    TAP(OF_TILE(w5, i), q + 80, low, high)                                 \
+    sum##_low += low;                                                      \
+    if (VDVR_VECTORS == 2) sum##_high += high;                             \
   }
 #elif VDVR_TAPS == 4
-#define ADD(sum, i, c, r)                           \
-  {                                                 \
-    __global const float* q = plane + LANE(at, i);  \
-    TAP(LANE(w0, i), q, sum##_low, sum##_high)      \
-    TAP(LANE(w1, i), q + 16, sum##_low, sum##_high) \
-    TAP(LANE(w2, i), q + 32, sum##_low, sum##_high) \
-    TAP(LANE(w3, i), q + 48, sum##_low, sum##_high) \
+#define ADD(sum, i, c, r)                              \
+  {                                                    \
+    __global const float* q = plane + OF_TILE(at, i);  \
+    TAP(OF_TILE(w0, i), q, sum##_low, sum##_high)      \
+    TAP(OF_TILE(w1, i), q + 16, sum##_low, sum##_high) \
+    TAP(OF_TILE(w2, i), q + 32, sum##_low, sum##_high) \
+    TAP(OF_TILE(w3, i), q + 48, sum##_low, sum##_high) \
   }
 #else
-#define ADD(sum, i, c, r)                           \
-  {                                                 \
-    __global const float* q = plane + LANE(at, i);  \
-    TAP(LANE(w0, i), q, sum##_low, sum##_high)      \
-    TAP(LANE(w1, i), q + 16, sum##_low, sum##_high) \
+#define ADD(sum, i, c, r)                              \
+  {                                                    \
+    __global const float* q = plane + OF_TILE(at, i);  \
+    TAP(OF_TILE(w0, i), q, sum##_low, sum##_high)      \
+    TAP(OF_TILE(w1, i), q + 16, sum##_low, sum##_high) \
   }
 #endif
 // Where a tile keeps the sums of its runs: [column][vector].

@@ -7,40 +7,10 @@
 // [block][brick z][brick y][brick x]. A brick's results are those of its own cells, in whatever block they
 // are computed. Called by host/gold/cell_test.cpp.
 #include "device/lanes.h"
-#include "device/largest.h"
 #include "device/powers.h"
 #include "shared/cell_test.h"
 #include "shared/gold_shape.h"
 #include "shared/mixed_sampler.h"
-
-#if VDVR_LANES == 1
-#define READ(p) (*(p))
-#define WRITE(v, p) (*(p) = (v))
-#define INT int
-#define INDEX 0
-#define LARGEST(v) (v)
-#elif VDVR_LANES == 4
-#define READ(p) vload4(0, p)
-#define WRITE(v, p) vstore4(v, 0, p)
-#define INT int4
-#define INDEX (int4)(0, 1, 2, 3)
-#define LARGEST(v) fmax(fmax((v).x, (v).y), fmax((v).z, (v).w))
-#elif VDVR_LANES == 8
-#define READ(p) vload8(0, p)
-#define WRITE(v, p) vstore8(v, 0, p)
-#define INT int8
-#define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
-#define LARGEST(v) largest_of_8(v)
-#else
-#define READ(p) vload16(0, p)
-#define WRITE(v, p) vstore16(v, 0, p)
-#define INT int16
-#define INDEX (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-#define LARGEST(v) largest_of_16(v)
-#endif
-
-// What goes through memory is a third of the time.
-#define ALWAYS_INLINE __attribute__((always_inline))
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
@@ -288,8 +258,19 @@ int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, 
   return parts;
 }
 
-// One work-item does VDVR_LANES heights of a brick. violated: the failing parts, where test.parts asks for
-// them.
+// Cells along x of a work-item. Few, so that what it keeps of the row before stays in registers, or all of a
+// brick: then no column is looked at twice.
+#ifndef VDVR_CELLS_X
+#define VDVR_CELLS_X VDVR_BRICK_NODES
+#endif
+#if VDVR_CELLS_X < VDVR_BRICK_NODES
+#define UNROLL_X _Pragma("unroll")
+#else
+#define UNROLL_X
+#endif
+
+// One work-item does VDVR_LANES heights of VDVR_CELLS_X cells along x of a brick. violated: the failing
+// parts, where test.parts asks for them.
 __kernel void cell_test(volatile __global int* total, volatile __global int* error,
                         volatile __global int* slack_max, volatile __global int* violated,
                         __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
@@ -298,11 +279,13 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                         __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
                         VdvrCellTest test) {
   const int begin = (int)get_global_id(0) * VDVR_LANES;
-  const int bricks_across = (int)get_global_id(1), by = bricks_across / s.bricks_x;
+  const int runs_x = (VDVR_BRICK_NODES + VDVR_CELLS_X - 1) / VDVR_CELLS_X,
+            bricks_across = (int)get_global_id(1) / runs_x, by = bricks_across / s.bricks_x,
+            first_x = ((int)get_global_id(1) - bricks_across * runs_x) * VDVR_CELLS_X;
   Place p;
   if (!find_place(&p, bricks_across - by * s.bricks_x, by, (int)get_global_id(2), gold, margin, bricks, grid,
                   first_brick, selected, s) ||
-      begin >= p.last_z)
+      begin >= p.last_z || first_x >= p.last_x)
     return;
   const float tolerance = tolerances[p.slot];
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
@@ -312,7 +295,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
             end_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last) & inside;
   VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
   int parts = 0;
-  Corners before[VDVR_BRICK_NODES];
+  Corners before[VDVR_CELLS_X];
 #if VDVR_LANES == 8
   const bool by_planes = (s.rate << grid.coarse_z) >> p.brick.level_z >= 4;
   Planes f;
@@ -320,7 +303,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
 #endif
   for (int iy = 0; iy <= p.last_y; ++iy) {
     Corners left;
-    __global const float* c = p.gold + (size_t)iy * p.row * s.gold_stride + begin;
+    __global const float* c = p.gold + ((size_t)iy * p.row + first_x) * s.gold_stride + begin;
     Ends gold_before = gold_at(c - to_x), gold = gold_at(c);
 #if VDVR_LANES == 8
     // Samples below and above this row, at the near and the far end of an interval of columns.
@@ -338,7 +321,10 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + 1);
     }
 #endif
-    for (int ix = 0; ix <= p.last_x; ++ix) {
+    UNROLL_X
+    for (int cell_x = 0; cell_x <= VDVR_CELLS_X; ++cell_x) {
+      const int ix = first_x + cell_x;
+      if (ix > p.last_x) break;
       const size_t column = (size_t)iy * p.row + ix;
       const int tested = p.margin[column] >= s.lowest;
       const Ends gold_after = gold_at(c + to_x);
@@ -377,10 +363,10 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       c += to_x;
       gold_before = gold;
       gold = gold_after;
-      if (ix > 0) {
+      if (cell_x > 0) {
         const Corners face = larger(left, here);
         if (iy > 0) {
-          const Corners all = larger(before[ix - 1], face);
+          const Corners all = larger(before[cell_x - 1], face);
           VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * test.curvature + rest,
               above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * test.curvature + rest;
           // Whatever is no number here is no bound.
@@ -409,7 +395,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           }
           largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));
         }
-        before[ix - 1] = face;
+        before[cell_x - 1] = face;
       }
       left = here;
     }

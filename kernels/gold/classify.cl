@@ -1,7 +1,7 @@
 // The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
 // chosen tiles. Layouts as in node_slack.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
 // samples every (rate * 2^coarsening >> l)-th gold node. Called by host/gold/gold_batch.cpp.
-#include "device/largest.h"
+#include "device/lanes.h"
 #include "device/powers.h"
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
@@ -9,25 +9,39 @@
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
-// The level's interpolant less gold at 16 nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                                     \
-  (fma((float16)(1.0f - fy),                                                                            \
-       fma((float16)(1.0f - fx), vload16(0, a + (z)), fx * vload16(0, a + s.gold_stride + (z))),        \
-       fy * fma((float16)(1.0f - fx), vload16(0, b + (z)), fx * vload16(0, b + s.gold_stride + (z)))) - \
-   vload16(0, gold_column + (z)))
+// The level's interpolant less gold at VDVR_LANES nodes of one column, or gold itself at 1x spacing.
+#define ERROR_AT(z)                                                                                \
+  (fma((VEC)(1.0f - fy), fma((VEC)(1.0f - fx), READ(a + (z)), fx * READ(a + s.gold_stride + (z))), \
+       fy * fma((VEC)(1.0f - fx), READ(b + (z)), fx * READ(b + s.gold_stride + (z)))) -            \
+   READ(gold_column + (z)))
 
 // Raises error[i] to the largest that |interpolant - F| may be at the closed nodes of the brick bricks[i]:
 // its block, and its place x, y, z in it. It starts negative and stays so where no node of a brick is tested.
-// Positive floats order as their bits do. One work-item does one column of one brick.
-__kernel void level_error(volatile __global int* error, __global const int4* bricks, int count,
+// Positive floats order as their bits do. One work-item does `each` nodes of a column of a
+// brick; nodes, or runs of them, follow one another along z, then x, then y.
+typedef struct {
+  int i, block, x, y, bz;  // of the bricks; in them all; nodes of the block
+  int from;                // node of the brick
+} Column;
+static inline bool find_column(Column* c, __global const int4* bricks, int count, int each, VdvrGoldShape s) {
+  const int side = VDVR_BRICK_NODES + 1, parts = (side + each - 1) / each, n = (int)get_global_id(0);
+  c->i = (int)get_global_id(1);
+  if (n >= parts * side * side || c->i >= count) return false;
+  const int column = n / parts, row = column / side;
+  c->from = (n - column * parts) * each;
+  c->block = bricks[c->i].s0;
+  c->x = bricks[c->i].s1 * VDVR_BRICK_NODES + column - row * side;
+  c->y = bricks[c->i].s2 * VDVR_BRICK_NODES + row;
+  c->bz = bricks[c->i].s3;
+  return c->x < s.nx && c->y < s.ny;
+}
+__kernel void level_error(volatile __global int* error, __global const int4* bricks, int count, int each,
                           __global const float* along, __global const float* gold,
                           __global const float* above, __global const float* below,
                           __global const float* margin, VdvrGoldShape s, VdvrLattice l) {
-  const int i = (int)get_global_id(2);
-  if (get_global_id(0) > VDVR_BRICK_NODES || get_global_id(1) > VDVR_BRICK_NODES || i >= count) return;
-  const int block = bricks[i].s0, x = bricks[i].s1 * VDVR_BRICK_NODES + (int)get_global_id(0),
-            y = bricks[i].s2 * VDVR_BRICK_NODES + (int)get_global_id(1), bz = bricks[i].s3;
-  if (x >= s.nx || y >= s.ny) return;
+  Column c;
+  if (!find_column(&c, bricks, count, each, s)) return;
+  const int i = c.i, block = c.block, x = c.x, y = c.y;
   const size_t column = ((size_t)block * s.ny + y) * s.nx + x;
   const size_t gold_at =
       ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo;
@@ -36,7 +50,7 @@ __kernel void level_error(volatile __global int* error, __global const int4* bri
             iy = min(y / l.spacing_y, (s.ny - 1) / l.spacing_y - 1);
   const float fx = (float)(x - ix * l.spacing_x) * inverse_of_power(l.spacing_x),
               fy = (float)(y - iy * l.spacing_y) * inverse_of_power(l.spacing_y);
-  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
+  const int first = c.bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
   __global const float* a =
       along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * s.gold_stride + s.halo +
       first;
@@ -45,20 +59,22 @@ __kernel void level_error(volatile __global int* error, __global const int4* bri
   __global const float *above_column = above + column * s.stride + first,
                        *below_column = below + column * s.stride + first;
 
-  // Whole runs of 16, then the rest lane by lane (UNTESTED lanes beyond the block are negative).
+  // Whole runs of lanes, then the rest one by one: beyond the block lies what no lane may count.
   float largest = -1.0f;
-  int z = 0;
-  for (; z + 16 <= last - first + 1; z += 16) {
-    const float16 e = ERROR_AT(z);
-    largest = fmax(largest,
-                   largest_of_16(fmax(e + vload16(0, below_column + z), vload16(0, above_column + z) - e)));
+  int z = c.from;
+  const int end = min(z + each, last - first + 1);
+  for (; z + VDVR_LANES <= end; z += VDVR_LANES) {
+    const VEC e = ERROR_AT(z);
+    largest = fmax(largest, LARGEST(fmax(e + READ(below_column + z), READ(above_column + z) - e)));
   }
-  for (; z <= last - first; ++z) {
+#if VDVR_LANES > 1
+  for (; z < end; ++z) {
     const float v = fma(1.0f - fy, fma(1.0f - fx, a[z], fx * a[s.gold_stride + z]),
                         fy * fma(1.0f - fx, b[z], fx * b[s.gold_stride + z]));
     const float e = v - gold_column[z];
     largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
   }
+#endif
   if (largest >= 0.0f && as_int(largest) > error[i]) atomic_max(error + i, as_int(largest));
 }
 
@@ -82,53 +98,53 @@ static inline int level_of_middle(int i, int levels) {
 }
 // Half the spacing of that level, in nodes; at a base sample that of the finest, which is read and not used.
 static inline int half_of(int level, int levels) { return 1 << max(levels - 1 - level, 0); }
-__kernel void axis_errors(volatile __global int* errors, __global const int4* bricks, int count,
+#define FOR_LEVELS(M) M(0) M(1) M(2) M(3) M(4) M(5)
+#define NOTHING_Z(l) VEC plus_z##l = none, minus_z##l = none;
+#define TAKE_Z(l)                                                                                 \
+  if (l < levels_z) {                                                                             \
+    const int half_z = 1 << (levels_z - 1 - l);                                                   \
+    const VEC ez = select(fma((VEC)(0.5f), READ(at - half_z) + READ(at + half_z), -centre), none, \
+                          outside | ((node & (2 * half_z - 1)) != half_z));                       \
+    plus_z##l = fmax(plus_z##l, ez);                                                              \
+    minus_z##l = fmax(minus_z##l, -ez);                                                           \
+  }
+#define RAISE_Z(l) \
+  if (l < levels_z) raise_pair(out + 2 * (2 * most_levels + l), LARGEST(plus_z##l), LARGEST(minus_z##l));
+// As level_error. levels_z: six at most.
+__kernel void axis_errors(volatile __global int* errors, __global const int4* bricks, int count, int each,
                           __global const float* gold, __global const float* margin, VdvrGoldShape s,
                           int levels_x, int levels_y, int levels_z, int most_levels) {
-  const int i = (int)get_global_id(2);
-  if (get_global_id(0) > VDVR_BRICK_NODES || get_global_id(1) > VDVR_BRICK_NODES || i >= count) return;
-  const int block = bricks[i].s0, x = bricks[i].s1 * VDVR_BRICK_NODES + (int)get_global_id(0),
-            y = bricks[i].s2 * VDVR_BRICK_NODES + (int)get_global_id(1), bz = bricks[i].s3;
-  if (x >= s.nx || y >= s.ny) return;
+  Column c;
+  if (!find_column(&c, bricks, count, each, s)) return;
+  const int i = c.i, block = c.block, x = c.x, y = c.y;
   const int row = s.nx + 2 * s.halo;
   const size_t gold_at = ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * row + x + s.halo;
   if (margin[gold_at] < s.lowest) return;
-  const int first = bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
+  const int first = c.bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
   __global const float* column = gold + gold_at * s.gold_stride + s.halo;
   const int level_x = level_of_middle(x, levels_x), level_y = level_of_middle(y, levels_y);
   const int half_x = half_of(level_x, levels_x), half_y = half_of(level_y, levels_y);
   const long step_x = (long)half_x * s.gold_stride, step_y = (long)half_y * row * s.gold_stride;
-  const int16 lane = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  const float16 none = (float16)(0.0f);
-  float16 plus_x = none, minus_x = none, plus_y = none, minus_y = none, plus_z[6], minus_z[6];
-  for (int l = 0; l < levels_z; ++l) plus_z[l] = minus_z[l] = none;
-  for (int z = first; z < last; z += 16) {
-    const int16 node = z + lane, outside = node >= last;
-    __global const float* c = column + z;
-    const float16 centre = vload16(0, c);
-    const float16 ex = select(fma((float16)(0.5f), vload16(0, c - step_x) + vload16(0, c + step_x), -centre),
-                              none, outside),
-                  ey = select(fma((float16)(0.5f), vload16(0, c - step_y) + vload16(0, c + step_y), -centre),
-                              none, outside);
+  const VEC none = (VEC)(0.0f);
+  VEC plus_x = none, minus_x = none, plus_y = none, minus_y = none;
+  FOR_LEVELS(NOTHING_Z)
+  const int end = min(first + c.from + each, last);
+  for (int z = first + c.from; z < end; z += VDVR_LANES) {
+    const INT node = z + INDEX, outside = node >= last;
+    __global const float* at = column + z;
+    const VEC centre = READ(at);
+    const VEC ex = select(fma((VEC)(0.5f), READ(at - step_x) + READ(at + step_x), -centre), none, outside),
+              ey = select(fma((VEC)(0.5f), READ(at - step_y) + READ(at + step_y), -centre), none, outside);
     plus_x = fmax(plus_x, ex);
     minus_x = fmax(minus_x, -ex);
     plus_y = fmax(plus_y, ey);
     minus_y = fmax(minus_y, -ey);
-    for (int l = 0; l < levels_z; ++l) {
-      const int half_z = 1 << (levels_z - 1 - l);
-      const float16 ez =
-          select(fma((float16)(0.5f), vload16(0, c - half_z) + vload16(0, c + half_z), -centre), none,
-                 outside | ((node & (2 * half_z - 1)) != half_z));
-      plus_z[l] = fmax(plus_z[l], ez);
-      minus_z[l] = fmax(minus_z[l], -ez);
-    }
+    FOR_LEVELS(TAKE_Z)
   }
   volatile __global int* out = errors + (size_t)i * 6 * most_levels;
-  if (level_x < levels_x) raise_pair(out + 2 * level_x, largest_of_16(plus_x), largest_of_16(minus_x));
-  if (level_y < levels_y)
-    raise_pair(out + 2 * (most_levels + level_y), largest_of_16(plus_y), largest_of_16(minus_y));
-  for (int l = 0; l < levels_z; ++l)
-    raise_pair(out + 2 * (2 * most_levels + l), largest_of_16(plus_z[l]), largest_of_16(minus_z[l]));
+  if (level_x < levels_x) raise_pair(out + 2 * level_x, LARGEST(plus_x), LARGEST(minus_x));
+  if (level_y < levels_y) raise_pair(out + 2 * (most_levels + level_y), LARGEST(plus_y), LARGEST(minus_y));
+  FOR_LEVELS(RAISE_Z)
 }
 
 // Copies the samples of tiles out of a lattice: request i writes tile samples float[sz][sy][sx] at `offset`.

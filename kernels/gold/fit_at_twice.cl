@@ -9,23 +9,8 @@
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
 
-#if VDVR_LANES == 1
-#define READ(p) (*(p))
-#define WRITE(v, p) (*(p) = (v))
-#define INT int
-#define INDEX 0
-#elif VDVR_LANES == 4
-#define READ(p) vload4(0, p)
-#define WRITE(v, p) vstore4(v, 0, p)
-#define INT int4
-#define INDEX (int4)(0, 1, 2, 3)
-#elif VDVR_LANES > 8
+#if VDVR_LANES > 8
 #error "the columns around a sample are as many registers: eight lanes at most"
-#else
-#define READ(p) vload8(0, p)
-#define WRITE(v, p) vstore8(v, 0, p)
-#define INT int8
-#define INDEX (int8)(0, 1, 2, 3, 4, 5, 6, 7)
 #endif
 
 // Two registers' worth of nodes that follow one another, and the halves of every second.

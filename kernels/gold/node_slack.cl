@@ -3,6 +3,7 @@
 // with a halo of at least one node; margin float[block][y + halo][x + halo]; cells
 // float[block][y][x][stride] with cell z at z + 1; slack float[block][y][x][stride], node z at z. Called by
 // host/gold/node_slack.cpp.
+#include "device/lanes.h"
 #include "shared/untested.h"
 
 // What bricks add along gold columns: rows[block][brick y][brick x][stride], 0 beyond the block.
@@ -16,26 +17,27 @@ __kernel void expand_addend(__global float* rows, __global const float* addend, 
       brick < bricks_z ? addend[(((size_t)block * bricks_z + brick) * bricks_y + y) * bricks_x + x] : 0.0f;
 }
 
-// Second differences along x, y, z at 16 nodes, into the largest positive and the smallest negative so far.
-#define DIFFERENCES(node)                                                                           \
-  {                                                                                                 \
-    __global const float* centre = node;                                                            \
-    const float16 twice = 2.0f * vload16(0, centre);                                                \
-    const float16 dx = vload16(0, centre - gold_stride) + vload16(0, centre + gold_stride) - twice; \
-    const float16 dy = vload16(0, centre - row) + vload16(0, centre + row) - twice;                 \
-    const float16 dz = vload16(0, centre - 1) + vload16(0, centre + 1) - twice;                     \
-    px = fmax(px, dx);                                                                              \
-    mx = fmin(mx, dx);                                                                              \
-    py = fmax(py, dy);                                                                              \
-    my = fmin(my, dy);                                                                              \
-    pz = fmax(pz, dz);                                                                              \
-    mz = fmin(mz, dz);                                                                              \
+// Second differences along x, y, z at VDVR_LANES nodes, into the largest positive and the smallest negative
+// so far.
+#define DIFFERENCES(node)                                                           \
+  {                                                                                 \
+    __global const float* centre = node;                                            \
+    const VEC twice = 2.0f * READ(centre);                                          \
+    const VEC dx = READ(centre - gold_stride) + READ(centre + gold_stride) - twice; \
+    const VEC dy = READ(centre - row) + READ(centre + row) - twice;                 \
+    const VEC dz = READ(centre - 1) + READ(centre + 1) - twice;                     \
+    px = fmax(px, dx);                                                              \
+    mx = fmin(mx, dx);                                                              \
+    py = fmax(py, dy);                                                              \
+    my = fmin(my, dy);                                                              \
+    pz = fmax(pz, dz);                                                              \
+    mz = fmin(mz, dz);                                                              \
   }
-#define RANGE(node)                     \
-  {                                     \
-    const float16 v = vload16(0, node); \
-    low = fmin(low, v);                 \
-    high = fmax(high, v);               \
+#define RANGE(node)           \
+  {                           \
+    const VEC v = READ(node); \
+    low = fmin(low, v);       \
+    high = fmax(high, v);     \
   }
 #define CORNERS(M)    \
   M(at)               \
@@ -54,35 +56,34 @@ __kernel void cell_slack(__global float* cells_above, __global float* cells_belo
                          __global const float* addend, int nx, int ny, int nz, int halo, int gold_stride,
                          int stride, int side, int bricks_x, int bricks_y, int blocks, int counted,
                          int windowed, float window_low, float window_high, float curvature) {
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int z = (int)get_global_id(0) * VDVR_LANES, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / (ny - 1), y = (int)get_global_id(2) - block * (ny - 1);
   if (z >= nz || x >= nx - 1 || block >= blocks)
     return;  // one cell more than there is: it must be marked VDVR_UNTESTED
   const int row = (nx + 2 * halo) * gold_stride;
   __global const float* at =
       gold + ((size_t)block * (ny + 2 * halo) + y + halo) * row + (size_t)(x + halo) * gold_stride + z + halo;
-  float16 px = (float16)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
+  VEC px = (VEC)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
   CORNERS(DIFFERENCES)
-  const float16 bound =
-      vload16(0, addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
-  float16 below = fma(px + py + pz, (float16)(curvature), bound),
-          above = fma(-(mx + my + mz), (float16)(curvature), bound);
-  const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  int16 out = k > nz - 2;
+  const VEC bound = READ(addend + (((size_t)block * bricks_y + y / side) * bricks_x + x / side) * stride + z);
+  VEC below = fma(px + py + pz, (VEC)(curvature), bound),
+      above = fma(-(mx + my + mz), (VEC)(curvature), bound);
+  const INT k = z + INDEX;
+  INT out = k > nz - 2;
   if (windowed) {
-    float16 low = vload16(0, at), high = low;
+    VEC low = READ(at), high = low;
     CORNERS(RANGE)
     // F may enter the window between corners that computed gold leaves out of it: by no more than the slack.
     out |= (low - below > window_high) | (high + above < window_low);
   }
   // Whatever is no number here is no bound.
-  above = select((float16)(INFINITY), counted ? above : (float16)(0.0f), above <= FLT_MAX);
-  below = select((float16)(INFINITY), counted ? below : (float16)(0.0f), below <= FLT_MAX);
-  above = select(above, (float16)(VDVR_UNTESTED), out);
-  below = select(below, (float16)(VDVR_UNTESTED), out);
+  above = select((VEC)(INFINITY), counted ? above : (VEC)(0.0f), above <= FLT_MAX);
+  below = select((VEC)(INFINITY), counted ? below : (VEC)(0.0f), below <= FLT_MAX);
+  above = select(above, (VEC)(VDVR_UNTESTED), out);
+  below = select(below, (VEC)(VDVR_UNTESTED), out);
   const size_t column = (((size_t)block * ny + y) * nx + x) * stride;
-  vstore16(above, 0, cells_above + column + z + 1);
-  vstore16(below, 0, cells_below + column + z + 1);
+  WRITE(above, cells_above + column + z + 1);
+  WRITE(below, cells_below + column + z + 1);
   if (z == 0) cells_above[column] = cells_below[column] = VDVR_UNTESTED;
 }
 
@@ -93,11 +94,11 @@ __kernel void node_slack(__global float* above, __global float* below, __global 
                          __global const float* cells_below, __global const float* margin,
                          __global const int2* last, int nx, int ny, int nz, int halo, int stride, int blocks,
                          float lowest, int z_first, int z_last) {
-  const int z = (int)get_global_id(0) * 16, x = (int)get_global_id(1);
+  const int z = (int)get_global_id(0) * VDVR_LANES, x = (int)get_global_id(1);
   const int block = (int)get_global_id(2) / ny, y = (int)get_global_id(2) - block * ny;
   if (z >= nz || x >= nx || block >= blocks) return;
   const size_t column = ((size_t)block * ny + y) * nx + x;
-  float16 a = (float16)(VDVR_UNTESTED), b = a;
+  VEC a = (VEC)(VDVR_UNTESTED), b = a;
   const int2 end = last[block];
   const size_t here = ((size_t)block * (ny + 2 * halo) + y + halo) * (nx + 2 * halo) + x + halo;
   if (margin[here] >= lowest && x <= end.x && y <= end.y) {
@@ -105,14 +106,14 @@ __kernel void node_slack(__global float* above, __global float* below, __global 
       for (int dx = -1; dx <= 0; ++dx) {
         if (x + dx < 0 || y + dy < 0 || x + dx >= end.x || y + dy >= end.y) continue;
         const size_t at = (column + dy * nx + dx) * stride + z;
-        a = fmax(a, fmax(vload16(0, cells_above + at), vload16(0, cells_above + at + 1)));
-        b = fmax(b, fmax(vload16(0, cells_below + at), vload16(0, cells_below + at + 1)));
+        a = fmax(a, fmax(READ(cells_above + at), READ(cells_above + at + 1)));
+        b = fmax(b, fmax(READ(cells_below + at), READ(cells_below + at + 1)));
       }
-    const int16 k = z + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    const int16 out = (k < z_first) | (k > z_last) | (k > nz - 1);
-    a = select(a, (float16)(VDVR_UNTESTED), out);
-    b = select(b, (float16)(VDVR_UNTESTED), out);
+    const INT k = z + INDEX;
+    const INT out = (k < z_first) | (k > z_last) | (k > nz - 1);
+    a = select(a, (VEC)(VDVR_UNTESTED), out);
+    b = select(b, (VEC)(VDVR_UNTESTED), out);
   }
-  vstore16(a, 0, above + column * stride + z);
-  vstore16(b, 0, below + column * stride + z);
+  WRITE(a, above + column * stride + z);
+  WRITE(b, below + column * stride + z);
 }

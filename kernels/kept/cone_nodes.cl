@@ -3,19 +3,9 @@
 // VIEW views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in columns
 // and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the same
 // columns and rows, follow one another. Called by host/kept/cone_tiles.cpp.
+#include "device/lanes.h"
 #include "shared/cone_nodes.h"
 #include "shared/six_taps.h"
-
-#if VDVR_DOUBLE
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-#define REAL double
-#define REAL8 double8
-#define TO_REAL8 convert_double8
-#else
-#define REAL float
-#define REAL8 float8
-#define TO_REAL8 convert_float8
-#endif
 
 // As host/kept/cone_tiles.cpp fills it.
 typedef struct {
@@ -66,28 +56,30 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
     sum##n = fma(taps(share_v), across, sum##n);                                                    \
   }
 
-#define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+#if VDVR_LANES > 8
+#error "each height has eight sums: eight lanes at most"
+#endif
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
-#define UPRIGHT_PART(n) ADD(n, column, weight_u, row.s##n, g_v.s##n)
-#define TILTED_PART(n)                                                             \
-  {                                                                                \
-    const float8 weight_u = (float)(inverse.s##n * inverse.s##n) * taps(g_u.s##n); \
-    ADD(n, column.s##n, weight_u, row.s##n, g_v.s##n)                              \
+#define UPRIGHT_PART(n) ADD(n, column, weight_u, LANE(row, n), LANE(g_v, n))
+#define TILTED_PART(n)                                                                         \
+  {                                                                                            \
+    const float8 weight_u = (float)(LANE(inverse, n) * LANE(inverse, n)) * taps(LANE(g_u, n)); \
+    ADD(n, LANE(column, n), weight_u, LANE(row, n), LANE(g_v, n))                              \
   }
 #define PUT(n) to[n] += sum_of(sum##n);
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const View* views,
                          __global const int2* wanted, ulong first, VdvrConeNodes s) {
-  const int y = (int)get_global_id(0), group = (int)get_global_id(1), tile = (int)get_global_id(2);
-  if (group >= s.groups || tile >= s.tiles) return;
+  const int y = (int)get_global_id(0), height = (int)get_global_id(1) * VDVR_LANES,
+            tile = (int)get_global_id(2), group = height / VDVR_CONE_HEIGHTS;
+  if (y >= VDVR_CONE_TILE || group >= s.groups || tile >= s.tiles) return;
   const int2 range = wanted[tile * VDVR_CONE_TILE + y];
-  const int column_stride = s.column_stride, views_all = s.views, height = group * VDVR_CONE_HEIGHTS,
-            block_z = group / s.block_groups, block_y = y / s.block_side;
+  const int column_stride = s.column_stride, views_all = s.views, block_z = group / s.block_groups,
+            block_y = y / s.block_side;
   const float half_side = 0.5f * (float)(s.block_side - 1),
               half_height = 0.5f * (float)(s.block_groups * VDVR_CONE_HEIGHTS - 1);
   const REAL dy = (REAL)((float)(y - block_y * s.block_side) - half_side);
-  const REAL8 dz = TO_REAL8((float8)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f) +
-                            ((float)((group - block_z * s.block_groups) * VDVR_CONE_HEIGHTS) - half_height));
+  const SUM dz = WIDE(TO_VEC(height - block_z * s.block_groups * VDVR_CONE_HEIGHTS + INDEX) - half_height);
   for (int x = range.x; x <= range.y; ++x) {
     const int block_x = x / s.block_side;
     const REAL dx = (REAL)((float)(x - block_x * s.block_side) - half_side);
@@ -96,7 +88,7 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
                  block_x) *
                     views_all;
     __global const float* plane = table;
-    FOR_HEIGHTS(CLEAR)
+    FOR_LANES(CLEAR)
     for (int k = 0; k < views_all; ++k, ++v, plane += s.plane) {
       const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
                  u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
@@ -105,27 +97,26 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
       const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
       const int column = (int)v->whole_u + (int)whole_u - 2;
       const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
-      const REAL8 v8 =
-          fma(fma((REAL8)(v->step_v[2]), dz, (REAL8)(v_plane)), (REAL8)(inverse), (REAL8)(v->part_v));
+      const SUM v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), (SUM)(inverse), (SUM)(v->part_v));
 #else
-      const REAL8 inverse = (REAL)1 / fma((REAL8)(v->step_lambda[2]), dz, (REAL8)(l_plane)),
-                  u8 = fma(fma((REAL8)(v->step_u[2]), dz, (REAL8)(u_plane)), inverse, (REAL8)(v->part_u)),
-                  whole_u = floor(u8),
-                  v8 = fma(fma((REAL8)(v->step_v[2]), dz, (REAL8)(v_plane)), inverse, (REAL8)(v->part_v));
-      const int8 column = (int)v->whole_u + convert_int8(whole_u) - 2;
-      const float8 g_u = convert_float8(u8 - whole_u - 0.5f);
+      const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
+                u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
+                whole_u = floor(u8),
+                v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), inverse, (SUM)(v->part_v));
+      const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
+      const VEC g_u = NARROW(u8 - whole_u - 0.5f);
 #endif
-      const REAL8 whole_v = floor(v8);
-      const int8 row = (int)v->whole_v + convert_int8(whole_v) - 2;
-      const float8 g_v = convert_float8(v8 - whole_v - 0.5f);
+      const SUM whole_v = floor(v8);
+      const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
+      const VEC g_v = NARROW(v8 - whole_v - 0.5f);
 #if VDVR_UPRIGHT
-      FOR_HEIGHTS(UPRIGHT_PART)
+      FOR_LANES(UPRIGHT_PART)
 #else
-      FOR_HEIGHTS(TILTED_PART)
+      FOR_LANES(TILTED_PART)
 #endif
     }
     __global float* to =
         out + first + (size_t)tile * s.tile + ((size_t)y * VDVR_CONE_TILE + x) * s.stride + height;
-    FOR_HEIGHTS(PUT)
+    FOR_LANES(PUT)
   }
 }

@@ -18,9 +18,9 @@
 #define VDVR_GLOBAL __global
 // Records and coordinates are handed on by value: a call that is not inlined copies them through memory.
 #if defined(__clang__) || defined(__GNUC__)
-#define VDVR_INLINE inline __attribute__((always_inline))
+#define VDVR_INLINE static inline __attribute__((always_inline))
 #else
-#define VDVR_INLINE inline
+#define VDVR_INLINE static inline
 #endif
 typedef ulong vdvr_u64;
 typedef uint vdvr_u32;

@@ -15,6 +15,7 @@ typedef struct {
   int windowed;           // whether cells outside the window do not count
   float window_low, window_high;
   float correction;  // of second differences by fourth ones
+  int each;          // nodes of a column that a work-item of verify_errors does
 } VdvrPieces;
 
 #endif

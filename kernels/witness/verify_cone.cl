@@ -1,7 +1,10 @@
 // How `verify` back-projects nodes of cone beam, apart from everything that build uses: lambda^-2 q(u, v) by
 // eight points of Lagrange both ways (docs/error-bounds.md, "What verify does", "Cone beam").
 // Layouts: float table[view][column][row]; View numbers[tile][block][view]; int2 tiles[tile] = first node x,
-// y; float nodes[y][x][all_heights]. Called by host/witness/verify_cone_nodes.cpp.
+// y; float nodes[y][x][all_heights]. What reads like kept/cone_nodes.cl is written a second time: a fault in
+// a shared line would be in what is certified and in what it is held to. Called by
+// host/witness/verify_cone_nodes.cpp.
+#include "device/lanes.h"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 
@@ -14,7 +17,7 @@ typedef struct {
 } View;
 
 // The eight weights on the nodes -3 .. 4: one factor of each of seven rotations of the nodes.
-static inline __attribute__((always_inline)) float8 lagrange(float f) {
+static inline ALWAYS_INLINE float8 lagrange(float f) {
   const float8 a = (f - (float8)(-2, -1, 0, 1, 2, 3, 4, -3)) * (f - (float8)(-1, 0, 1, 2, 3, 4, -3, -2)),
                b = (f - (float8)(0, 1, 2, 3, 4, -3, -2, -1)) * (f - (float8)(1, 2, 3, 4, -3, -2, -1, 0)),
                c = (f - (float8)(2, 3, 4, -3, -2, -1, 0, 1)) * (f - (float8)(3, 4, -3, -2, -1, 0, 1, 2)),
@@ -24,7 +27,7 @@ static inline __attribute__((always_inline)) float8 lagrange(float f) {
   return (a * b) * (c * d);
 }
 
-static inline __attribute__((always_inline)) float sum_of(float8 v) {
+static inline ALWAYS_INLINE float sum_of(float8 v) {
   const float4 four = v.lo + v.hi;
   const float2 two = four.lo + four.hi;
   return two.x + two.y;
@@ -46,40 +49,42 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
     sum##n = fma(lagrange(part_v), across, sum##n);                                    \
   }
 
-#define FOR_HEIGHTS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+#if VDVR_LANES > 8
+#error "each height has eight sums: eight lanes at most"
+#endif
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
 #if VDVR_UPRIGHT
-#define PART(n) ADD(n, column, weight, row.s##n, part_v.s##n)
+#define PART(n) ADD(n, column, weight, LANE(row, n), LANE(part_v, n))
 #else
-#define PART(n)                                                                  \
-  {                                                                              \
-    const float8 weight = (inverse.s##n * inverse.s##n) * lagrange(part_u.s##n); \
-    ADD(n, column.s##n, weight, row.s##n, part_v.s##n)                           \
+#define PART(n)                                                                              \
+  {                                                                                          \
+    const float8 weight = (LANE(inverse, n) * LANE(inverse, n)) * lagrange(LANE(part_u, n)); \
+    ADD(n, LANE(column, n), weight, LANE(row, n), LANE(part_v, n))                           \
   }
 #endif
 #define PUT(n) to[n] = accumulate ? to[n] + sum_of(sum##n) : sum_of(sum##n);
 
-// Adds the table's views at eight heights of eight nodes along x. VDVR_UPRIGHT: u and lambda do not change
-// along z in any view.
+// Adds the table's views at VDVR_LANES heights of eight nodes along x. VDVR_UPRIGHT: u and lambda do not
+// change along z in any view.
 __kernel void verify_cone(__global float* nodes, __global const float* table, __global const View* numbers,
                           __global const int2* tiles, VdvrVerifyCone s) {
-  const int group = (int)get_global_id(0), y = (int)get_global_id(1), tile = (int)get_global_id(2);
-  const int block = group * VDVR_VERIFY_CONE_HEIGHTS / VDVR_VERIFY_CONE_BLOCK;
+  const int height = (int)get_global_id(0) * VDVR_LANES, y = (int)get_global_id(1),
+            tile = (int)get_global_id(2), block = height / VDVR_VERIFY_CONE_BLOCK;
   if (block >= s.blocks || y >= VDVR_VERIFY_TILE || tile >= s.tiles) return;
   // Copies, which no store can be taken to change.
   const int accumulate = s.accumulate, views = s.views, rows = s.rows, last_column = s.columns - 8,
-            last_row = s.rows - 8, height = group * VDVR_VERIFY_CONE_HEIGHTS;
+            last_row = s.rows - 8;
   const size_t plane_size = (size_t)s.columns * (size_t)s.rows;
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
-  const float8 dz = (float8)(0, 1, 2, 3, 4, 5, 6, 7) + ((float)(height - block * VDVR_VERIFY_CONE_BLOCK) -
-                                                        0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1));
+  const VEC dz =
+      TO_VEC(height - block * VDVR_VERIFY_CONE_BLOCK + INDEX) - 0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1);
   const int2 first = tiles[s.first_tile + tile];
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * views;
   for (int x = 0; x < VDVR_VERIFY_TILE; ++x) {
     const float dx = (float)x - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
     __global const View* view = own;
     __global const float* plane = table;
-    FOR_HEIGHTS(CLEAR)
+    FOR_LANES(CLEAR)
     for (int k = 0; k < views; ++k, ++view, plane += plane_size) {
       const float4 u = view->u, v = view->v, lambda = view->lambda;
       const int4 whole = view->whole;
@@ -89,22 +94,19 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       const int below_u = (int)place_u, column = whole.x + below_u - 3;
       const float8 weight = (inverse * inverse) * lagrange(place_u - (float)below_u);
 #else
-      const float8 inverse = 1.0f / fma((float8)(lambda.z), dz,
-                                        (float8)(fma(lambda.x, dx, lambda.y * dy) + lambda.w)),
-                   place_u =
-                       fma(fma((float8)(u.z), dz, (float8)(fma(u.x, dx, u.y * dy))), inverse, (float8)(u.w));
-      const int8 below_u = convert_int8(place_u), column = whole.x + below_u - 3;
-      const float8 part_u = place_u - convert_float8(below_u);
+      const VEC inverse = 1.0f / fma((VEC)(lambda.z), dz, (VEC)(fma(lambda.x, dx, lambda.y * dy) + lambda.w)),
+                place_u = fma(fma((VEC)(u.z), dz, (VEC)(fma(u.x, dx, u.y * dy))), inverse, (VEC)(u.w));
+      const INT below_u = TO_INT(place_u), column = whole.x + below_u - 3;
+      const VEC part_u = place_u - TO_VEC(below_u);
 #endif
-      const float8 place_v =
-          fma(fma((float8)(v.z), dz, (float8)(fma(v.x, dx, v.y * dy))), (float8)(inverse), (float8)(v.w));
+      const VEC place_v = fma(fma((VEC)(v.z), dz, (VEC)(fma(v.x, dx, v.y * dy))), (VEC)(inverse), (VEC)(v.w));
       // Places are positive: truncation is floor.
-      const int8 below_v = convert_int8(place_v), row = whole.y + below_v - 3;
-      const float8 part_v = place_v - convert_float8(below_v);
-      FOR_HEIGHTS(PART)
+      const INT below_v = TO_INT(place_v), row = whole.y + below_v - 3;
+      const VEC part_v = place_v - TO_VEC(below_v);
+      FOR_LANES(PART)
     }
     __global float* to =
         nodes + ((size_t)(first.y + y) * s.nx + (size_t)(first.x + x)) * s.all_heights + height;
-    FOR_HEIGHTS(PUT)
+    FOR_LANES(PUT)
   }
 }
