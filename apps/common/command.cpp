@@ -51,7 +51,7 @@ int run_guarded(const Command& command, std::vector<std::string> words) {
   } catch (const std::bad_alloc&) {
     return fail(who, "out of memory; choose a smaller --size, or set --max-memory", 3);
   } catch (const std::exception& e) {
-    return fail(who, e.what(), 3);
+    return fail(who, words_for(e), 3);
   }
 }
 

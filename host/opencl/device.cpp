@@ -245,10 +245,11 @@ std::vector<FoundDevice> find_devices() {
       continue;
     }
     for (const auto& device : devices) {
-      FoundDevice one{device, info, ""};
+      FoundDevice one{{}, info, ""};
       DeviceInfo& d = one.info;
       d.index = static_cast<int>(found.size());
       try {
+        one.device = device;
         if (device.getInfo<CL_DEVICE_AVAILABLE>() != CL_TRUE) continue;
         describe(device, d);
       } catch (const cl::Error& e) {
@@ -318,21 +319,24 @@ std::vector<DeviceInfo> Device::list() {
 
 namespace {
 
-// Those that the selector means, the best first.
-std::vector<FoundDevice> chosen_from(const std::vector<FoundDevice>& all, const std::string& selector) {
-  std::vector<FoundDevice> chosen;
+// Those that the selector means, the best first. Not copies: each would be an OpenCL call, which may fail.
+std::vector<const FoundDevice*> chosen_from(const std::vector<FoundDevice>& all,
+                                            const std::string& selector) {
+  std::vector<const FoundDevice*> chosen;
   for (const FoundDevice& found : all)
-    if (selector.empty() || matches(found.info, selector)) chosen.push_back(found);
+    if (selector.empty() || matches(found.info, selector)) chosen.push_back(&found);
   if (selector.empty())
-    std::stable_partition(chosen.begin(), chosen.end(), [](const FoundDevice& f) { return f.info.is_gpu; });
+    std::stable_partition(chosen.begin(), chosen.end(), [](const FoundDevice* f) { return f->info.is_gpu; });
   return chosen;
 }
 
 // Throws DeviceError, BuildError or ResourceError where the device cannot be used.
-std::shared_ptr<opencl::State> opened(FoundDevice found) {
+std::shared_ptr<opencl::State> opened(const FoundDevice& listed) {
   auto state = std::make_shared<opencl::State>();
   DeviceTest test;
+  FoundDevice found{{}, listed.info, listed.trouble};
   try {
+    found.device = listed.device;
     ask_image_formats(found);
     if (!found.trouble.empty())
       throw DeviceError(fmt::format("device {}, '{}', cannot be used: {}; choose another `device`",
@@ -362,7 +366,7 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
   const std::vector<FoundDevice> all = find_devices();
   if (all.empty())
     throw DeviceError("no OpenCL device found; install one, for a CPU the package pocl-opencl-icd");
-  const std::vector<FoundDevice> chosen = chosen_from(all, selector);
+  const std::vector<const FoundDevice*> chosen = chosen_from(all, selector);
   if (chosen.empty()) {
     std::string names;
     for (const FoundDevice& found : all)
@@ -370,9 +374,9 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
     throw DeviceError(fmt::format("no device matches `device` '{}'; there are:{}", selector, names));
   }
   std::vector<std::string> passed_over;
-  for (const FoundDevice& found : chosen) {
+  for (const FoundDevice* found : chosen) {
     try {
-      state_ = opened(found);
+      state_ = opened(*found);
       break;
     } catch (const Error& e) {
       const bool of_device =

@@ -164,6 +164,7 @@ struct Opened {
   std::mutex lock;
   std::map<const State*, DeviceTest> tests;
   std::function<void(const std::string&)> tell;
+  std::string last;  // name of the device opened last
 };
 Opened& opened() {
   static auto* one = new Opened;  // devices may end after statics
@@ -188,6 +189,7 @@ void keep_test(const State& state, DeviceTest test) {
   static_cast<void>(listening);
   const std::lock_guard guard(opened().lock);
   opened().tests[&state] = std::move(test);
+  opened().last = state.info.name;
 }
 
 void tell(const std::string& line) {
@@ -240,6 +242,14 @@ const DeviceTest& test_of(Device& device) { return opencl::test_of(device.state(
 void tell_of_devices(std::function<void(const std::string&)> tell) {
   const std::lock_guard guard(opencl::opened().lock);
   opencl::opened().tell = std::move(tell);
+}
+
+std::string words_for(const std::exception& e) {
+  const auto* call = dynamic_cast<const cl::Error*>(&e);
+  if (call == nullptr) return e.what();
+  const std::lock_guard guard(opencl::opened().lock);
+  return fmt::format("'{}' failed: {} {}", opencl::opened().last, call->what(),
+                     opencl::code_name(call->err()));
 }
 
 void open_untrusted_devices(bool open) { opencl::untrusted_opened = open; }

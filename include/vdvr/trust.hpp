@@ -2,6 +2,7 @@
 // whether one computes as certificates assume.
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <string>
 #include <vector>
@@ -43,6 +44,10 @@ VDVR_API const DeviceTest& test_of(Device& device);
 /// `tell` hears, in one line, of each device that is passed over for another, with its name and the reason,
 /// and of one that is opened although it failed its test. Of the process; by whatever thread opens a device.
 VDVR_API void tell_of_devices(std::function<void(const std::string&)> tell);
+
+/// What to say of an exception that is none of vdvr/error.hpp's: of a call of OpenCL that failed where nobody
+/// was ready for it, which call, its code and the device opened last; else what() itself.
+VDVR_API std::string words_for(const std::exception& e);
 
 /// Whether this process opens devices that fail their test, from now on: to draw. Nothing is certified with
 /// one. Default: they are refused.
