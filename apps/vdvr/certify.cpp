@@ -15,6 +15,7 @@ namespace vdvr::cli {
 void add_plan_options(Arguments& args) {
   add_scan(args);
   add_tolerance(args);
+  add_noise(args);
   args.group("Pictures")
       .value("picture-tolerance", "N",
              "refine until every pixel of the views is certain to N levels of 255; --epsilon then holds "
@@ -46,6 +47,9 @@ std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
         "--picture-tolerance needs --picture-views VIEWS.json: the pictures that it speaks of (--views "
         "VIEWS.json "
         "means the same)");
+  if (sigmas_option(args))
+    throw InputError(
+        "--epsilon in sigma excludes --picture-tolerance: one of the two decides what bricks need");
   refuse(args, {"window"}, "excludes --picture-tolerance: bricks beside the window have no bound");
   PictureWanted out;
   out.levels = args.positive_or("picture-tolerance", out.levels);
@@ -59,15 +63,18 @@ std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
 
 }  // namespace
 
-Wanted wanted_of(const Arguments& args) {
+Wanted wanted_of(const Arguments& args, bool may_choose_tolerance) {
   Wanted w;
   w.options.field = field_options(args);
   w.options.grid = grid_options(args);
   w.options.rates = rate_options(args);
   w.pictures = pictures_wanted(args);
-  w.tolerance = w.pictures && !args.has("epsilon") && !args.has("epsilon-abs")
-                    ? Tolerance{everywhere_of_pictures, {}}
-                    : tolerance(args);
+  w.sigmas = sigmas_option(args);
+  const bool given = args.has("epsilon") || args.has("epsilon-abs");
+  w.chosen_by_noise = may_choose_tolerance && !given && !w.pictures;
+  if (w.pictures && !given) w.tolerance = Tolerance{everywhere_of_pictures, {}};
+  else if (w.sigmas) refuse(args, {"epsilon-abs"}, "excludes --epsilon");
+  else if (!w.chosen_by_noise) w.tolerance = tolerance(args);
   w.options.build = build_options(args);
   w.options.plan = plan_settings(args);
   return w;
@@ -81,20 +88,75 @@ void add_certify_options(Arguments& args) {
   add_common(args);
 }
 
-Wanted wanted_to_certify(const Arguments& args) {
-  Wanted wanted = wanted_of(args);
+Wanted wanted_to_certify(const Arguments& args, bool may_choose_tolerance) {
+  Wanted wanted = wanted_of(args, may_choose_tolerance);
   wanted.options.plan.foresee = false;
   wanted.compression = compression(args);
   return wanted;
 }
 
-Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
+namespace {
+
+constexpr double percent_where_noise_is_not_known = 0.03;
+
+// The noise of the scan, and the tolerance where it depends on that.
+void choose_tolerance(Planned& planned, Wanted& wanted, const Arguments& args) {
+  if (!wanted.sigmas && !wanted.chosen_by_noise && !wanted.noted_noise) return;
+  planned.noise = noise_of_scan(args.path("IN"), args, wanted.options.field, planned.scan);
+  const auto& noise = planned.noise.noise;
+  if (wanted.chosen_by_noise && noise && noise->agreed) {
+    wanted.sigmas = 1;
+    planned.chosen = "1sigma, the noise of the scan itself: " + noise->words;
+  } else if (wanted.chosen_by_noise) {
+    wanted.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
+    planned.chosen = "3 % of the range, since " +
+                     (noise ? "two sources do not agree on the noise: " + noise->words : planned.noise.why);
+  }
+  planned.sigmas = wanted.sigmas;
+  if (wanted.sigmas && !noise)
+    throw InputError(fmt::format(
+        "{}: --epsilon in sigma needs the scan's noise, and none is known: {}; state it by --photons or "
+        "--sigma-p, or give a tolerance such as --epsilon 3%",
+        args.path("IN").string(), planned.noise.why));
+}
+
+// Beside a tolerance of another kind sigma is told where it can be had; no build fails for it.
+std::optional<BrickSigma> noted_sigma(Device& device, Planned& planned, const Progress& progress) {
+  if (!planned.noise.noise) return std::nullopt;
+  try {
+    return sigma_of_plan(device, planned.scan, planned.plan, *planned.noise.noise, progress);
+  } catch (const Error& e) {
+    if (e.kind() != ErrorKind::resource && e.kind() != ErrorKind::input) throw;
+    planned.noise.why = e.what();
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+Planned read_and_plan(Device& device, const Arguments& args, const Wanted& asked, const Progress& progress,
                       const std::function<void(const Planned&)>& seen) {
+  Wanted wanted = asked;
   Planned planned;
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
+  choose_tolerance(planned, wanted, args);
   if (seen) seen(planned);
+  if (wanted.sigmas) try {
+      PlanInSigma made = make_plan_in_sigma(device, planned.scan, *wanted.sigmas, *planned.noise.noise,
+                                            wanted.options, progress);
+      planned.plan = std::move(made.plan);
+      planned.sigma = std::move(made.sigma);
+      return planned;
+    } catch (const ToleranceError& e) {
+      if (!wanted.chosen_by_noise) throw;
+      wanted.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
+      planned.sigmas.reset();
+      say(fmt::format("{}: one sigma of this scan is out of reach ({}); takes 3 % of the range\n", args.who(),
+                      e.what()));
+    }
   if (!wanted.pictures) {
     planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
+    planned.sigma = noted_sigma(device, planned, progress);
     return planned;
   }
   CertifyOptions options = wanted.options;
@@ -106,6 +168,7 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wante
   planned.pictures =
       std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan, planned.plan.field,
                                           refinement_options(planned, wanted), progress);
+  planned.sigma = noted_sigma(device, planned, progress);
   return planned;
 }
 
@@ -130,10 +193,12 @@ double everywhere_of(const Planned& planned, const Wanted& wanted) {
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
   CertifyOptions options = wanted.options;
   options.input = planned.understood.stated;
-  if (!planned.pictures) return certify(device, planned.scan, std::move(planned.plan), options, progress);
-  options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
+  if (planned.pictures)
+    options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
+  else if (planned.sigmas) options.build.refinement = refinement_in_sigma(*planned.sigma, *planned.sigmas);
   BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
-  planned.pictures->note(result.certificate);
+  if (planned.pictures) planned.pictures->note(result.certificate);
+  if (planned.sigma) note_noise(result.certificate, *planned.noise.noise, *planned.sigma, planned.sigmas);
   return result;
 }
 

@@ -8,7 +8,9 @@
 
 #include "apps/common/common_options.hpp"
 #include "apps/vdvr/options.hpp"
+#include "apps/vdvr/scan_noise.hpp"
 #include "vdvr/certify.hpp"
+#include "vdvr/noise_forecast.hpp"
 #include "vdvr/picture_refinement.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -29,29 +31,36 @@ struct PictureWanted {
 
 /// Everything that can be refused before a scan is read.
 struct Wanted {
-  Tolerance tolerance;
+  Tolerance tolerance;           ///< without `sigmas`
+  std::optional<double> sigmas;  ///< --epsilon 1sigma
+  bool chosen_by_noise = false;  ///< no tolerance was given: 1 sigma where the noise is known well, else 3 %
+  bool noted_noise = true;       ///< sigma of F is looked for, whatever the tolerance
   CertifyOptions options;
   Compression compression = Compression::deflate;  ///< of the file; `build` and `run` fill it in
   std::optional<PictureWanted> pictures;           ///< refine for these
 };
-Wanted wanted_of(const Arguments& args);
+/// `may_choose_tolerance`: none need be given.
+Wanted wanted_of(const Arguments& args, bool may_choose_tolerance = false);
 
 /// All that `build` and `run` take besides their input and output.
 void add_certify_options(Arguments& args);
 /// What they are asked for: a plan without what is foreseen, and the file's compression.
-Wanted wanted_to_certify(const Arguments& args);
+Wanted wanted_to_certify(const Arguments& args, bool may_choose_tolerance = false);
 
 struct Planned {
   ProjectionSet scan;
-  Understood understood;  ///< of its files
+  Understood understood;         ///< of its files
+  NoiseFound noise;              ///< of the scan
+  std::optional<double> sigmas;  ///< the tolerance, where it is one in sigma
+  std::string chosen;            ///< one line, where the tolerance was chosen: which, and why
   Plan plan;
+  std::optional<BrickSigma> sigma;              ///< of F, where the noise is known
   std::shared_ptr<PictureRefinement> pictures;  ///< none, unless refined for some
 };
 /// How refinement went: what it was asked, each round, whether the tolerance is met. Null without pictures.
 Json pictures_json(const Planned& planned);
 void print_pictures(const Planned& planned);
-/// Reads IN and plans.
-/// `seen` is called between the two.
+/// Reads IN and plans. `seen` is called between the two, when the tolerance is known.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
                       const std::function<void(const Planned&)>& seen = {});
 /// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.

@@ -7,7 +7,6 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/read_scan.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -29,30 +28,6 @@ Json number_or_null(const std::optional<double>& value) { return value ? Json(*v
 
 }  // namespace
 
-void add_noise(Arguments& args) {
-  args.group("Noise (an estimate, beside what is certified)")
-      .value("photons", "N0",
-             "of a pixel in the open beam (default: from repeated flats, or the projections)")
-      .value("sigma-p", "S", "the standard deviation of every line integral");
-}
-
-NoiseOptions noise_options(const Arguments& args) {
-  NoiseOptions options;
-  if (args.has("photons")) options.photons = args.positive_or("photons", 0);
-  if (args.has("sigma-p")) options.sigma_p = args.positive_or("sigma-p", 0);
-  return options;
-}
-
-NoiseFound noise_of_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
-                         const ProjectionSet& scan) {
-  NoiseFound found;
-  const NoiseOptions options = noise_options(args);
-  std::optional<LineIntegralNoise> by_flats;
-  if (!options.photons && !options.sigma_p) by_flats = load_line_noise(path, args, field);
-  found.noise = scan_noise(scan, options, by_flats, &found.why);
-  return found;
-}
-
 Json noise_json(const NoiseFound& found) {
   if (!found.noise) return {{"found", false}, {"why", found.why}};
   const ScanNoise& n = *found.noise;
@@ -70,16 +45,14 @@ void print_noise(const NoiseFound& found) {
   fmt::print("  noise        {}\n", found.noise ? found.noise->words : "not known: " + found.why);
 }
 
-std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const NoiseFound& found,
-                                        const Progress& progress) {
-  if (!found.noise) return std::nullopt;
+std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Progress& progress) {
+  if (!planned.noise.noise || !planned.sigma) return std::nullopt;
   const Plan& plan = planned.plan;
   FieldNoise out;
-  const Volume sigma = noise_of_field(device, planned.scan, plan.field, found.noise->model,
-                                      noise_grid(plan.grid, plan.layout.granularity), progress);
-  out.sigma = sigma_range(sigma, planned.scan, plan.field);
-  out.split = split_of_views(device, planned.scan, plan.field, found.noise->model, progress);
-  out.forecasts = foresee_in_sigma(plan, sigma, multiples);
+  out.sigma = planned.sigma->range;
+  out.sigmas = planned.sigmas;
+  out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
+  out.forecasts = foresee_in_sigma(plan, *planned.sigma, multiples);
   return out;
 }
 
@@ -87,7 +60,7 @@ Json field_noise_json(const FieldNoise& noise, const Plan& plan) {
   Json json = {
       {"sigma",
        {{"least", noise.sigma.least}, {"median", noise.sigma.median}, {"largest", noise.sigma.largest}}},
-      {"epsilon_in_sigma", plan.epsilon_abs / noise.sigma.median},
+      {"epsilon_in_sigma", noise.sigmas ? *noise.sigmas : plan.epsilon_abs / noise.sigma.median},
       {"split", Json()},
       {"foreseen", Json::array()}};
   if (noise.split)
@@ -108,7 +81,8 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
     fmt::print("  split        halves of the views differ by {:.2f} of that{}\n", noise.split->ratio(),
                judgement(*noise.split));
   else fmt::print("  split        too few views to be split for comparison\n");
-  fmt::print("  tolerance    epsilon is {:.2f} sigma\n", plan.epsilon_abs / median);
+  if (noise.sigmas) fmt::print("  tolerance    {:g} sigma of its own in each brick\n", *noise.sigmas);
+  else fmt::print("  tolerance    epsilon is {:.2f} sigma\n", plan.epsilon_abs / median);
   for (const SigmaForecast& f : noise.forecasts)
     fmt::print(
         "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen, "

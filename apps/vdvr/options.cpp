@@ -223,7 +223,8 @@ Compression compression(const Arguments& args) {
 
 void add_tolerance(Arguments& args) {
   args.group("Tolerance")
-      .value("epsilon", "0.03|3%", "fraction of the reference range")
+      .value("epsilon", "3%|0.03|1sigma",
+             "fraction of the reference range; or of the scan's own noise there, brick by brick")
       .value("epsilon-abs", "E", "in density units");
 }
 
@@ -239,9 +240,20 @@ double fraction_option(const Arguments& args, const std::string& name) {
   return fraction;
 }
 
+std::optional<double> sigmas_option(const Arguments& args) {
+  constexpr std::string_view unit = "sigma";
+  if (!args.has("epsilon")) return {};
+  std::string text = args.text("epsilon");
+  if (!text.ends_with(unit)) return {};
+  text.resize(text.size() - unit.size());
+  const double sigmas = parse_number("--epsilon", text);
+  if (!(sigmas > 0)) throw InputError(fmt::format("--epsilon: {} is not above 0", args.text("epsilon")));
+  return sigmas;
+}
+
 Tolerance tolerance(const Arguments& args) {
   if (args.has("epsilon") == args.has("epsilon-abs"))
-    throw InputError("give a tolerance: either --epsilon 3% or --epsilon-abs in density units");
+    throw InputError("give a tolerance: --epsilon 3%, --epsilon 1sigma, or --epsilon-abs in density units");
   Tolerance result;
   if (args.has("epsilon-abs")) {
     result.absolute = args.positive_or("epsilon-abs", 0);

@@ -30,6 +30,8 @@ RateOptions rate_options(const Arguments& args);
 int upsampling_option(const Arguments& args);
 /// 0.03 or 3%, above 0 and at most 1.
 double fraction_option(const Arguments& args, const std::string& name);
+/// --epsilon 1sigma, .5sigma: the number; nothing of any other tolerance.
+std::optional<double> sigmas_option(const Arguments& args);
 /// Exactly one of --epsilon and --epsilon-abs.
 Tolerance tolerance(const Arguments& args);
 /// Includes --roi of the grid group.

@@ -157,6 +157,16 @@ void print_budget(const ErrorBudget& budget, double epsilon_abs) {
   if (budget.sampler.image3d) line("sampler image3d", *budget.sampler.image3d);
 }
 
+void print_noise_record(const Certificate& c) {
+  const NoiseRecord& n = *c.noise;
+  const double worst = worst_in_sigma(c, c.budget.sampler.buffer.value);
+  fmt::print("  noise        sigma of F {:.4g} ({:.4g} to {:.4g}), estimated from {}{}\n", n.median, n.least,
+             n.largest, n.source, n.photons > 0 ? fmt::format(": {:.4g} photons a pixel", n.photons) : "");
+  if (worst > 0 && !c.comparison)
+    fmt::print("  in sigma     interpolation errs by at most {:.3g} sigma of its brick{}\n", worst,
+               n.tolerance_sigmas ? fmt::format("; {:g} was asked for", *n.tolerance_sigmas) : "");
+}
+
 void print_certificate(const Certificate& c) {
   const auto verdict = [&](const char* sampler, bool holds, double total) {
     fmt::print("  {:<12} {}: total {:.4g}, {:.1f} % of the tolerance\n", sampler,
@@ -172,6 +182,7 @@ void print_certificate(const Certificate& c) {
   verdict("buffer", c.holds_buffer, c.total_buffer);
   if (c.holds_image3d && c.total_image3d) verdict("image3d", *c.holds_image3d, *c.total_image3d);
   print_budget(c.budget, c.epsilon_abs);
+  if (c.noise) print_noise_record(c);
   fmt::print("  measured     |V - gold| {:.4g}, with gold's and the projections' own errors {:.4g}, at {}\n",
              c.measured_max, c.measured_total, vec_text(c.worst_at));
   fmt::print("  rates        u {}x {}, gold {}x\n", c.rates.upsampling, text_of(c.rates.interpolation),

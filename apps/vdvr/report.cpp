@@ -177,6 +177,20 @@ std::string pictures(const RunReport& run) {
 
 // --- the certificate in words ---
 
+/// What the bounds are in units of the scan's noise.
+std::string in_sigma(const Certificate& c) {
+  if (!c.noise) return "";
+  const NoiseRecord& n = *c.noise;
+  return fmt::format(
+      "<li>In units of the scan's own noise: interpolation errs by at most {} sigma of the brick{}. Sigma, "
+      "the "
+      "standard deviation of F, runs from {} to {}, {} in the middle: an estimate, from {}.</li>\n",
+      number_html(worst_in_sigma(c, c.budget.sampler.buffer.value), "noise.worst.buffer"),
+      n.tolerance_sigmas ? fmt::format(", where {} was asked for", number_text(*n.tolerance_sigmas)) : "",
+      number_html(n.least, "noise.sigma.least"), number_html(n.largest, "noise.sigma.largest"),
+      number_html(n.median, "noise.sigma.median"), escaped(n.source));
+}
+
 std::string promised(const RunReport& run) {
   const Certificate& c = run.certificate;
   std::string html = fmt::format(
@@ -194,7 +208,7 @@ std::string promised(const RunReport& run) {
   };
   sampler("buffer", c.holds_buffer, c.total_buffer);
   if (c.holds_image3d && c.total_image3d) sampler("image3d", *c.holds_image3d, *c.total_image3d);
-  return html + "</ul>\n";
+  return html + in_sigma(c) + "</ul>\n";
 }
 
 std::string not_promised(const RunReport& run) {

@@ -12,6 +12,7 @@
 
 #include "host/prepare/preparation_json.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/hash.hpp"
 
 namespace vdvr {
 namespace {
@@ -56,6 +57,25 @@ Json numbers(const char* member, const Numbers& values) {
   Json list = Json::array();
   for (const double v : values) list.push_back(finite(member, v));
   return list;
+}
+
+/// `worst`: by how many sigmas of its own a brick's bound is the largest, of each sampler.
+Json noise(const Certificate& c) {
+  const NoiseRecord& n = *c.noise;
+  Json j = {{"source", n.source}};
+  if (n.photons > 0) j["photons"] = finite("noise.photons", n.photons);
+  j["sigma"] = {{"least", finite("noise.sigma.least", n.least)},
+                {"median", finite("noise.sigma.median", n.median)},
+                {"largest", finite("noise.sigma.largest", n.largest)}};
+  if (n.tolerance_sigmas) j["tolerance_sigmas"] = finite("noise.tolerance_sigmas", *n.tolerance_sigmas);
+  if (!c.comparison && !c.brick_totals.empty() && !c.brick_sigma.empty()) {
+    const SamplerTerms& sampler = c.budget.sampler;
+    j["worst"]["buffer"] = finite("noise.worst.buffer", worst_in_sigma(c, sampler.buffer.value));
+    if (sampler.image3d)
+      j["worst"]["image3d"] = finite("noise.worst.image3d", worst_in_sigma(c, sampler.image3d->value));
+  }
+  j["brick_sigma_sha256"] = n.sha256;
+  return j;
 }
 
 Json options(const std::string& text) {
@@ -195,6 +215,25 @@ void read_promise(const Member& m, Certificate& c) {
   }
 }
 
+void read_noise(const Member& m, Certificate& c) {
+  NoiseRecord& n = c.noise.emplace();
+  n.source = m.at("source").text();
+  if (m.has("photons")) n.photons = m.at("photons").number();
+  const Member sigma = m.at("sigma");
+  n.least = sigma.at("least").number();
+  n.median = sigma.at("median").number();
+  n.largest = sigma.at("largest").number();
+  if (!(n.least > 0 && n.least <= n.median && n.median <= n.largest))
+    throw FileError("certificate: member 'noise.sigma' is not positive and in order");
+  if (m.has("tolerance_sigmas")) {
+    n.tolerance_sigmas = m.at("tolerance_sigmas").number();
+    if (!(*n.tolerance_sigmas > 0))
+      throw FileError(fmt::format("certificate: member 'noise.tolerance_sigmas' is {}; it must be positive",
+                                  *n.tolerance_sigmas));
+  }
+  n.sha256 = m.at("brick_sigma_sha256").text();
+}
+
 void read_method(const Member& m, Certificate& c) {
   const Member rates = m.at("rates"), field = m.at("field");
   c.rates.upsampling = rates.at("upsampling_u").rate();
@@ -256,9 +295,12 @@ std::string contradiction(const Certificate& c) {
                ? "it was built for comparison, and yet something 'holds'"
                : "";
   const bool image_fits =
-      !c.total_image3d || !c.holds_image3d || *c.holds_image3d == (*c.total_image3d <= c.epsilon_abs);
-  if (c.holds_buffer != (c.total_buffer <= c.epsilon_abs) || !image_fits)
-    return fmt::format("'holds' does not follow from total and epsilon_abs {}", c.epsilon_abs);
+      !c.total_image3d || !c.holds_image3d || !c.budget.sampler.image3d ||
+      *c.holds_image3d == within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
+  if (c.holds_buffer != within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value) || !image_fits)
+    return fmt::format(
+        "'holds' does not follow from total and epsilon_abs {}{}", c.epsilon_abs,
+        c.noise && c.noise->tolerance_sigmas ? ", or not from the bounds and sigma of bricks" : "");
   // Written with all digits: what differs in the tenth was not written together.
   const auto same = [](double a, double b) {
     return std::abs(a - b) <= 1e-10 * std::max(std::abs(a), std::abs(b));
@@ -275,6 +317,26 @@ std::string contradiction(const Certificate& c) {
     return fmt::format("total {} of the image3d sampler is not measured_total, arithmetic and sampler",
                        *c.total_image3d);
   return {};
+}
+
+double worst_in_sigma(const Certificate& c, double sampler) {
+  double worst = 0;
+  for (std::size_t i = 0; i < std::min(c.brick_totals.size(), c.brick_sigma.size()); ++i)
+    if (c.brick_totals[i] >= 0)
+      worst = std::max(worst, (static_cast<double>(c.brick_totals[i]) + c.budget.arithmetic.value + sampler) /
+                                  static_cast<double>(c.brick_sigma[i]));
+  return worst;
+}
+
+bool within_tolerance(const Certificate& c, double total, double sampler) {
+  if (!(total <= c.epsilon_abs)) return false;
+  return !c.noise || !c.noise->tolerance_sigmas || worst_in_sigma(c, sampler) <= *c.noise->tolerance_sigmas;
+}
+
+std::string sigma_sha256(const std::vector<float>& brick_sigma) {
+  Sha256 hash;
+  hash.update(brick_sigma.data(), brick_sigma.size() * sizeof(float));
+  return hash.hex();
 }
 
 std::string to_json(const Certificate& c) {
@@ -294,6 +356,7 @@ std::string to_json(const Certificate& c) {
   j["measured_max"] = finite("measured_max", c.measured_max);
   j["measured_total"] = finite("measured_total", c.measured_total);
   j["worst_at"] = numbers("worst_at", c.worst_at);
+  if (c.noise) j["noise"] = noise(c);
   j["rates"] = {{"upsampling_u", c.rates.upsampling},
                 {"u_filter", text_of(c.rates.interpolation)},
                 {"gold", c.rates.gold}};
@@ -334,6 +397,7 @@ Certificate certificate_from_json(const std::string& text) {
   const Member m(parsed, "");
   Certificate c;
   read_promise(m, c);
+  if (m.has("noise")) read_noise(m.at("noise"), c);
   read_method(m, c);
   read_scope(m, c);
   read_origin(m, c);

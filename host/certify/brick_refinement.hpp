@@ -16,6 +16,10 @@ class BrickRefinement {
   BrickRefinement(const Refinement& wanted, const Units& units);
   /// What |V - F| may be everywhere.
   [[nodiscard]] double everywhere() const { return everywhere_; }
+  /// Whether each brick's tolerance is known from the start.
+  [[nodiscard]] bool knows_bricks() const { return !wanted_.by_brick.empty(); }
+  /// Bricks begin at what is known of them. `rest` and `least` as below, before anything was measured.
+  void begin(double rest, double least);
   /// Asks. `rest` is what a brick's bound holds beside what is measured at nodes, `least` the least tolerance
   /// of a node. Tolerances only fall: false where `ask` is content, or asks for nothing that bricks do not
   /// have.
@@ -24,6 +28,8 @@ class BrickRefinement {
   [[nodiscard]] NodeTolerance with_bricks(double all) const { return {all, by_brick_}; }
 
  private:
+  bool take(const std::vector<float>& asked, double rest, double least, const std::vector<float>& totals);
+
   const Refinement& wanted_;
   Units units_;
   double everywhere_;

@@ -367,7 +367,11 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   std::optional<BrickRefinement> refinement;
   if (options.refinement) refinement.emplace(*options.refinement, units);
   const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
-  SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes);
+  const bool by_brick = refinement && refinement->knows_bricks();
+  SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes, by_brick);
+  if (refinement)
+    refinement->begin(epsilon_abs - samplers.first_tolerance(epsilon_abs),
+                      samplers.first_tolerance(plan.epsilon_abs));
   records.begin(
       journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
   bool refined = false;
@@ -375,9 +379,15 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     const SamplerTerms sampler = samplers.of(measured.volume);
     result.certificate =
         fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
-    refined =
-        refinement && refinement->asks(measured.volume, result.certificate, samplers.beside_nodes(sampler),
-                                       samplers.first_tolerance(plan.epsilon_abs));
+    const double rest =
+        by_brick ? samplers.beside_nodes(sampler, plan.epsilon_abs) : samplers.beside_nodes(sampler);
+    const bool asked =
+        refinement && refinement->asks(measured.volume, result.certificate, rest,
+                                       samplers.first_tolerance(plan.epsilon_abs) / (by_brick ? 2 : 1));
+    // What is known from the start only changes by what samplers were measured to take: little, of few
+    // bricks.
+    if (asked && by_brick) return refinement->with_bricks(samplers.now());
+    refined = asked;
     if (refined) return std::nullopt;
     const std::optional<double> less = samplers.smaller(result.certificate);
     if (!less) return std::nullopt;

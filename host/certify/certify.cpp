@@ -59,6 +59,8 @@ void check_options(const CertifyOptions& options) {
 constexpr const char* of_region_note =
     "the grid is that part of the default one whose bricks meet `roi`: the range is the range there";
 
+bool is_cropped(const CertifyOptions& options) { return options.build.roi && !options.grid.size; }
+
 // Of the default grid, what the region of interest meets.
 Grid grid_of_region(const ProjectionSet& scan, const FieldOptions& field, const std::array<double, 6>& roi,
                     const Grid& whole, int granularity) {
@@ -131,16 +133,23 @@ void refuse_empty_promise(const Certificate& c) {
 
 }  // namespace
 
-Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
-               const CertifyOptions& options, const Progress& progress) {
+Grid grid_to_certify(const ProjectionSet& scan, const CertifyOptions& options) {
   check_options(options);
   FieldOptions field = options.field;
   field.center = center_of(field, scan.geometry);
   Grid grid = certified_grid(scan, field, options.grid);
-  const bool cropped = options.build.roi && !options.grid.size;
-  if (cropped) grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
+  if (is_cropped(options))
+    grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
+  return grid;
+}
+
+Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
+               const CertifyOptions& options, const Progress& progress) {
+  const Grid grid = grid_to_certify(scan, options);
+  FieldOptions field = options.field;
+  field.center = center_of(field, scan.geometry);
   Plan plan = make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
-  if (cropped) plan.notes.emplace_back(of_region_note);
+  if (is_cropped(options)) plan.notes.emplace_back(of_region_note);
   return plan;
 }
 

@@ -1,10 +1,16 @@
 // Tolerances in sigma; see vdvr/noise_forecast.hpp.
 #include "vdvr/noise_forecast.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <utility>
 
 #include "host/certify/foresee.hpp"
+#include "host/gold/gold_settings.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
@@ -13,33 +19,24 @@
 namespace vdvr {
 namespace {
 
-// [bz][by][bx]: the least sigma of a brick's corners; infinite where no corner has any.
-std::vector<float> least_of_bricks(const Volume& sigma, const Index3& bricks) {
-  const Index3 n = sigma.grid.samples();
-  std::vector<float> out(at(bricks[0] * bricks[1] * bricks[2]), std::numeric_limits<float>::infinity());
-  for (std::int64_t z = 0; z < bricks[2]; ++z)
-    for (std::int64_t y = 0; y < bricks[1]; ++y)
-      for (std::int64_t x = 0; x < bricks[0]; ++x) {
-        float& least = out[at((z * bricks[1] + y) * bricks[0] + x)];
-        for (std::int64_t c = 0; c < 8; ++c) {
-          const float s =
-              sigma.samples[at(((z + (c >> 2)) * n[1] + y + ((c >> 1) & 1)) * n[0] + x + (c & 1))];
-          if (s > 0) least = std::min(least, s);
-        }
-      }
-  return out;
-}
+// What is asked of a brick lies below what is promised by more than sums in fp32 round by.
+constexpr double margin = 1 - 0x1p-18;
 
-}  // namespace
-
-SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field) {
+std::vector<std::uint8_t> seen_samples(const Volume& sigma, const ProjectionSet& scan,
+                                       const FieldOptions& field) {
   const CertifiedRegion region(scan, field);
   const Index3 n = sigma.grid.samples();
-  std::vector<float> covered;
+  std::vector<std::uint8_t> seen(sigma.samples.size(), 0);
   for (std::int64_t i = 0; i < sigma.grid.sample_count(); ++i)
-    if (sigma.samples[at(i)] > 0 &&
-        region.contains(sigma.grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]})))
-      covered.push_back(sigma.samples[at(i)]);
+    seen[at(i)] = sigma.samples[at(i)] > 0 &&
+                  region.contains(sigma.grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  return seen;
+}
+
+SigmaRange range_of(const Volume& sigma, const std::vector<std::uint8_t>& seen) {
+  std::vector<float> covered;
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if (seen[i]) covered.push_back(sigma.samples[i]);
   if (covered.empty())
     throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
   std::sort(covered.begin(), covered.end());
@@ -47,17 +44,49 @@ SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const Fie
           static_cast<double>(covered.back())};
 }
 
-std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const Volume& sigma,
+}  // namespace
+
+SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field) {
+  return range_of(sigma, seen_samples(sigma, scan, field));
+}
+
+BrickSigma brick_sigma(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field,
+                       const Grid& grid, int granularity) {
+  const std::vector<std::uint8_t> seen = seen_samples(sigma, scan, field);
+  const Index3 n = sigma.grid.samples(), bricks = Bricks(grid, granularity).along();
+  BrickSigma out{{}, range_of(sigma, seen)};
+  out.of_brick.resize(at(bricks[0] * bricks[1] * bricks[2]));
+  for (std::int64_t z = 0; z < bricks[2]; ++z)
+    for (std::int64_t y = 0; y < bricks[1]; ++y)
+      for (std::int64_t x = 0; x < bricks[0]; ++x) {
+        float least = std::numeric_limits<float>::infinity();
+        for (std::int64_t c = 0; c < 8; ++c) {
+          const std::size_t i = at(((z + (c >> 2)) * n[1] + y + ((c >> 1) & 1)) * n[0] + x + (c & 1));
+          if (seen[i]) least = std::min(least, sigma.samples[i]);
+        }
+        out.of_brick[at((z * bricks[1] + y) * bricks[0] + x)] =
+            std::isfinite(least) ? least : static_cast<float>(out.range.least);
+      }
+  return out;
+}
+
+BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& plan, const ScanNoise& noise,
+                         const Progress& progress) {
+  const int granularity = plan.layout.granularity;
+  return brick_sigma(
+      noise_of_field(device, scan, plan.field, noise.model, noise_grid(plan.grid, granularity), progress),
+      scan, plan.field, plan.grid, granularity);
+}
+
+std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& sigma,
                                             std::span<const double> multiples) {
   if (!plan.foresight || plan.estimated) return {};
   Foresight& foresight = *plan.foresight;
-  const std::vector<float> least = least_of_bricks(sigma, Bricks(plan.grid, plan.layout.granularity).along());
   std::vector<SigmaForecast> out;
   for (const double multiple : multiples) {
-    NodeTolerance tolerance(0, least);
+    NodeTolerance tolerance(0, sigma.of_brick);
     for (float& brick : tolerance.by_brick) {
-      if (!(brick < std::numeric_limits<float>::infinity())) continue;
-      const double wanted = multiple * static_cast<double>(brick) - plan.budget.arithmetic.value;
+      const double wanted = multiple * margin * static_cast<double>(brick) - plan.budget.arithmetic.value;
       // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
       brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, foresight.units()));
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
@@ -65,6 +94,68 @@ std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const Volume& sigm
     if (tolerance.of_all > 0) out.push_back({multiple, foresight.foresee(tolerance).samples_ratio});
   }
   return out;
+}
+
+PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
+                               const ScanNoise& noise, const CertifyOptions& options,
+                               const Progress& progress) {
+  if (!(multiple > 0) || !std::isfinite(multiple))
+    throw InputError(fmt::format("a tolerance of {} sigma must be positive and finite", multiple));
+  FieldOptions field = options.field;
+  field.center = center_of(field, scan.geometry);
+  const Grid grid = grid_to_certify(scan, options);
+  const int granularity = fitting_granularity(options.plan.granularity, grid);
+  PlanInSigma out;
+  out.sigma =
+      brick_sigma(noise_of_field(device, scan, field, noise.model, noise_grid(grid, granularity), progress),
+                  scan, field, grid, granularity);
+  CertifyOptions whole = options;
+  whole.plan.estimate = false;
+  out.plan =
+      make_plan(device, scan, Tolerance{{}, multiple * margin * out.sigma.range.least}, whole, progress);
+  if (const auto foreseen = foresee_in_sigma(out.plan, out.sigma, std::array{multiple}); !foreseen.empty())
+    out.plan.samples_ratio = foreseen.front().samples_ratio;
+  return out;
+}
+
+Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
+  Refinement out;
+  for (const float s : sigma.of_brick) {
+    out.by_brick.push_back(static_cast<float>(multiple * margin * static_cast<double>(s)));
+    out.everywhere_abs = std::max(out.everywhere_abs, multiple * static_cast<double>(s));
+  }
+  out.digest = fmt::format("{} sigma of {}", multiple, sigma_sha256(sigma.of_brick));
+  return out;
+}
+
+BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
+                             const ScanNoise& noise, CertifyOptions options, const Progress& progress) {
+  options.plan.foresee = false;
+  PlanInSigma made = make_plan_in_sigma(device, scan, multiple, noise, options, progress);
+  options.build.refinement = refinement_in_sigma(made.sigma, multiple);
+  BuildResult result = certify(device, scan, std::move(made.plan), options, progress);
+  note_noise(result.certificate, noise, made.sigma, multiple);
+  return result;
+}
+
+void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
+                std::optional<double> multiple) {
+  const SigmaRange& range = sigma.range;
+  c.noise =
+      NoiseRecord{noise.model.source, noise.model.photons,         range.least, range.median, range.largest,
+                  multiple,           sigma_sha256(sigma.of_brick)};
+  c.brick_sigma = sigma.of_brick;
+  if (!multiple || c.comparison) return;
+  c.holds_buffer = within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value);
+  if (c.total_image3d && c.holds_image3d)
+    c.holds_image3d = within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
+  if (!c.holds_buffer) {
+    const double worst = worst_in_sigma(c, c.budget.sampler.buffer.value);
+    throw ToleranceError(
+        fmt::format("a brick's bound is {:.4g} of its sigma, where {:.4g} is asked: allow "
+                    "at least {:.3g}sigma",
+                    worst, *multiple, 1.02 * worst));
+  }
 }
 
 }  // namespace vdvr

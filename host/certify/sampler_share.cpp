@@ -24,7 +24,7 @@ double worse_of(const SamplerTerms& sampler) {
 }  // namespace
 
 SamplerShare::SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& plan, const Units& units,
-                           double epsilon_abs, double arithmetic, const FieldSlopes& base)
+                           double epsilon_abs, double arithmetic, const FieldSlopes& base, bool buffer_alone)
     : kinds_(kinds),
       plan_(plan),
       units_(units),
@@ -33,7 +33,7 @@ SamplerShare::SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& pla
       charges_(plan.settings.comparison.terms != Terms::grid) {
   for (const Crew::Kind& kind : kinds) {
     SamplerTerms sampler = terms(kind, base, longest_atlas(kind.info));
-    const bool coarse = sampler.image3d && kind.probe.delta > fp32_weights;
+    const bool coarse = sampler.image3d && (kind.probe.delta > fp32_weights || buffer_alone);
     if (coarse) sampler.image3d.reset();
     coarse_ = coarse_ || coarse;
     reserved_ = std::max(reserved_, reserve * worse_of(sampler));
@@ -62,8 +62,10 @@ SamplerTerms SamplerShare::of(const MixedVolume& volume) const {
   return worst;
 }
 
-double SamplerShare::beside_nodes(const SamplerTerms& sampler) const {
-  return charges_ ? arithmetic_ + worse_of(sampler) : 0;
+double SamplerShare::beside_nodes(const SamplerTerms& sampler, double tolerance) const {
+  if (!charges_) return 0;
+  const double worse = arithmetic_ + worse_of(sampler);
+  return worse <= tolerance / 8 ? worse : arithmetic_ + sampler.buffer.value;
 }
 
 double SamplerShare::left(double taken, double epsilon_abs) const {

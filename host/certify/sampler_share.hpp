@@ -3,6 +3,7 @@
 // falls as bricks with steep samples are refined. Called by build.cpp.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -25,14 +26,19 @@ class SamplerShare {
   /// `epsilon_abs` in `units`, as all values here; `arithmetic`: what rounding up to gold takes. Where
   /// nothing is charged (terms grid) all of epsilon is left. Refers to the plan and the devices. `base`:
   /// slopes of the base volume, by which a reserve is left for the buffer at first, and nothing beside it for
-  /// the texture unit. Throws ToleranceError where nothing is left for nodes.
+  /// a coarse texture unit. For a fine one what the longest atlas would take is left, unless
+  /// `buffer_alone`. Throws ToleranceError where nothing is left for nodes.
   SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& plan, const Units& units, double epsilon_abs,
-               double arithmetic, const FieldSlopes& base);
+               double arithmetic, const FieldSlopes& base, bool buffer_alone = false);
 
   /// On the worst of the devices.
   [[nodiscard]] SamplerTerms of(const MixedVolume& volume) const;
-  /// What a bound holds beside what is measured at nodes: arithmetic, and what the worse sampler takes.
-  [[nodiscard]] double beside_nodes(const SamplerTerms& sampler) const;
+  /// What a bound holds beside what is measured at nodes: arithmetic, and what the worse sampler takes; the
+  /// buffer, where the texture unit would take more than an eighth of `tolerance`.
+  [[nodiscard]] double beside_nodes(const SamplerTerms& sampler,
+                                    double tolerance = std::numeric_limits<double>::infinity()) const;
+  /// What nodes are brought within now.
+  [[nodiscard]] double now() const { return now_; }
 
   /// What |V - gold| + T + P may be at first, within this tolerance. Throws ToleranceError where nothing is
   /// left.

@@ -129,6 +129,10 @@ float CertifiedPoints::bound(const Vec3& p) const {
 
 float CertifiedPoints::bound_or_nan(const Vec3& p) const { return promised(p) ? bound(p) : kNothing; }
 
+float CertifiedPoints::sigma(const Vec3& p) const {
+  return certificate_->brick_sigma.empty() ? kNothing : certificate_->brick_sigma[brick_of(p)];
+}
+
 void CertifiedPoints::values(std::span<const Vec3> points, std::span<float> out,
                              const Progress& progress) const {
   require_fit(points.size(), out.size());
@@ -145,6 +149,13 @@ void CertifiedPoints::bounds(std::span<const Vec3> points, std::span<float> out,
 void CertifiedPoints::bounds(const Lattice& lattice, std::span<float> out, const Progress& progress) const {
   require_fit(static_cast<std::size_t>(lattice.size()), out.size());
   for_lattice(lattice, progress, "bound", [&](std::size_t i, const Vec3& p) { out[i] = bound_or_nan(p); });
+}
+
+void CertifiedPoints::sigmas(std::span<const Vec3> points, std::span<float> out,
+                             const Progress& progress) const {
+  require_fit(points.size(), out.size());
+  for_points(points.size(), progress, "sigma",
+             [&](std::size_t i) { out[i] = covered(points[i]) ? sigma(points[i]) : kNothing; });
 }
 
 }  // namespace vdvr

@@ -21,9 +21,14 @@ bool may_draw_image3d(Device& device, SamplerKind asked) {
 }
 
 std::string why_not(const Device& device, const Certificate& here) {
+  const double share = here.budget.sampler.image3d->value;
+  if (*here.total_image3d <= here.epsilon_abs)
+    return fmt::format(
+        "the texture unit of '{}' may err by {:.3g}, with which a brick's bound is {:.4g} of its sigma",
+        device.info().name, share, worst_in_sigma(here, share));
   return fmt::format(
       "the texture unit of '{}' may err by {:.3g}, with which the total {:.4g} exceeds epsilon {:.4g}",
-      device.info().name, here.budget.sampler.image3d->value, *here.total_image3d, here.epsilon_abs);
+      device.info().name, share, *here.total_image3d, here.epsilon_abs);
 }
 
 }  // namespace
@@ -38,14 +43,15 @@ Certificate certificate_on(Device& device, const MixedVolume& volume, const Cert
   if (!info.subnormals && !(here.buffer.value <= c.budget.sampler.buffer.value)) {
     c.budget.sampler.buffer = here.buffer;
     c.total_buffer = sum + here.buffer.value;
-    c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
+    c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, here.buffer.value);
   }
   forget_image3d(c);
   if (!here.image3d) return c;
   c.budget.sampler.image3d = here.image3d;
   c.total_image3d = sum + here.image3d->value;
   // Where nothing is certified of the arithmetic that is the same everywhere, nothing is of this.
-  c.holds_image3d = stored.holds_buffer && !c.comparison && *c.total_image3d <= c.epsilon_abs;
+  c.holds_image3d =
+      stored.holds_buffer && !c.comparison && within_tolerance(c, *c.total_image3d, here.image3d->value);
   return c;
 }
 

@@ -67,6 +67,7 @@ PictureRefinement::~PictureRefinement() = default;
 
 Refinement PictureRefinement::refinement(double everywhere_abs) {
   return {everywhere_abs,
+          {},
           [this](const MixedVolume& volume, const Certificate& certificate) {
             return impl_->ask(volume, certificate);
           },

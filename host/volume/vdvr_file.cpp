@@ -244,6 +244,18 @@ void read_totals(const h5::Reader& file, const MixedVolume& v, Certificate& c) {
                                        c.measured_total));
 }
 
+/// Sigma of F by brick, where the certificate speaks of it.
+void read_sigma(const h5::Reader& file, const MixedVolume& v, Certificate& c) {
+  if (!c.noise) return;
+  const Index3 b = v.bricks();
+  const h5::Dataset d = expect(file, kSigma, {h5::Element::f32}, shape_of({b[2], b[1], b[0]}));
+  c.brick_sigma.resize(d.count);
+  file.read(d, c.brick_sigma.data());
+  for (const float sigma : c.brick_sigma)
+    if (!(sigma > 0) || !std::isfinite(sigma))
+      file.refuse(kSigma, fmt::format("holds {}; a standard deviation is positive", sigma));
+}
+
 /// The base's offset and shift, as attributes of any integer type.
 void read_base_table(const h5::Reader& file, SampleBlock& b) {
   const auto value = [&](const char* name, std::int64_t most) {
@@ -322,7 +334,8 @@ Certificate read_certificate(const h5::Reader& file, const std::string& path, st
 /// Of all objects that a reader looks at. Paths of /tiles come after "/tiles" itself.
 std::vector<h5::Attribute> all_attributes(const h5::Reader& file) {
   std::vector<std::string> objects{"/"};
-  for (const char* path : {"/base", kTotals, kCertificate, kComparison, "/grid", "/level", "/tile", "/tiles"})
+  for (const char* path :
+       {"/base", kTotals, kSigma, kCertificate, kComparison, "/grid", "/level", "/tile", "/tiles"})
     if (file.has(path)) objects.emplace_back(path);
   if (file.has("/tiles"))
     for (const std::string& name : file.members("/tiles")) objects.push_back("/tiles/" + name);
@@ -348,6 +361,9 @@ std::string read_seal(const h5::Reader& file, VdvrFile& result) {
     return fmt::format(
         "the seal is broken: certificate, totals by brick and attributes have sha256 {}, the seal says {}",
         found, stored.substr(0, 64));
+  const Certificate& c = result.certificate;
+  if (c.noise && sigma_sha256(c.brick_sigma) != c.noise->sha256)
+    return fmt::format("the seal is broken: {} is not what the certificate was issued with", kSigma);
   if (!result.certificate.sealed)
     return "the seal is broken: there is one, but the certificate does not say so";
   result.seal = Seal::whole;
@@ -379,6 +395,7 @@ VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
   try {
     read_volume_data(file, contents, reading, result.volume);
     read_totals(file, result.volume, result.certificate);
+    read_sigma(file, result.volume, result.certificate);
   } catch (const std::bad_alloc&) {
     throw ResourceError(fmt::format("{}: not enough memory for the samples in its {} bytes", path.string(),
                                     file.file_bytes()));
@@ -451,6 +468,7 @@ VdvrParts open_parts(const std::filesystem::path& path, std::uint64_t max_memory
     read_table(file, contents, kind, b);
   }
   read_totals(file, v, result.certificate);
+  read_sigma(file, v, result.certificate);
   result.altered = read_seal(file, result);
   if (!result.altered.empty())
     throw MismatchError(fmt::format("{}: {}; build it again", path.string(), result.altered));

@@ -17,6 +17,7 @@ namespace vdvr {
 inline constexpr int newest_version = 4;
 
 inline constexpr const char* kTotals = "/brick_total";
+inline constexpr const char* kSigma = "/brick_sigma";
 inline constexpr const char* kCertificate = "/certificate";
 /// In its place where nothing is certified, so that nobody takes the one for the other.
 inline constexpr const char* kComparison = "/comparison";

@@ -53,12 +53,13 @@ void write_block(h5::Writer& file, const std::string& path, const h5::Shape& sha
   file.dataset(path + "_shift", {b.shift.size()}, std::span<const std::uint8_t>(b.shift));
 }
 
-void write_totals(h5::Writer& file, const MixedVolume& v, const std::vector<float>& totals) {
+void write_by_brick(h5::Writer& file, const char* name, const MixedVolume& v,
+                    const std::vector<float>& values) {
   const Index3 b = v.bricks();
-  if (totals.size() != v.level.size())
+  if (values.size() != v.level.size())
     throw InputError(
-        fmt::format("not written: {}: {} totals for {} bricks", kTotals, totals.size(), v.level.size()));
-  file.dataset(kTotals, shape_of({b[2], b[1], b[0]}), std::span<const float>(totals));
+        fmt::format("not written: {}: {} values for {} bricks", name, values.size(), v.level.size()));
+  file.dataset(name, shape_of({b[2], b[1], b[0]}), std::span<const float>(values));
 }
 
 }  // namespace
@@ -96,7 +97,8 @@ void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const C
     }
     if (stored.comparison) stored.brick_totals.clear();
     file.text(stored.comparison ? kComparison : kCertificate, json);
-    if (!stored.brick_totals.empty()) write_totals(file, v, stored.brick_totals);
+    if (!stored.brick_totals.empty()) write_by_brick(file, kTotals, v, stored.brick_totals);
+    if (stored.noise) write_by_brick(file, kSigma, v, stored.brick_sigma);
     file.attribute("/", kSeal, seal_of(json, stored.brick_totals, file.attributes()));
     file.close();
   }

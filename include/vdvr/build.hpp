@@ -24,11 +24,13 @@ struct BuildShare {
   int part = 1, parts = 1;
 };
 
-/// Refinement where something asks for it: bricks begin at a tolerance that holds everywhere, and are brought
-/// within a smaller one, round by round, as whoever looks at the volume asks. The plan's epsilon is then the
-/// smallest tolerance that can be asked for, since its rates suit that one.
+/// Refinement where something asks for it: bricks begin at a tolerance that holds everywhere, or at their own,
+/// and are brought within a smaller one, round by round, as whoever looks at the volume asks. The plan's
+/// epsilon is then the smallest tolerance that can be asked for, since its rates suit that one.
 struct Refinement {
   double everywhere_abs = 0;  ///< density units, no less than the plan's epsilon_abs
+  /// [bz][by][bx] what |V - F| may be in each brick from the start, world units; empty: everywhere_abs.
+  std::vector<float> by_brick;
   /// Given a measured volume and its certificate, in world units: [bz][by][bx] what |V - F| may be at most,
   /// or nothing where the volume will do. Called again once bricks are within it, or within the plan's
   /// epsilon.

@@ -48,6 +48,16 @@ struct CoveredCylinder {
   std::pair<double, double> z{0, 0};
 };
 
+/// What the scan's own noise does to F: an estimate (docs/noise.md), beside what is proved.
+struct NoiseRecord {
+  std::string source;  ///< LineIntegralNoise::source
+  double photons = 0;  ///< of a pixel in the open beam; 0 where the noise is not of counts
+  double least = 0, median = 0, largest = 0;  ///< the standard deviation sigma of F at covered samples
+  /// Promised: at covered points of each brick |V - F| is at most that many sigmas of the brick.
+  std::optional<double> tolerance_sigmas;
+  std::string sha256;  ///< of Certificate::brick_sigma
+};
+
 struct Certificate {
   double epsilon = 0;          ///< fraction of reference_range
   double epsilon_abs = 0;      ///< density units
@@ -67,6 +77,9 @@ struct Certificate {
   /// [bz][by][bx] the same brick by brick, whose largest is measured_total; negative where nothing was
   /// tested. Empty for files of earlier versions. Not in the JSON: a dataset of the file.
   std::vector<float> brick_totals;
+  std::optional<NoiseRecord> noise;  ///< nothing where no noise was found, and in files of earlier versions
+  /// [bz][by][bx] with `noise`: sigma of F in each brick, density units. Not in the JSON: a dataset.
+  std::vector<float> brick_sigma;
   Vec3 worst_at{0, 0, 0};
   Rates rates;
   std::vector<Bound> bounds;
@@ -92,6 +105,15 @@ struct Certificate {
 /// and the sampler; infinite where nothing was tested. Throws InputError where the certificate has no totals
 /// by brick, or says nothing of image3d.
 VDVR_API std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
+
+/// The largest of brick_bounds() over sigma, of a sampler whose share is `sampler`; 0 where nothing was
+/// tested or no sigma is known.
+VDVR_API double worst_in_sigma(const Certificate& certificate, double sampler);
+/// Whether a volume of this total, drawn by a sampler whose share of it is `sampler`, is within the tolerance:
+/// epsilon_abs, and the promise in sigma where there is one.
+VDVR_API bool within_tolerance(const Certificate& certificate, double total, double sampler);
+/// SHA-256 of sigma by brick, as NoiseRecord has it.
+VDVR_API std::string sigma_sha256(const std::vector<float>& brick_sigma);
 
 /// One line where the certificate's own numbers do not follow from each other; empty where they do.
 VDVR_API std::string contradiction(const Certificate& certificate);

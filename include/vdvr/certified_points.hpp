@@ -59,11 +59,17 @@ class VDVR_API CertifiedPoints {
   /// has none by brick the certificate's total. Infinite where nothing was tested.
   [[nodiscard]] float bound(const Vec3& point) const;
 
+  /// What the scan's noise is worth at a covered point, sigma of F in its brick: an estimate. NaN where the
+  /// certificate knows no noise.
+  [[nodiscard]] float sigma(const Vec3& point) const;
+
   /// V; NaN at points that are not covered. On all cores; throws InputError unless `out` fits, Interrupted.
   void values(std::span<const Vec3> points, std::span<float> out, const Progress& progress = {}) const;
   /// What bound() says; NaN where nothing is promised. The same of a lattice, out[z][y][x].
   void bounds(std::span<const Vec3> points, std::span<float> out, const Progress& progress = {}) const;
   void bounds(const Lattice& lattice, std::span<float> out, const Progress& progress = {}) const;
+  /// What sigma() says; NaN at points that are not covered.
+  void sigmas(std::span<const Vec3> points, std::span<float> out, const Progress& progress = {}) const;
 
  private:
   [[nodiscard]] float bound_or_nan(const Vec3& point) const;

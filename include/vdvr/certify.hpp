@@ -26,6 +26,9 @@ struct CertifyOptions {
   InputStatement input;  ///< what was stated when the scan was read (Understood::stated), for the certificate
 };
 
+/// The grid that such a plan has.
+VDVR_API Grid grid_to_certify(const ProjectionSet& scan, const CertifyOptions& options);
+
 /// The plan that certify() follows. Throws what make_plan of plan.hpp and make_grid throw.
 VDVR_API Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                         const CertifyOptions& options = {}, const Progress& progress = {});

@@ -1,13 +1,17 @@
-// Tolerances in units of the scan's own noise: what they are of the range, and what builds of them would
-// store.
+// Tolerances in units of the scan's own noise: what they are of the range, what builds of them would store,
+// and builds of them (docs/noise.md). The bound of each brick is proved; sigma, which it is held to, is
+// estimated.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
+#include "vdvr/certify.hpp"
 #include "vdvr/grid.hpp"
+#include "vdvr/noise.hpp"
 #include "vdvr/plan.hpp"
 #include "vdvr/projections.hpp"
 
@@ -20,16 +24,50 @@ struct SigmaRange {
 /// Throws InputError where no sample is covered.
 VDVR_API SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field);
 
+/// Sigma of F brick by brick.
+struct BrickSigma {
+  /// [bz][by][bx], density units: the least at those corners of the brick that views see, of a brick without
+  /// such a corner the least of all.
+  std::vector<float> of_brick;
+  SigmaRange range;
+};
+/// `sigma`: on noise_grid(grid, granularity). Throws what sigma_range() throws.
+VDVR_API BrickSigma brick_sigma(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field,
+                                const Grid& grid, int granularity);
+/// The same of a plan, by one more back-projection (noise_of_field).
+VDVR_API BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& plan,
+                                  const ScanNoise& noise, const Progress& progress = {});
+
 /// A build whose bricks may each err by so many sigmas of their own.
 struct SigmaForecast {
   double multiple = 1;
   double samples_ratio = 0;  ///< stored per base sample, as Plan::samples_ratio
 };
 
-/// `sigma`: on noise_grid(plan.grid, plan.layout.granularity); a brick's is the least of its corners. The
-/// plan's rates are taken as they are, which suits tolerances no smaller than its own. Nothing of a plan that
-/// was made without foresight or from a part of the scan. Cost: a plan's look at some bricks for each.
-VDVR_API std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const Volume& sigma,
+/// The plan's rates are taken as they are, which suits tolerances no smaller than its own. Nothing of a plan
+/// that was made without foresight or from a part of the scan. Cost: a plan's look at some bricks for each.
+VDVR_API std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& sigma,
                                                      std::span<const double> multiples);
+
+/// A plan whose epsilon is what the quietest brick may err by.
+struct PlanInSigma {
+  Plan plan;
+  BrickSigma sigma;
+};
+/// Of the whole scan, never estimated from a part. Throws what make_plan() throws; InputError for a multiple
+/// that is not positive and finite.
+VDVR_API PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
+                                        const ScanNoise& noise, const CertifyOptions& options = {},
+                                        const Progress& progress = {});
+/// How build() holds each brick to `multiple` times its sigma.
+VDVR_API Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple);
+/// Plans, builds and notes it. Throws what certify() throws.
+VDVR_API BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
+                                      const ScanNoise& noise, CertifyOptions options = {},
+                                      const Progress& progress = {});
+/// Writes what is known of the noise into the certificate of a build: with `multiple` of a build so refined,
+/// which is then promised. Throws ToleranceError where a brick's bound is more.
+VDVR_API void note_noise(Certificate& certificate, const ScanNoise& noise, const BrickSigma& sigma,
+                         std::optional<double> multiple = {});
 
 }  // namespace vdvr

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "arrays.hpp"
+#include "asked.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
 #include "vdvr/certify.hpp"
@@ -293,10 +294,21 @@ void add_plans(nb::module_& m) {
       .def_rw("terms", &Comparison::terms)
       .def_rw("closing", &Comparison::closing)
       .def_rw("epsilon_of_max", &Comparison::epsilon_of_max);
-  nb::class_<Tolerance>(m, "Tolerance")
+  nb::class_<Asked>(m, "Asked")
       .def(nb::init<>())
-      .def_rw("relative", &Tolerance::relative)
-      .def_rw("absolute", &Tolerance::absolute);
+      .def_prop_rw(
+          "relative", [](const Asked& a) { return a.tolerance.relative; },
+          [](Asked& a, std::optional<double> value) { a.tolerance.relative = value; }, nb::arg().none())
+      .def_prop_rw(
+          "absolute", [](const Asked& a) { return a.tolerance.absolute; },
+          [](Asked& a, std::optional<double> value) { a.tolerance.absolute = value; }, nb::arg().none())
+      .def_rw("sigmas", &Asked::sigmas)
+      .def_prop_rw(
+          "photons", [](const Asked& a) { return a.noise.photons; },
+          [](Asked& a, std::optional<double> value) { a.noise.photons = value; }, nb::arg().none())
+      .def_prop_rw(
+          "sigma_p", [](const Asked& a) { return a.noise.sigma_p; },
+          [](Asked& a, std::optional<double> value) { a.noise.sigma_p = value; }, nb::arg().none());
   nb::class_<CertifyOptions>(m, "CertifyOptions")
       .def(nb::init<>())
       .def_rw("field", &CertifyOptions::field)
@@ -372,16 +384,19 @@ void add_plans(nb::module_& m) {
       .def_ro("notes", &Plan::notes);
   m.def(
       "make_plan",
-      [](Device& device, const ProjectionSet& scan, const Tolerance& tolerance, const CertifyOptions& options,
+      [](Device& device, const ProjectionSet& scan, const Asked& asked, const CertifyOptions& options,
          nb::handle progress) {
         auto plan = std::make_unique<Plan>();
         run_long(progress, [&](const Progress& report) {
-          *plan = make_plan(device, scan, tolerance, options, report);
+          *plan = asked.sigmas ? make_plan_in_sigma(device, scan, *asked.sigmas, known_noise(scan, asked),
+                                                    options, report)
+                                     .plan
+                               : make_plan(device, scan, asked.tolerance, options, report);
         });
         plan->prepared.reset();
         return plan;
       },
-      "device"_a, "scan"_a, "tolerance"_a, "options"_a, "progress"_a.none());
+      "device"_a, "scan"_a, "asked"_a, "options"_a, "progress"_a.none());
 }
 
 }  // namespace

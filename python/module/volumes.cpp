@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "arrays.hpp"
+#include "asked.hpp"
 #include "held_volume.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
@@ -45,23 +46,29 @@ Held held_of(BuildResult&& built) {
   return std::make_shared<HeldVolume>(std::move(file));
 }
 
-Held build(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
-           const CertifyOptions& options, nb::handle progress) {
+BuildResult certified(Device& device, const ProjectionSet& scan, const Asked& asked,
+                      const CertifyOptions& options, const Progress& report) {
+  if (asked.sigmas)
+    return certify_in_sigma(device, scan, *asked.sigmas, known_noise(scan, asked), options, report);
+  return certify(device, scan, asked.tolerance, options, report);
+}
+
+Held build(Device& device, const ProjectionSet& scan, const Asked& asked, const CertifyOptions& options,
+           nb::handle progress) {
   Held held;
-  run_long(progress, [&](const Progress& report) {
-    held = held_of(certify(device, scan, tolerance, options, report));
-  });
+  run_long(progress,
+           [&](const Progress& report) { held = held_of(certified(device, scan, asked, options, report)); });
   return held;
 }
 
 /// The same into a file, with a journal of what is finished beside it, as `vdvr build` has them.
-Held build_into(Device& device, const ProjectionSet& scan, const Tolerance& tolerance, CertifyOptions options,
+Held build_into(Device& device, const ProjectionSet& scan, const Asked& asked, CertifyOptions options,
                 const std::filesystem::path& path, bool deflate, bool resume, nb::handle progress) {
   Held held;
   run_long(progress, [&](const Progress& report) {
     Journal journal(path.string() + ".journal", resume);
     options.build.journal = &journal;
-    held = held_of(certify(device, scan, tolerance, options, report));
+    held = held_of(certified(device, scan, asked, options, report));
     const std::lock_guard turn(hdf5_turn());
     write_vdvr(path, held->file().volume, held->file().certificate,
                deflate ? Compression::deflate : Compression::none);
@@ -116,6 +123,12 @@ nb::object values_at(HeldVolume& held, const PointArray& points) {
 nb::object bounds_at(HeldVolume& held, const PointArray& points) {
   std::vector<float> out(points.shape(0));
   run_long(nb::none(), [&](const Progress&) { held.points().bounds(points_of(points), out); });
+  return nb::cast(as_array(std::move(out), {points.shape(0)}));
+}
+
+nb::object sigmas_at(HeldVolume& held, const PointArray& points) {
+  std::vector<float> out(points.shape(0));
+  run_long(nb::none(), [&](const Progress&) { held.points().sigmas(points_of(points), out); });
   return nb::cast(as_array(std::move(out), {points.shape(0)}));
 }
 
@@ -247,6 +260,7 @@ void add_volumes(nb::module_& m) {
       .def("levels", &levels)
       .def("values", &values_at, "points"_a)
       .def("bounds", &bounds_at, "points"_a)
+      .def("sigmas", &sigmas_at, "points"_a)
       .def(
           "lattice",
           [](HeldVolume& h, std::optional<Vec3> spacing, std::optional<std::array<double, 6>> box) {
@@ -269,8 +283,8 @@ void add_volumes(nb::module_& m) {
             });
           },
           "path"_a, "deflate"_a);
-  m.def("build", &build, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "progress"_a.none());
-  m.def("build_into", &build_into, "device"_a, "scan"_a, "tolerance"_a, "options"_a, "path"_a, "deflate"_a,
+  m.def("build", &build, "device"_a, "scan"_a, "asked"_a, "options"_a, "progress"_a.none());
+  m.def("build_into", &build_into, "device"_a, "scan"_a, "asked"_a, "options"_a, "path"_a, "deflate"_a,
         "resume"_a, "progress"_a.none());
   m.def("open", &open, "path"_a, "max_memory_bytes"_a, "unverified"_a);
   add_verification(m);

@@ -125,6 +125,8 @@ def plan(
     epsilon: Union[str, float, None] = None,
     *,
     epsilon_abs: Optional[float] = None,
+    photons: Optional[float] = None,
+    sigma_p: Optional[float] = None,
     device: DeviceLike = None,
     progress: Optional[Progress] = None,
     **options: Any,
@@ -137,7 +139,8 @@ def plan(
     """
     wanted = _options(**options)
     wanted.input = _stated(scan)
-    return _core.make_plan(open_device(device), _checked(scan), tolerance(epsilon, epsilon_abs), wanted, progress)
+    asked = tolerance(epsilon, epsilon_abs, photons, sigma_p)
+    return _core.make_plan(open_device(device), _checked(scan), asked, wanted, progress)
 
 
 @_takes_options
@@ -146,6 +149,8 @@ def build(
     epsilon: Union[str, float, None] = None,
     *,
     epsilon_abs: Optional[float] = None,
+    photons: Optional[float] = None,
+    sigma_p: Optional[float] = None,
     save: Optional[Path] = None,
     overwrite: bool = False,
     compression: str = "deflate",
@@ -158,8 +163,10 @@ def build(
 
     Parameters
     ----------
-    epsilon : "3%" or 0.03 of F's range; or
+    epsilon : "3%" or 0.03 of F's range; "1sigma": of the scan's own noise, brick by brick; or
     epsilon_abs : a density.
+    photons, sigma_p : with "1sigma": photons of a pixel in the open beam, or the standard deviation of every line
+        integral, in place of what the projections tell.
     save : path of a .vdvr file that is written too. While the build goes on `SAVE.journal` keeps what is finished;
         it is removed once the file is in place.
     overwrite, compression : as `Volume.save` has them.
@@ -175,7 +182,7 @@ def build(
     wanted = _options(**options)
     wanted.input = _stated(scan)
     wanted.foresee = False
-    projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs)
+    projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs, photons, sigma_p)
     if save is None:
         if resume:
             raise _core.InputError("resume: give save=, beside which the journal lies")

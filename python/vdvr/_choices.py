@@ -44,15 +44,25 @@ def numbers(values: Any, count: int, name: str) -> Tuple[float, ...]:
     return result
 
 
-def tolerance(epsilon: Union[str, float, None], epsilon_abs: Optional[float]) -> "_core.Tolerance":
-    """From "3%", 0.03 or a density."""
-    result = _core.Tolerance()
+def tolerance(
+    epsilon: Union[str, float, None],
+    epsilon_abs: Optional[float],
+    photons: Optional[float] = None,
+    sigma_p: Optional[float] = None,
+) -> "_core.Asked":
+    """From "3%", 0.03, "1sigma" or a density."""
+    result = _core.Asked()
     if (epsilon is None) == (epsilon_abs is None):
-        raise _core.InputError("give a tolerance: either epsilon='3%' or epsilon_abs in density units")
+        raise _core.InputError("give a tolerance: either epsilon='3%' (or '1sigma') or epsilon_abs in density units")
     if epsilon_abs is not None:
         result.absolute = number(epsilon_abs, "epsilon_abs")
         return result
+    result.photons = None if photons is None else number(photons, "photons")
+    result.sigma_p = None if sigma_p is None else number(sigma_p, "sigma_p")
     text = str(epsilon).strip()
+    if text.endswith("sigma"):
+        result.sigmas = number(text[: -len("sigma")], "epsilon")
+        return result
     percent = text.endswith("%")
     fraction = number(text[:-1] if percent else text, "epsilon") / (100 if percent else 1)
     if not 0 < fraction <= 1:

@@ -83,6 +83,13 @@ class Volume:
         flat, shape = _points(points)
         return self._held.bounds(flat).reshape(shape)
 
+    def sigma(self, points: "ArrayLike") -> "NDArray[np.float32]":
+        """What the scan's noise is worth at points, the standard deviation of F in the brick there, in density:
+        float32 [...] of points [..., 3] (x, y, z). An estimate, not proved. NaN where points are not covered,
+        everywhere where the certificate knows no noise (`certificate["noise"]`)."""
+        flat, shape = _points(points)
+        return self._held.sigmas(flat).reshape(shape)
+
     def lattice(
         self, spacing: Union[float, Sequence[float], None] = None, box: Optional[Sequence[float]] = None
     ) -> "_core.Lattice":

@@ -95,6 +95,7 @@ BOOST_AUTO_TEST_CASE(bricks_are_brought_within_what_is_asked_and_no_others) {
     std::vector<float> first;
     const BuildResult result =
         c.built(Refinement{everywhere * c.range(),
+                           {},
                            [&](const MixedVolume& volume, const Certificate& certificate) {
                              ++calls;
                              const auto bounds = brick_bounds(certificate, false);
@@ -127,6 +128,7 @@ BOOST_AUTO_TEST_CASE(what_is_asked_twice_or_beyond_the_plan_s_epsilon_ends) {
   Case c;
   int calls = 0;
   const BuildResult result = c.built(Refinement{everywhere * c.range(),
+                                                {},
                                                 [&](const MixedVolume& volume, const Certificate&) {
                                                   ++calls;
                                                   return half_of(volume, 1e-3 * finest * c.range());
@@ -143,5 +145,5 @@ BOOST_AUTO_TEST_CASE(what_is_asked_twice_or_beyond_the_plan_s_epsilon_ends) {
 BOOST_AUTO_TEST_CASE(a_refinement_of_other_bricks_is_refused) {
   Case c;
   const auto wrong = [](const MixedVolume&, const Certificate&) { return std::vector<float>(3, 1.0f); };
-  BOOST_CHECK_THROW(c.built(Refinement{everywhere * c.range(), wrong, "wrong"}), InputError);
+  BOOST_CHECK_THROW(c.built(Refinement{everywhere * c.range(), {}, wrong, "wrong"}), InputError);
 }

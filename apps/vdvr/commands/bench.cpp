@@ -168,6 +168,7 @@ int bench_build(Arguments& args) {
   refuse(args, {"resume"}, "a timing has nothing to resume; give it to build");
   const CommonOptions common = common_options(args);
   Wanted wanted = wanted_of(args);
+  wanted.noted_noise = false;
   wanted.options.plan.foresee = false;
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
   ProgressLine progress(args.who(), common.quiet);

@@ -58,7 +58,9 @@ int build_part(const Arguments& args, const CommonOptions& common, Wanted wanted
   wanted.options.build.journal = &journal;
   wanted.options.build.crew = devices.crew();
   ProgressLine progress(args.who(), common.quiet);
+  wanted.noted_noise = false;
   Planned planned = read_and_plan(devices.first(), args, wanted, progress.callback());
+  if (planned.sigmas) wanted.options.build.refinement = refinement_in_sigma(*planned.sigma, *planned.sigmas);
   build_share(devices.first(), planned.scan, std::move(planned.plan), wanted.options.build, share,
               progress.callback());
   progress.clear();

@@ -173,7 +173,6 @@ int plan_command(Arguments& args) {
       .value("ranks", "N", "also what N ranks of vdvr-mpi would take, each with a device as this one")
       .value("machines", "M", "on which these ranks are, alike on each (default 1)");
   add_plan_options(args);
-  add_noise(args);
   add_build(args);
   add_common(args);
   if (!args.parse()) return 0;
@@ -199,8 +198,8 @@ int plan_command(Arguments& args) {
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
   const std::optional<PictureForecast> forecast =
       picture_forecast(device, planned, wanted, progress.callback());
-  const NoiseFound found = noise_of_scan(args.path("IN"), args, wanted.options.field, planned.scan);
-  const std::optional<FieldNoise> noise = noise_of_plan(device, planned, found, progress.callback());
+  const NoiseFound& found = planned.noise;
+  const std::optional<FieldNoise> noise = noise_of_plan(device, planned, progress.callback());
   Json json = plan_json(planned, forecast), pictures;
   json["noise"] = noise_json(found);
   if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.plan);

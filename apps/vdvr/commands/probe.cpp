@@ -25,7 +25,7 @@ namespace {
 /// One line of the result; what is absent is an empty field.
 struct Probe {
   bool covered = false;
-  std::optional<double> value, bound;
+  std::optional<double> value, bound, sigma;
   std::string level;
 };
 
@@ -68,20 +68,24 @@ std::vector<Vec3> read_points(const std::filesystem::path& path) {
   return points;
 }
 
-std::string to_csv(const std::vector<Vec3>& points, const std::vector<Probe>& probes) {
+std::string to_csv(const std::vector<Vec3>& points, const std::vector<Probe>& probes, bool sigma) {
   fmt::memory_buffer out;
-  const auto field = [&](const std::optional<double>& v) {
-    if (v)
-      fmt::format_to(std::back_inserter(out), "{}",
-                     *v);  // the shortest text that reads back to the same bits
-    out.push_back(',');
+  // The shortest text that reads back to the same bits.
+  const auto number = [&](const std::optional<double>& v) {
+    if (v) fmt::format_to(std::back_inserter(out), "{}", *v);
   };
-  fmt::format_to(std::back_inserter(out), "x,y,z,value,bound,level,covered\n");
+  fmt::format_to(std::back_inserter(out), "x,y,z,value,bound,level,covered{}\n", sigma ? ",sigma" : "");
   for (std::size_t i = 0; i < points.size(); ++i) {
-    for (const double c : points[i]) field(c);
-    field(probes[i].value);
-    field(probes[i].bound);
-    fmt::format_to(std::back_inserter(out), "{},{}\n", probes[i].level, probes[i].covered ? 1 : 0);
+    const Probe& probe = probes[i];
+    for (const std::optional<double> v : {std::optional(points[i][0]), std::optional(points[i][1]),
+                                          std::optional(points[i][2]), probe.value, probe.bound}) {
+      number(v);
+      out.push_back(',');
+    }
+    fmt::format_to(std::back_inserter(out), "{},{}", probe.level, probe.covered ? 1 : 0);
+    if (sigma) out.push_back(',');
+    number(probe.sigma);
+    out.push_back('\n');
   }
   return fmt::to_string(out);
 }
@@ -99,10 +103,11 @@ std::string level_text(const LevelTriple& l) {
 }
 
 std::vector<Probe> probe_certified(const std::filesystem::path& path, const Arguments& args,
-                                   const std::vector<Vec3>& points, const Progress& progress) {
+                                   const std::vector<Vec3>& points, bool& sigma, const Progress& progress) {
   const VdvrFile file = open_certified(path, args);
   const MixedVolume& volume = file.volume;
   const Certificate& c = file.certificate;
+  sigma = c.noise.has_value();
   std::optional<ProjectionSet> scan = noted_geometry(c);
   if (args.has("projections")) scan = load_certified_scan(args.path("projections"), args, c, progress);
   if (!scan)
@@ -119,6 +124,7 @@ std::vector<Probe> probe_certified(const std::filesystem::path& path, const Argu
     probe.value = static_cast<double>(values[i]);
     probe.level = level_text(at.level(points[i]));
     if (at.promised(points[i])) probe.bound = c.total_buffer;
+    if (sigma) probe.sigma = static_cast<double>(at.sigma(points[i]));
   }
   return probes;
 }
@@ -191,8 +197,10 @@ std::vector<Probe> probe_d2vr(const std::filesystem::path& path, const Arguments
 int probe_command(Arguments& args) {
   args.positional("FILE", "a certified volume, a volume, or projections")
       .value("points", "P.csv", "points, with the header x,y,z")
-      .value("output,o", "V.csv",
-             "x,y,z,value,bound,level,covered; empty where not covered, bound also where not certified")
+      .value(
+          "output,o", "V.csv",
+          "x,y,z,value,bound,level,covered, and sigma of F where the file has it; empty where not covered, "
+          "bound also where not certified")
       .flag("exact", "of projections: the field F in double precision on the host")
       .value("like", "OUT.vdvr", "with --exact: take the field options from this file")
       .value("projections", "IN", "of a certified volume from elsewhere: where the covered points are");
@@ -228,13 +236,14 @@ int probe_command(Arguments& args) {
   const std::vector<Vec3> points = read_points(points_path);
 
   ProgressLine progress(args.who(), common.quiet);
+  bool sigma = false;
   const std::vector<Probe> probes = kind == InputKind::certified
-                                        ? probe_certified(path, args, points, progress.callback())
+                                        ? probe_certified(path, args, points, sigma, progress.callback())
                                     : kind == InputKind::volume ? probe_volume(path, args, points)
                                     : d2vr ? probe_d2vr(path, args, points, progress.callback())
                                            : probe_exact(path, args, points, progress.callback());
   throw_if_stopped();
-  io::write_file(output, to_csv(points, probes));
+  io::write_file(output, to_csv(points, probes, sigma));
   progress.clear();
   const auto covered = std::count_if(probes.begin(), probes.end(), [](const Probe& p) { return p.covered; });
   print_result(common, {{"output", output.string()}, {"points", points.size()}, {"covered", covered}}, [&] {

@@ -226,6 +226,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
     line.clear();
     if (common.json || common.quiet) return;
     print_scan(read.scan, &read.understood);
+    if (!read.chosen.empty()) fmt::print("tolerance      {}\n", read.chosen);
     std::fflush(stdout);
   };
   out.planned =
@@ -271,7 +272,7 @@ int run_command(Arguments& args) {
   add_certify_options(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  Wanted wanted = wanted_to_certify(args);
+  Wanted wanted = wanted_to_certify(args, true);
   if (wanted.options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
   const auto output = args.path("output"), volume = output / "volume.vdvr";

@@ -1,0 +1,32 @@
+#include "apps/vdvr/scan_noise.hpp"
+
+#include "apps/vdvr/inputs.hpp"
+#include "vdvr/read_scan.hpp"
+
+namespace vdvr::cli {
+
+void add_noise(Arguments& args) {
+  args.group("Noise (an estimate, beside what is certified)")
+      .value("photons", "N0",
+             "of a pixel in the open beam (default: from repeated flats, or the projections)")
+      .value("sigma-p", "S", "the standard deviation of every line integral");
+}
+
+NoiseOptions noise_options(const Arguments& args) {
+  NoiseOptions options;
+  if (args.has("photons")) options.photons = args.positive_or("photons", 0);
+  if (args.has("sigma-p")) options.sigma_p = args.positive_or("sigma-p", 0);
+  return options;
+}
+
+NoiseFound noise_of_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
+                         const ProjectionSet& scan) {
+  NoiseFound found;
+  const NoiseOptions options = noise_options(args);
+  std::optional<LineIntegralNoise> by_flats;
+  if (!options.photons && !options.sigma_p) by_flats = load_line_noise(path, args, field);
+  found.noise = scan_noise(scan, options, by_flats, &found.why);
+  return found;
+}
+
+}  // namespace vdvr::cli

@@ -1,0 +1,106 @@
+// Tolerances in sigma as a user types them: what is written, printed and refused.
+#define BOOST_TEST_MODULE cli_sigma
+#include <boost/test/unit_test.hpp>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/support/command_line.hpp"
+
+using namespace vdvr::support;
+namespace fs = std::filesystem;
+
+namespace {
+
+// Counts with flats and darks, as a detector gives them.
+const std::string& noisy() {
+  static const std::string scan = [] {
+    const std::string path = at("noisy.h5");
+    const Ended made = run({"simulate", "--phantom", "sphere", "--detector", "65x9", "--angles", "90",
+                            "--photons", "300", "-o", path});
+    BOOST_TEST_REQUIRE(made.code == 0, made.err);
+    return path;
+  }();
+  return scan;
+}
+
+nlohmann::json json_of(const std::vector<std::string>& words) {
+  const Ended ended = run(words);
+  BOOST_TEST_CONTEXT(ended.err) { BOOST_TEST_REQUIRE(ended.code == 0); }
+  auto json = nlohmann::json::parse(ended.out, nullptr, false);
+  BOOST_TEST_REQUIRE(json.is_object());
+  return json;
+}
+
+const std::string& one_sigma() {
+  static const std::string file = at("one.vdvr");
+  return file;
+}
+
+// What `build` said of it.
+const nlohmann::json& built() {
+  static const auto json = json_of({"build", noisy(), "--epsilon", "1sigma", "-o", one_sigma(), "--json"});
+  return json;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_volume_of_one_sigma_says_so_and_is_verified) {
+  const auto& noise = built().at("certificate").at("noise");
+  const std::string& file = one_sigma();
+  BOOST_TEST(noise.at("tolerance_sigmas") == 1);
+  BOOST_TEST(noise.at("source") == "flats");
+  BOOST_TEST(noise.at("worst").at("buffer").get<double>() <= 1);
+  BOOST_TEST(noise.at("worst").at("buffer").get<double>() > 0);
+  BOOST_TEST(run({"verify", file, "--projections", noisy()}).code == 0);
+  BOOST_TEST(run({"info", file}).out.find("sigma of its brick") != std::string::npos);
+  std::ofstream(at("p.csv")) << "x,y,z\n0,0,0\n1000,0,0\n";
+  BOOST_TEST(run({"probe", file, "--points", at("p.csv"), "-o", at("v.csv")}).code == 0);
+  std::ifstream values(at("v.csv"));
+  std::string line;
+  std::getline(values, line);
+  BOOST_TEST(line == "x,y,z,value,bound,level,covered,sigma");
+  std::getline(values, line);
+  BOOST_TEST(std::stod(line.substr(line.rfind(',') + 1)) > 0);
+  std::getline(values, line);
+  BOOST_TEST(line == "1000,0,0,,,,0,");
+}
+
+BOOST_AUTO_TEST_CASE(a_tolerance_of_another_kind_is_told_in_sigma_too) {
+  const std::string file = at("percent.vdvr");
+  const auto percent = json_of({"build", noisy(), "--epsilon", "20%", "-o", file, "--json"});
+  const auto& noise = percent.at("certificate").at("noise");
+  BOOST_TEST(!noise.contains("tolerance_sigmas"));
+  BOOST_TEST(noise.at("worst").at("buffer").get<double>() > 0);
+}
+
+BOOST_AUTO_TEST_CASE(plan_foresees_what_one_sigma_stores) {
+  const auto plan = json_of({"plan", noisy(), "--epsilon", "1sigma", "--json"});
+  BOOST_TEST(plan.at("noise").at("field").at("epsilon_in_sigma") == 1);
+  const double foreseen = plan.at("foreseen").at("samples_ratio").get<double>(),
+               stored = built().at("storage").at("samples_ratio").get<double>();
+  BOOST_TEST(std::abs(foreseen - stored) < 0.2 * stored);
+}
+
+BOOST_AUTO_TEST_CASE(run_goes_by_the_noise_where_nothing_is_asked) {
+  const fs::path folder = at("result");
+  const auto result = json_of({"run", noisy(), "-o", folder.string(), "--json"});
+  BOOST_TEST(result.at("certificate").at("noise").at("tolerance_sigmas") == 1);
+  const Ended clean = run({"run", small_scan(), "-o", at("clean"), "--json"});
+  BOOST_TEST_REQUIRE(clean.code == 0, clean.err);
+  const auto json = nlohmann::json::parse(clean.out, nullptr, false);
+  BOOST_TEST(std::abs(json.at("certificate").at("epsilon").get<double>() - 0.03) < 1e-12);
+}
+
+BOOST_AUTO_TEST_CASE(what_sigma_cannot_mean_is_refused) {
+  check_refused({"build", small_scan(), "--epsilon", "1sigma", "-o", at("none.vdvr")}, "--photons");
+  check_refused({"build", noisy(), "--epsilon", "0sigma", "-o", at("none.vdvr")}, "above 0");
+  check_refused({"build", noisy(), "--epsilon", "manysigma", "-o", at("none.vdvr")}, "not a finite number");
+  check_refused({"build", noisy(), "--epsilon", "1sigma", "--epsilon-abs", "1", "-o", at("none.vdvr")},
+                "--epsilon-abs");
+  check_refused({"build", noisy(), "--epsilon", "1sigma", "--window", "0,1", "-o", at("none.vdvr")},
+                "--window");
+  check_refused({"build", noisy(), "-o", at("none.vdvr")}, "--epsilon 1sigma");
+}
