@@ -6,6 +6,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
+#include <fstream>
 
 #include "host/sampler/sampler_terms.hpp"
 #include "tests/support/program.hpp"
@@ -101,6 +102,26 @@ BOOST_AUTO_TEST_CASE(a_gpu_makes_the_volumes_of_a_cpu) {
     BOOST_TEST(of(on_cpu.certificate) != of(on_gpu.certificate));
     BOOST_TEST(content_sha256(on_gpu.volume) == content_sha256(on_cpu.volume), scan.name);
   }
+}
+
+// Of the small arrays of a launch none is waited for, and none has a buffer of its own: there were more
+// writes that block, and more buffers, than launches.
+BOOST_AUTO_TEST_CASE(a_build_waits_for_few_writes_and_makes_few_buffers) {
+  Settings counted = gpu;
+  counted["VDVR_SHIM_CALLS"] = files().at("calls");
+  files().build(counted, scans()[0], "counted.vdvr");
+  std::ifstream in(files().at("calls"));
+  double launches = 0, blocking = 0, buffers = 0;
+  for (double l = 0, w = 0, b = 0; in >> l >> w >> b;) {
+    launches += l;
+    blocking += w;
+    buffers += b;
+  }
+  BOOST_TEST_MESSAGE(launches << " launches, " << blocking << " writes that block, " << buffers
+                              << " buffers");
+  BOOST_TEST(launches > 100);
+  BOOST_TEST(blocking < 0.5 * launches);
+  BOOST_TEST(buffers < 0.5 * launches);
 }
 
 BOOST_AUTO_TEST_CASE(a_texture_unit_of_8_bits_is_charged_for_them) {

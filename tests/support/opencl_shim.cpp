@@ -18,6 +18,8 @@
 //   VDVR_SHIM_BUILD_OPTIONS=TEXT  more options for every program
 // What is built:
 //   VDVR_SHIM_PROGRAMS=DIR        every program, as NAME.cl and its options as NAME.opt (scripts/offline-gpu)
+// What is called:
+//   VDVR_SHIM_CALLS=FILE          at the end, added to it: launches, writes that block, buffers
 // Limits and faults:
 //   VDVR_SHIM_MAX_ALLOC, VDVR_SHIM_GLOBAL_MEM   bytes
 //   VDVR_SHIM_IMAGE3D=N                         largest extent of a 3D image
@@ -226,6 +228,16 @@ void write_down(cl_program program, const char* options) {
   std::ofstream(name + ".opt") << all;
 }
 
+// --- what is called ---
+
+struct Calls {
+  std::atomic<cl_ulong> launches{0}, blocking_writes{0}, buffers{0};
+  ~Calls() {
+    if (const char* file = std::getenv("VDVR_SHIM_CALLS"))
+      std::ofstream(file, std::ios::app) << launches << ' ' << blocking_writes << ' ' << buffers << '\n';
+  }
+} calls;
+
 // --- what is refused ---
 
 bool refused(size_t bytes) {
@@ -304,6 +316,7 @@ cl_int clGetKernelWorkGroupInfo(cl_kernel kernel, cl_device_id device, cl_kernel
 
 cl_mem clCreateBuffer(cl_context context, cl_mem_flags flags, size_t size, void* host, cl_int* error) {
   static const auto real = next<decltype(&clCreateBuffer)>("clCreateBuffer");
+  ++calls.buffers;
   if (!refused(size)) return real(context, flags, size, host, error);
   if (error != nullptr) *error = CL_MEM_OBJECT_ALLOCATION_FAILURE;
   return nullptr;
@@ -313,6 +326,7 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
                               const size_t* offset, const size_t* global, const size_t* local, cl_uint waits,
                               const cl_event* wait, cl_event* event) {
   static const auto real = next<decltype(&clEnqueueNDRangeKernel)>("clEnqueueNDRangeKernel");
+  ++calls.launches;
   static std::atomic<cl_ulong> launched{0};
   const cl_ulong last = setting("VDVR_SHIM_LAUNCH_FAILS"), most = setting("VDVR_SHIM_WORK_GROUP");
   if (last != 0 && ++launched >= last) return CL_OUT_OF_RESOURCES;
@@ -320,6 +334,14 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
   for (cl_uint i = 0; local != nullptr && i < dimensions; ++i) items *= local[i];
   if (most != 0 && items > most) return CL_INVALID_WORK_GROUP_SIZE;
   return real(queue, kernel, dimensions, offset, global, local, waits, wait, event);
+}
+
+cl_int clEnqueueWriteBuffer(cl_command_queue queue, cl_mem buffer, cl_bool blocking, size_t offset,
+                            size_t size, const void* from, cl_uint waits, const cl_event* wait,
+                            cl_event* event) {
+  static const auto real = next<decltype(&clEnqueueWriteBuffer)>("clEnqueueWriteBuffer");
+  if (blocking == CL_TRUE) ++calls.blocking_writes;
+  return real(queue, buffer, blocking, offset, size, from, waits, wait, event);
 }
 
 cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const char** texts,
