@@ -126,7 +126,7 @@ std::optional<BrickSigma> noted_sigma(Device& device, Planned& planned, const Pr
   try {
     return sigma_of_plan(device, planned.scan, planned.plan, *planned.noise.noise, progress);
   } catch (const Error& e) {
-    if (e.kind() != ErrorKind::resource && e.kind() != ErrorKind::input) throw;
+    if (e.kind() == ErrorKind::interrupted) throw;
     planned.noise.why = e.what();
     return std::nullopt;
   }
