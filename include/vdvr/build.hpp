@@ -24,8 +24,8 @@ struct BuildShare {
   int part = 1, parts = 1;
 };
 
-/// Refinement where something asks for it: bricks begin at a tolerance that holds everywhere, or at their own,
-/// and are brought within a smaller one, round by round, as whoever looks at the volume asks. The plan's
+/// Refinement where something asks for it: bricks begin at a tolerance that holds everywhere, or at their
+/// own, and are brought within a smaller one, round by round, as whoever looks at the volume asks. The plan's
 /// epsilon is then the smallest tolerance that can be asked for, since its rates suit that one.
 struct Refinement {
   double everywhere_abs = 0;  ///< density units, no less than the plan's epsilon_abs

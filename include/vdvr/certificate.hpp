@@ -109,8 +109,8 @@ VDVR_API std::vector<float> brick_bounds(const Certificate& certificate, bool im
 /// The largest of brick_bounds() over sigma, of a sampler whose share is `sampler`; 0 where nothing was
 /// tested or no sigma is known.
 VDVR_API double worst_in_sigma(const Certificate& certificate, double sampler);
-/// Whether a volume of this total, drawn by a sampler whose share of it is `sampler`, is within the tolerance:
-/// epsilon_abs, and the promise in sigma where there is one.
+/// Whether a volume of this total, drawn by a sampler whose share of it is `sampler`, is within the
+/// tolerance: epsilon_abs, and the promise in sigma where there is one.
 VDVR_API bool within_tolerance(const Certificate& certificate, double total, double sampler);
 /// SHA-256 of sigma by brick, as NoiseRecord has it.
 VDVR_API std::string sigma_sha256(const std::vector<float>& brick_sigma);
