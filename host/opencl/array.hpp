@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -107,22 +109,29 @@ class DeviceArray {
   /// Waits.
   template <class F>
   void read_mapped(F&& f) const {
-    const Mapping m(*this, CL_MAP_READ);
+    Mapping m(*this, CL_MAP_READ);
     f(std::span<const T>(m.data, count_));
+    m.unmap();
   }
   /// f(span<T>) fills all of the mapped array; what it held before is lost. Waits for earlier work.
   template <class F>
   void write_mapped(F&& f) {
-    const Mapping m(*this, CL_MAP_WRITE_INVALIDATE_REGION);
+    Mapping m(*this, CL_MAP_WRITE_INVALIDATE_REGION);
     f(std::span<T>(m.data, count_));
+    m.unmap();
   }
   [[nodiscard]] std::vector<T> to_host() const {
     std::vector<T> values(count_);
     read(values);
     return values;
   }
+  /// In pieces: there are drivers that fill no more than 2 or 4 GiB of a buffer, and report no error.
   void fill(const T& value) {
-    guard("fill", [&] { state_->queue.enqueueFillBuffer(buffer_, value, 0, size_bytes()); });
+    constexpr std::uint64_t most = (std::uint64_t{1} << 30) / sizeof(T) * sizeof(T);
+    guard("fill", [&] {
+      for (std::uint64_t done = 0, all = size_bytes(); done < all; done += most)
+        state_->queue.enqueueFillBuffer(buffer_, value, done, std::min(most, all - done));
+    });
   }
 
  private:
@@ -134,7 +143,15 @@ class DeviceArray {
             array.state_->queue.enqueueMapBuffer(array.buffer_, CL_TRUE, flags, 0, array.size_bytes()));
       });
     }
-    ~Mapping() { clEnqueueUnmapMemObject(array.state_->queue(), array.buffer_(), data, 0, nullptr, nullptr); }
+    // What was written may arrive only now: a failure is one of the write's.
+    void unmap() {
+      T* mapped = std::exchange(data, nullptr);
+      array.guard("unmap", [&] { array.state_->queue.enqueueUnmapMemObject(array.buffer_, mapped); });
+    }
+    ~Mapping() {
+      if (data != nullptr)
+        clEnqueueUnmapMemObject(array.state_->queue(), array.buffer_(), data, 0, nullptr, nullptr);
+    }
     Mapping(const Mapping&) = delete;
     Mapping& operator=(const Mapping&) = delete;
     const DeviceArray& array;

@@ -16,6 +16,7 @@
 #include "host/opencl/device_end.hpp"
 #include "host/opencl/state.hpp"
 #include "host/opencl/trust.hpp"
+#include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -40,27 +41,59 @@ void before_device_ends(Forget forget) {
   throw std::logic_error("before_device_ends: no room for another cache");
 }
 
-void MemoryAccount::set_limit(std::uint64_t bytes) {
+namespace {
+
+std::string lacking(std::uint64_t bytes, const std::string& what, std::uint64_t room, std::uint64_t limit) {
+  const auto mebi = [](std::uint64_t n) { return static_cast<double>(n) / (1 << 20); };
+  return fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left", what, mebi(bytes),
+                     mebi(room), mebi(limit));
+}
+
+}  // namespace
+
+void MemoryAccount::set_limits(std::uint64_t limit, std::uint64_t of_device) {
   const std::lock_guard guard(lock_);
-  limit_ = bytes;
+  limit_ = limit;
+  device_limit_ = std::min(limit, of_device);
+}
+
+void MemoryAccount::add(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
+  if (bytes > room())
+    throw ResourceError(lacking(bytes, what, room(), limit_) +
+                        "; raise `max_memory`, or choose a smaller `size`");
+  used_ += bytes;
+  peak_ = std::max(peak_, used_ + kept);
 }
 
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   const std::lock_guard guard(lock_);
-  if (limit_ != 0 && (bytes > limit_ || used_ > limit_ - bytes)) {
-    throw ResourceError(
-        fmt::format("{} needs {:.1f} MiB, but only {:.1f} of {:.1f} MiB are left; raise `max_memory`, or "
-                    "choose a smaller `size`",
-                    what, static_cast<double>(bytes) / (1 << 20), static_cast<double>(room()) / (1 << 20),
-                    static_cast<double>(limit_) / (1 << 20)));
-  }
-  used_ += bytes;
-  peak_ = std::max(peak_, used_ + kept);
+  if (bytes > device_room() && bytes <= room())
+    throw ResourceError(lacking(bytes, what, device_room(), device_limit_) +
+                        " on the device; choose a smaller `size` or another `device`");
+  add(bytes, what, kept);
+  on_device_ += bytes;
+}
+
+void MemoryAccount::take_host(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
+  const std::lock_guard guard(lock_);
+  add(bytes, what, kept);
 }
 
 void MemoryAccount::give(std::uint64_t bytes) noexcept {
   const std::lock_guard guard(lock_);
   used_ -= bytes;
+  on_device_ -= bytes;
+}
+
+void MemoryAccount::give_host(std::uint64_t bytes) noexcept {
+  const std::lock_guard guard(lock_);
+  used_ -= bytes;
+}
+
+std::uint64_t MemoryAccount::room() const { return limit_ > used_ ? limit_ - used_ : 0; }
+
+std::uint64_t MemoryAccount::device_room() const {
+  return std::min(room(), device_limit_ > on_device_ ? device_limit_ - on_device_ : 0);
 }
 
 std::uint64_t MemoryAccount::peak() const {
@@ -69,6 +102,11 @@ std::uint64_t MemoryAccount::peak() const {
 }
 
 std::uint64_t MemoryAccount::left() const {
+  const std::lock_guard guard(lock_);
+  return device_room();
+}
+
+std::uint64_t MemoryAccount::host_left() const {
   const std::lock_guard guard(lock_);
   return room();
 }
@@ -126,23 +164,24 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
         "{}: {} bytes in one buffer, but '{}' allows {}; choose a smaller `size` or another `device`", what,
         bytes, info.name, info.max_allocation));
   }
+  const std::uint64_t size = pooled_size(bytes);
   const std::lock_guard guard(pool_lock_);
   cl::Buffer buffer = pool_.take(bytes);
   // What the pool keeps is in use as well: it goes first when room is short.
-  if (memory.left() < bytes + pool_.bytes()) pool_.clear();
-  memory.take(bytes, what, pool_.bytes());
+  if (memory.left() < size + pool_.bytes()) pool_.clear();
+  memory.take(size, what, pool_.bytes());
   if (buffer() != nullptr) return buffer;
   try {
-    return cl::Buffer(context, CL_MEM_READ_WRITE, pooled_size(bytes));
+    return cl::Buffer(context, CL_MEM_READ_WRITE, size);
   } catch (const cl::Error& e) {
-    memory.give(bytes);
+    memory.give(size);
     throw ResourceError(
         fmt::format("{}: '{}' refused {} bytes: {}", what, info.name, bytes, code_name(e.err())));
   }
 }
 
 void State::release(std::uint64_t bytes, cl::Buffer buffer) noexcept {
-  memory.give(bytes);
+  memory.give(pooled_size(bytes));
   try {
     const std::lock_guard guard(pool_lock_);
     pool_.keep(bytes, std::move(buffer));
@@ -152,22 +191,8 @@ void State::release(std::uint64_t bytes, cl::Buffer buffer) noexcept {
 
 void State::take_host(std::uint64_t bytes, const std::string& what) {
   const std::lock_guard guard(pool_lock_);
-  if (memory.left() < bytes + pool_.bytes()) pool_.clear();
-  memory.take(bytes, what, pool_.bytes());
-}
-
-void State::keep_pace(cl::Event latest) {
-  // The CPU is busy with one kernel. A GPU must not run dry while the host prepares the next: there every
-  // eighth is waited for, when eight more are enqueued.
-  static std::atomic<unsigned> launched{0};
-  if (!info.is_cpu && ++launched % 8 != 0) return;
-  cl::Event before;
-  {
-    const std::lock_guard guard(pace_lock_);
-    before = std::exchange(before_, std::exchange(last_, std::move(latest)));
-  }
-  // Outside the lock: another thread's launch need not wait for this one's.
-  if (before() != nullptr) before.wait();
+  if (memory.host_left() < bytes + pool_.bytes()) pool_.clear();
+  memory.take_host(bytes, what, pool_.bytes());
 }
 
 }  // namespace opencl
@@ -330,6 +355,15 @@ std::vector<const FoundDevice*> chosen_from(const std::vector<FoundDevice>& all,
   return chosen;
 }
 
+bool shares_host_memory(const opencl::State& state) {
+  if (state.info.is_cpu) return true;
+  try {
+    return state.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() == CL_TRUE;
+  } catch (const cl::Error&) {
+    return false;  // then its memory is counted by itself, and the host's as well
+  }
+}
+
 // Throws DeviceError, BuildError or ResourceError where the device cannot be used.
 std::shared_ptr<opencl::State> opened(const FoundDevice& listed) {
   auto state = std::make_shared<opencl::State>();
@@ -344,7 +378,7 @@ std::shared_ptr<opencl::State> opened(const FoundDevice& listed) {
     state->device = found.device;
     state->info = found.info;
     state->context = cl::Context(state->device);
-    state->queue = cl::CommandQueue(state->context, state->device);
+    state->queue = cl::CommandQueue(state->context, state->device, CL_QUEUE_PROFILING_ENABLE);
     test = opencl::test_device(*state);
   } catch (const cl::Error& e) {
     throw DeviceError(
@@ -393,8 +427,12 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
   for (const std::string& reason : passed_over)
     opencl::tell(fmt::format("{}; going on with '{}'", reason, state_->info.name));
   // The test's own buffers are gone, and count for nothing.
+  // On a card others have memory too: drivers, displays.
   const std::uint64_t device_memory = state_->info.global_memory;
-  state_->memory.set_limit(max_memory_bytes == 0 ? device_memory : std::min(max_memory_bytes, device_memory));
+  const bool shared = shares_host_memory(*state_);
+  const std::uint64_t most = shared ? device_memory : io::physical_memory();
+  state_->memory.set_limits(max_memory_bytes == 0 ? most : std::min(max_memory_bytes, most),
+                            shared ? device_memory : device_memory / 10 * 9);
 }
 
 Device::~Device() {

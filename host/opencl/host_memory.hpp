@@ -13,7 +13,10 @@ namespace vdvr {
 class HostMemory {
  public:
   explicit HostMemory(opencl::State& state) : state_(state) {}
-  ~HostMemory() { state_.memory.give(bytes_); }
+  HostMemory(opencl::State& state, std::uint64_t bytes, const std::string& what) : state_(state) {
+    count(bytes, what);
+  }
+  ~HostMemory() { state_.memory.give_host(bytes_); }
   HostMemory(const HostMemory&) = delete;
   HostMemory& operator=(const HostMemory&) = delete;
 
@@ -23,7 +26,7 @@ class HostMemory {
     bytes_ += bytes;
   }
   void uncount(std::uint64_t bytes) {
-    state_.memory.give(bytes);
+    state_.memory.give_host(bytes);
     bytes_ -= bytes;
   }
 

@@ -28,6 +28,9 @@ class Kernel {
          const Defines& defines = {})
       : state_(&state), name_(kernel_name) {
     throw_if_stopped();  // compiling takes seconds
+    std::string key = program_name + ' ' + kernel_name;
+    for (const auto& [name, value] : defines) key += ' ' + name + '=' + value;
+    pace_ = &state.pace_of(key);
     const cl::Program& p = program(state, program_name, defines);
     try {
       kernel_ = cl::Kernel(p, kernel_name.c_str());
@@ -41,8 +44,8 @@ class Kernel {
     }
   }
 
-  /// Enqueues. Waits only where the device is the CPU and two kernels are ahead of this one: what is enqueued
-  /// cannot be taken back, so that a stop would wait for all of it.
+  /// Enqueues, in pieces where all at once would take long (pace.hpp). Waits only for launches that are well
+  /// ahead of this one: what is enqueued cannot be taken back, so that a stop would wait for all of it.
   void operator()(const Range& range, const Args&... args) {
     std::array<std::uint64_t, 3> local = range.local;
     while (local[0] * local[1] * local[2] > max_group_) {  // a device smaller than the tuning assumed
@@ -52,14 +55,10 @@ class Kernel {
     }
     const auto g = [&](std::size_t a) { return round_up(range.global[a], local[a]); };
     if (g(0) * g(1) * g(2) == 0) return;
-    throw_if_stopped();
     try {
       cl_uint index = 0;
       (kernel_.setArg(index++, args), ...);
-      cl::Event event;
-      state_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(g(0), g(1), g(2)),
-                                         cl::NDRange(local[0], local[1], local[2]), nullptr, &event);
-      state_->keep_pace(std::move(event));
+      enqueue_in_pieces(*state_, kernel_, *pace_, {g(0), g(1), g(2)}, local);
     } catch (const cl::Error& e) {
       throw DeviceError(fmt::format("kernel {} on '{}', global {}x{}x{}, local {}x{}x{}: {} {}", name_,
                                     state_->info.name, g(0), g(1), g(2), local[0], local[1], local[2],
@@ -72,6 +71,7 @@ class Kernel {
   std::string name_;
   cl::Kernel kernel_;
   std::uint64_t max_group_ = 1;
+  Pace* pace_ = nullptr;  // the state's
 };
 
 /// Waits for everything enqueued; turns a failure into a DeviceError that names the stage.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -13,28 +14,37 @@
 #include <vector>
 
 #include "host/opencl/cl.hpp"
+#include "host/opencl/pace.hpp"
 #include "vdvr/device.hpp"
 
 namespace vdvr::opencl {
 
-/// Host and device allocations of ours, counted together against --max-memory.
+/// Allocations of ours, counted together against --max-memory; those on the device also against its own
+/// memory, which only a device that computes in the host's shares with the others.
 class MemoryAccount {
  public:
-  void set_limit(std::uint64_t bytes);
-  /// Throws ResourceError naming `what` and the remedy when the limit would be passed.
+  /// `limit`: of all together; `of_device`: of what is on the device.
+  void set_limits(std::uint64_t limit, std::uint64_t of_device);
+  /// Throws ResourceError naming `what` and the remedy when a limit would be passed.
   /// `kept`: bytes of the pool, for the peak.
   void take(std::uint64_t bytes, const std::string& what, std::uint64_t kept = 0);
+  void take_host(std::uint64_t bytes, const std::string& what, std::uint64_t kept);
   void give(std::uint64_t bytes) noexcept;
+  void give_host(std::uint64_t bytes) noexcept;
   [[nodiscard]] std::uint64_t peak() const;
+  /// For allocations on the device.
   [[nodiscard]] std::uint64_t left() const;
-  /// 0: none.
+  [[nodiscard]] std::uint64_t host_left() const;
+  /// Of all together.
   [[nodiscard]] std::uint64_t limit() const;
 
  private:
-  [[nodiscard]] std::uint64_t room() const { return limit_ > used_ ? limit_ - used_ : 0; }
+  [[nodiscard]] std::uint64_t room() const;
+  [[nodiscard]] std::uint64_t device_room() const;
+  void add(std::uint64_t bytes, const std::string& what, std::uint64_t kept);
 
   mutable std::mutex lock_;
-  std::uint64_t limit_ = 0, used_ = 0, peak_ = 0;
+  std::uint64_t limit_ = UINT64_MAX, device_limit_ = UINT64_MAX, used_ = 0, on_device_ = 0, peak_ = 0;
 };
 
 /// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that
@@ -56,6 +66,14 @@ class BufferPool {
 /// kernel).
 using Defines = std::vector<std::pair<std::string, std::string>>;
 
+/// A launch that nobody waited for yet.
+struct Launched {
+  cl::Event event;
+  Pace* pace = nullptr;
+  std::uint64_t items = 0;
+  double seconds = 0;  // that it will take, as far as is known
+};
+
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
   DeviceInfo info;
@@ -68,11 +86,17 @@ struct State : std::enable_shared_from_this<State> {
   /// allocated.
   cl::Buffer allocate(std::uint64_t bytes, const std::string& what);
   void release(std::uint64_t bytes, cl::Buffer buffer) noexcept;
-  /// Counts memory of the host, for which the pool makes room. Throws ResourceError. memory.give() returns
-  /// it.
+  /// Counts memory of the host, for which the pool makes room. Throws ResourceError. memory.give_host()
+  /// returns it.
   void take_host(std::uint64_t bytes, const std::string& what);
-  /// On a CPU: waits until at most two kernels are unfinished, the latest included.
-  void keep_pace(cl::Event latest);
+  /// Seconds. Set before kernels are launched.
+  double longest_launch = 0.25;
+  /// Waits for earlier launches where many are unfinished: on a CPU all but two. With `wait` for all.
+  void keep_pace(Launched latest, bool wait);
+  /// Lives as long as the state.
+  Pace& pace_of(const std::string& kernel);
+  /// So far, each piece counted.
+  [[nodiscard]] std::uint64_t launches();
 
   /// Told of each program that was built, by the thread that built it, which holds a lock. Set before kernels
   /// are made, and by the thread that makes them.
@@ -84,7 +108,9 @@ struct State : std::enable_shared_from_this<State> {
   std::mutex pool_lock_;  // the account's own may be taken under it
   BufferPool pool_;
   std::mutex pace_lock_;
-  cl::Event before_, last_;
+  std::deque<Launched> in_flight_;
+  double in_flight_seconds_ = 0;
+  std::map<std::string, Pace> paces_;  // by program, kernel and defines
   std::mutex programs_lock_;
   std::map<std::string, cl::Program> programs_;  // by name and defines
 };

@@ -28,7 +28,7 @@ namespace {
 using opencl::DeviceArray;
 using Impl = ResidentVolume::Impl;
 
-static_assert(sizeof(VdvrCertify) == 120);
+static_assert(sizeof(VdvrCertify) == 128);
 
 constexpr double kUnit = 0x1p-24;
 // Of the list of pieces; what a picture needs beyond is made by smaller launches.
@@ -236,7 +236,11 @@ class Launch {
     RenderOptions drawn = o_;
     drawn.width = box.x1 - box.x0;
     drawn.height = box.y1 - box.y0;
-    return packet_range(drawn, {}, v_.lanes);
+    const opencl::Range range = packet_range(drawn, {}, v_.lanes);
+    const auto items = [&](std::size_t a) { return opencl::round_up(range.global[a], range.local[a]); };
+    q_.items_x = static_cast<int>(items(0));
+    q_.items = static_cast<int>(items(0) * items(1));
+    return range;
   }
   void is_done(const PixelBox& box) {
     throw_if_stopped();

@@ -70,7 +70,7 @@ PagedVolume::Impl::Impl(Device& device, const MixedVolume& v, std::uint64_t memo
   on_host_ = host;
 }
 
-PagedVolume::Impl::~Impl() { state->memory.give(on_host_); }
+PagedVolume::Impl::~Impl() { state->memory.give_host(on_host_); }
 
 void PagedVolume::Impl::find_kinds() {
   const MixedVolume& v = *volume;

@@ -299,7 +299,7 @@ ResidentVolume::Impl::Impl(Device& device, const MixedVolume& v, const ImageLimi
   lay_atlas(v, limits);
   // Last, because a constructor that throws runs no destructor to give it back.
   const std::uint64_t bytes = host_ranges.size() * sizeof(cl_float2);
-  state->memory.take(bytes, "ranges of bricks");
+  state->take_host(bytes, "ranges of bricks");
   counted_ = bytes;
 }
 
@@ -328,7 +328,7 @@ void ResidentVolume::Impl::lay_atlas(const MixedVolume& v, ImageLimits left) {
 }
 
 ResidentVolume::Impl::~Impl() {
-  state->memory.give(counted_);
+  state->memory.give_host(counted_);
   if (atlas_) state->memory.give(layout.bytes());
 }
 

@@ -29,14 +29,18 @@ std::uint64_t checked_bytes(std::span<const std::int64_t> shape, std::uint64_t e
   return bytes;
 }
 
+std::uint64_t physical_memory() {
+  const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
+  return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
 void require_memory(std::uint64_t bytes, std::uint64_t limit, const std::string& what) {
   constexpr double mebi = 1024.0 * 1024.0;
   if (limit != 0 && bytes > limit)
     throw ResourceError(
         fmt::format("{}: needs {:.1f} MiB, the memory limit is {:.1f} MiB; raise `max_memory`", what,
                     static_cast<double>(bytes) / mebi, static_cast<double>(limit) / mebi));
-  const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
-  const auto physical = pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t physical = physical_memory();
   if (bytes > physical)
     throw ResourceError(fmt::format("{}: needs {:.1f} MiB, this machine has {:.1f} MiB", what,
                                     static_cast<double>(bytes) / mebi, static_cast<double>(physical) / mebi));

@@ -16,6 +16,9 @@ std::uint64_t checked_bytes(std::span<const std::int64_t> shape, std::uint64_t e
 /// Throws ResourceError when `bytes` exceed `limit` (0: no limit) or the machine's memory.
 void require_memory(std::uint64_t bytes, std::uint64_t limit, const std::string& what);
 
+/// Bytes of memory that this machine has.
+std::uint64_t physical_memory();
+
 /// "181 x 2 x 640".
 std::string shape_text(std::span<const std::int64_t> shape);
 

@@ -18,6 +18,7 @@
 #include <new>
 #include <string>
 
+#include "host/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -43,7 +44,7 @@ constexpr std::uint64_t aside_bytes = 256u << 20;
 
 void limit_memory(std::uint64_t max_memory_bytes) {
   const std::uint64_t now = address_space_bytes();
-  const auto physical = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * page_bytes();
+  const auto physical = physical_memory();
   const std::uint64_t more = max_memory_bytes == 0 ? physical : max_memory_bytes;
   if (now == 0) return;
   const rlimit memory{now + more + aside_bytes, RLIM_INFINITY};

@@ -11,6 +11,7 @@
 #include <random>
 #include <utility>
 
+#include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
@@ -369,12 +370,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   const std::uint64_t all = padded * static_cast<std::uint64_t>(scan.size()) * sizeof(double);
   const std::uint64_t bytes =
       scan.data.scratch() ? std::min(all, scan.data.scratch()->resident_bytes()) : all;
-  state.memory.take(bytes, "cosine coefficients of the filtered projections");
-  struct Give {
-    opencl::State& state;
-    std::uint64_t bytes;
-    ~Give() { state.memory.give(bytes); }
-  } const give{state, bytes};
+  const HostMemory host(state, bytes, "cosine coefficients of the filtered projections");
   const ExactField exact(scan, stored.field, progress);
   const FieldSlopes slopes = field_slopes(volume);
   const SamplerTerms sampler =

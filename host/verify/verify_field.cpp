@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "host/bounds/result_units.hpp"
+#include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
@@ -18,26 +19,10 @@ namespace {
 
 std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
 
-/// Host memory counted against --max-memory.
-class HostShare {
- public:
-  HostShare(opencl::State& state, std::uint64_t bytes, const std::string& what)
-      : state_(state), bytes_(bytes) {
-    state.memory.take(bytes, what);
-  }
-  ~HostShare() { state_.memory.give(bytes_); }
-  HostShare(const HostShare&) = delete;
-  HostShare& operator=(const HostShare&) = delete;
-
- private:
-  opencl::State& state_;
-  std::uint64_t bytes_;
-};
-
 // The stored field times 2^exponent.
 DeviceField upload(opencl::State& state, const MixedVolume& volume, int exponent) {
   if (exponent == 0) return {state, volume};
-  const HostShare copy(state, volume.base.bytes(), "the stored field in other units");
+  const HostMemory copy(state, volume.base.bytes(), "the stored field in other units");
   MixedVolume scaled = volume;
   scale(scaled, exponent);
   return {state, scaled};

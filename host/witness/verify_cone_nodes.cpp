@@ -8,6 +8,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "host/opencl/host_memory.hpp"
 #include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -143,12 +144,11 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
 /// Some views at the places of a window, on the host and on the device: [view][column][row].
 struct VerifyConeNodes::Table {
   Table(opencl::State& of, const Window& of_places, std::int64_t at_once)
-      : state(of), window(of_places), views(at_once) {
-    state.memory.take(bytes(), "dense filtered projections");
+      : state(of), window(of_places), views(at_once), counted(of, bytes(), "dense filtered projections") {
     host.resize(at(views * per_view()));
     device = opencl::DeviceArray<float>(state, count(views * per_view()), "dense filtered projections");
   }
-  ~Table() { state.memory.give(bytes()); }
+  ~Table() = default;
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
   [[nodiscard]] std::int64_t per_view() const { return window.columns * window.rows; }
@@ -157,6 +157,7 @@ struct VerifyConeNodes::Table {
   opencl::State& state;
   Window window;
   std::int64_t views;  // at a time
+  HostMemory counted;
   std::int64_t first_view = 0, filled = 0;
   std::vector<float> host;
   opencl::DeviceArray<float> device;

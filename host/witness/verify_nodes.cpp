@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/opencl/host_memory.hpp"
 #include "host/opencl/work_groups.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
@@ -74,19 +75,22 @@ std::int64_t VerifyNodes::views_at_once() const {
 /// 16 rows of the fine columns of some views, on the host and on the device.
 struct VerifyNodes::Table {
   Table(opencl::State& of, std::int64_t columns, std::int64_t at_once)
-      : state(of), per_view(columns * lanes), views(at_once) {
-    state.memory.take(bytes(), "fine columns of the filtered projections");
+      : state(of),
+        per_view(columns * lanes),
+        views(at_once),
+        counted(of, bytes(), "fine columns of the filtered projections") {
     host.resize(at(views * per_view));
     device = opencl::DeviceArray<float>(state, count(views * per_view + room),
                                         "fine columns of the filtered projections");
   }
-  ~Table() { state.memory.give(bytes()); }
+  ~Table() = default;
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
   [[nodiscard]] std::uint64_t bytes() const { return 4 * count(views * per_view); }
 
   opencl::State& state;
   std::int64_t per_view, views;  // floats; views at a time
+  HostMemory counted;
   std::int64_t first_view = 0, filled = 0;
   std::vector<float> host;
   opencl::DeviceArray<float> device;

@@ -24,7 +24,7 @@
 __kernel SHARED_COLUMN void fourth_differences(__global float* out, __global const float* gold,
                                                __global const float* margin, VdvrFourthDifferences s,
                                                SHARED_ROOM) {
-  const int bx = (int)get_group_id(0), by = (int)get_group_id(1), bz = (int)get_group_id(2);
+  const int bx = (int)get_global_id(0) / VDVR_ALONG, by = (int)get_global_id(1), bz = (int)get_global_id(2);
   if (bx >= s.bricks_x || by >= s.bricks_y || bz >= s.bricks_z) return;
   const long to_x = s.stride, to_y = (long)s.nx * s.stride;
   const int side_x = s.side_x + 1, runs = s.side_z / VDVR_LANES + 1, all = (s.side_y + 1) * side_x * runs;

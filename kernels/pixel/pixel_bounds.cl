@@ -58,9 +58,9 @@
 __kernel VDVR_HINT void certify_picture(CERTIFY_ARGUMENTS, __global V* restrict list,
                                         __global uint* restrict fullest) {
   PIXELS_OF_THE_LAUNCH;
-  const ulong item = get_global_id(1) * get_global_size(0) + get_global_id(0);
+  const ulong item = get_global_id(1) * (ulong)q.items_x + get_global_id(0);
 #if VDVR_LANES == 1
-  const ulong items = get_global_size(0) * get_global_size(1);
+  const ulong items = (ulong)q.items;
 #endif
   const V none = (V)(0.0f);
   const Ray ray = cast_rays(&p, grid, px, py);

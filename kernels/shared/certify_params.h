@@ -28,7 +28,7 @@
 #define VDVR_PIXEL_UNTESTED 1
 #define VDVR_PIXEL_ENDED 2
 
-// Scalars only. 120 bytes.
+// Scalars only. 128 bytes.
 typedef struct {
   float range_lo, range_scale;  // bin = (value - lo) * scale
   int bins;
@@ -47,7 +47,8 @@ typedef struct {
   float colour_lo[3], colour_hi[3];  // of all that may show, light included
   int first_row, rows;               // of the picture, in this launch
   int first_column, columns;
-  int capacity;  // pieces that the list of a packet holds
+  int capacity;                      // pieces that the list of a packet holds
+  int items_x, items;                // work-items of the launch: along x, and in all
 } VdvrCertify;
 
 #endif

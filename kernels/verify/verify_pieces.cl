@@ -95,7 +95,7 @@ __kernel SHARED_COLUMN void verify_fourth(__global float8* out, __global const f
                                           __global const int4* items, __global const int4* first,
                                           VdvrPieces s, SHARED_ROOM) {
   const int side = s.cells + 1;
-  const int y = (int)get_group_id(1), i = (int)get_group_id(2);
+  const int y = (int)get_global_id(1), i = (int)get_global_id(2);
   if (y >= side || i >= s.count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];
@@ -178,8 +178,8 @@ __kernel SHARED_COLUMN void verify_cells(__global int4* out, __global uint* cell
                                          __global const int4* items, __global const int4* first,
                                          __global const float* widening, VdvrPieces s, SHARED_ROOM) {
   const int side = s.cells + 1;
-  const int in_piece = (int)get_group_id(1), y = in_piece / s.cells, x = in_piece - y * s.cells,
-            i = (int)get_group_id(2);
+  const int in_piece = (int)get_global_id(1), y = in_piece / s.cells, x = in_piece - y * s.cells,
+            i = (int)get_global_id(2);
   if (y >= s.cells || i >= s.count) return;
   const int4 item = items[i];
   const int4 begin = first[item.w];

@@ -31,6 +31,8 @@ BARE_QUESTION = re.compile(r"\b(any|all)\s*\(")
 DOUBLE_CONSTANT = re.compile(r"(?<![\w.])(?:(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+|0x[\da-fA-F.]+p[+-]?\d+)(?![\w.])")
 # PoCL 3.1 shares such an array among all groups (device/shared_column.h).
 LOCAL_ARRAY = re.compile(r"\b__local\b[^;(){}*]*[;=\[]")
+# Long launches are cut (host/opencl/pace.hpp), which work-items do not see as long as they ask for global places.
+OF_THE_LAUNCH = re.compile(r"\bget_(?:group_id|num_groups|global_size|global_offset)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
 
@@ -148,6 +150,8 @@ def faults_of_kernels(root):
             yield f"{name}: {found[0]} is in double precision"
         if found := LOCAL_ARRAY.search(text):
             yield f"{name}: {found[0]} is no argument"
+        if found := OF_THE_LAUNCH.search(text):
+            yield f"{name}: {found[0]} is of a launch, which may be a piece"
 
 
 def plant(root, path, text):
@@ -173,6 +177,7 @@ FAULTS = [
     ("kernels/gold/cell_test.cl", "int f(int4 m) { return any(m); }\n", "never true of one lane"),
     ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
     ("kernels/kept/fourth_differences.cl", "__kernel void h() { __local float room[32]; }\n", "is no argument"),
+    ("kernels/kept/fourth_differences.cl", "__kernel void h() { int i = get_group_id(0); }\n", "may be a piece"),
 ]
 
 
