@@ -198,7 +198,8 @@ BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted
   else if (planned.sigmas) options.build.refinement = refinement_in_sigma(*planned.sigma, *planned.sigmas);
   BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
   if (planned.pictures) planned.pictures->note(result.certificate);
-  if (planned.sigma) note_noise(result.certificate, *planned.noise.noise, *planned.sigma, planned.sigmas);
+  if (planned.sigma)
+    note_noise(device, planned.scan, result, *planned.noise.noise, *planned.sigma, planned.sigmas, progress);
   return result;
 }
 

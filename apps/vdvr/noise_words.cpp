@@ -45,7 +45,8 @@ void print_noise(const NoiseFound& found) {
   fmt::print("  noise        {}\n", found.noise ? found.noise->words : "not known: " + found.why);
 }
 
-std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Progress& progress) {
+std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Wanted* compared,
+                                        const Progress& progress) {
   if (!planned.noise.noise || !planned.sigma) return std::nullopt;
   const Plan& plan = planned.plan;
   FieldNoise out;
@@ -53,6 +54,10 @@ std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, 
   out.sigmas = planned.sigmas;
   out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
   out.forecasts = foresee_in_sigma(plan, *planned.sigma, multiples);
+  out.rings = ring_noise(planned.scan, planned.understood.flats);
+  if (compared)
+    out.filters = foresee_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.sigmas,
+                                  *planned.noise.noise, compared->options, progress);
   return out;
 }
 
@@ -68,8 +73,17 @@ Json field_noise_json(const FieldNoise& noise, const Plan& plan) {
                      {"predicted", noise.split->predicted},
                      {"ratio", noise.split->ratio()},
                      {"resolved", noise.split->resolved}};
+  if (noise.rings)
+    json["rings"] = {{"flats", noise.rings->flats},
+                     {"at_axis", noise.rings->at_axis},
+                     {"slope", noise.rings->slope},
+                     {"radius", noise.rings->radius()}};
   for (const SigmaForecast& f : noise.forecasts)
     json["foreseen"].push_back({{"sigmas", f.multiple}, {"samples_ratio", f.samples_ratio}});
+  for (const FilterForecast& f : noise.filters)
+    json["filters"].push_back({{"filter", text_of(f.filter)},
+                               {"sigma", f.sigma.median > 0 ? Json(f.sigma.median) : Json()},
+                               {"samples_ratio", f.samples_ratio > 0 ? Json(f.samples_ratio) : Json()}});
   return json;
 }
 
@@ -81,6 +95,12 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
     fmt::print("  split        halves of the views differ by {:.2f} of that{}\n", noise.split->ratio(),
                judgement(*noise.split));
   else fmt::print("  split        too few views to be split for comparison\n");
+  if (noise.rings && noise.rings->radius() > 1)
+    fmt::print(
+        "  rings        noise of the {} flats, the same in all views, adds more than a tenth to sigma^2 "
+        "within {:.0f} "
+        "columns of the axis\n",
+        noise.rings->flats, noise.rings->radius());
   if (noise.sigmas) fmt::print("  tolerance    {:g} sigma of its own in each brick\n", *noise.sigmas);
   else fmt::print("  tolerance    epsilon is {:.2f} sigma\n", plan.epsilon_abs / median);
   for (const SigmaForecast& f : noise.forecasts)
@@ -88,6 +108,13 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
         "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen, "
         "brick by brick\n",
         f.multiple, 100 * f.multiple * median / plan.reference_range, f.samples_ratio);
+  if (!noise.filters.empty())
+    fmt::print("filters        at {}: sigma of F, and samples per base sample foreseen\n",
+               noise.sigmas ? fmt::format("{:g} sigma of each", *noise.sigmas) : "the same epsilon");
+  for (const FilterForecast& f : noise.filters)
+    if (f.samples_ratio > 0)
+      fmt::print("  {:<12} {:.4g}  {:.3f}\n", text_of(f.filter), f.sigma.median, f.samples_ratio);
+    else fmt::print("  {:<12} out of reach\n", text_of(f.filter));
 }
 
 }  // namespace vdvr::cli

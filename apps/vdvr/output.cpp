@@ -163,8 +163,9 @@ void print_noise_record(const Certificate& c) {
   fmt::print("  noise        sigma of F {:.4g} ({:.4g} to {:.4g}), estimated from {}{}\n", n.median, n.least,
              n.largest, n.source, n.photons > 0 ? fmt::format(": {:.4g} photons a pixel", n.photons) : "");
   if (worst > 0 && !c.comparison)
-    fmt::print("  in sigma     interpolation errs by at most {:.3g} sigma of its brick{}\n", worst,
-               n.tolerance_sigmas ? fmt::format("; {:g} was asked for", *n.tolerance_sigmas) : "");
+    fmt::print("  in sigma     interpolation errs by at most {:.3g} sigma of its brick{}{}\n", worst,
+               n.tolerance_sigmas ? fmt::format("; {:g} was asked for", *n.tolerance_sigmas) : "",
+               n.rms_in_sigma ? fmt::format("; {:.2g} in the mean, estimated", *n.rms_in_sigma) : "");
 }
 
 void print_certificate(const Certificate& c) {

@@ -129,7 +129,7 @@ RenderResult render_with_overlay(Source& source, const RenderOptions& o, const O
       throw InputError(fmt::format("--size {}x{}: an error picture needs at least 160x{} pixels", o.width,
                                    o.height, 16 + kErrorCaption));
     RenderResult r = source.draw(above_caption);
-    r.image = bound_picture(r.values, scene.certificate->epsilon_abs);
+    r.image = bound_picture(r.values, source.shown().end, source.shown().quantity);
     return r;
   }
   if (o.mode == RenderMode::slice && !overlay.plain) return draw_framed(source, o, certified);

@@ -13,8 +13,8 @@
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error", "bound",
-                                        "lo",     "hi",    "middle", "class", "band"};
+const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error",  "sigma", "error-in-sigma",
+                                        "bound",  "lo",    "hi",     "middle", "class", "band"};
 const std::vector<std::string> kModes{"dvr", "iso", "mip", "integral", "slice", "error"};
 void set_background(const Arguments& args, RenderOptions& o) {
   const auto given = args.numbers("background", 0);
@@ -88,12 +88,13 @@ void add_render_options(Arguments& args) {
   args.value("iso", "V[,V...]",
              "densities of up to 8 iso-surfaces (default: one between background and object)")
       .value("iso-opacity", "O[,O...]", "of each (default 1; of several the densest 1, others 0.3)")
-      .value(
-          "show", "colour|depth|normal|error|bound|lo|hi|middle|class|band",
-          "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, or "
-          "how far the samples it was made of can lie from the scan; with --certify the bound of each pixel, "
-          "the ends of its interval or their middle; of iso the class of each pixel, or "
-          "the band of its depth")
+      .value("show", "colour|depth|normal|error|sigma|error-in-sigma|bound|lo|hi|middle|class|band",
+             "what a pixel says: its colour, how far what is seen lies from the eye, which way it faces, how "
+             "far the "
+             "samples it was made of can lie from the scan, what the scan's own noise leaves in them (sigma, "
+             "estimated), or the former in units of the latter; with --certify the bound of each pixel, "
+             "the ends of its interval or their middle; of iso the class of each pixel, or "
+             "the band of its depth")
       .value("background", "R,G,B[,R,G,B]", "colour behind the volume, or at the top and the bottom; 0 to 1")
       .value("slice-axis", "x|y|z", "default z")
       .value("slice-position", "P", "world (default: the middle)")
@@ -152,6 +153,13 @@ std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold) {
   return iso_surfaces(values, args.numbers("iso-opacity", args.has("iso-opacity") ? values.size() : 0));
 }
 
+BrickQuantity brick_quantity(const Arguments& args) {
+  const std::string show = args.text_or("show", "colour");
+  return show == "sigma"            ? BrickQuantity::sigma
+         : show == "error-in-sigma" ? BrickQuantity::bound_in_sigma
+                                    : BrickQuantity::bound;
+}
+
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
   const std::string mode = args.choice("mode", kModes, "dvr");
@@ -172,10 +180,10 @@ RenderOptions render_options(const Arguments& args) {
                          : Classification::post;
   o.step_mode = step_mode_option(args, o);
   const std::string output = args.choice("show", kOutputs, "colour");
-  o.output = output == "depth"    ? RenderOutput::depth
-             : output == "normal" ? RenderOutput::normal
-             : output == "error"  ? RenderOutput::error
-                                  : RenderOutput::colour;
+  o.output = output == "depth"                                                   ? RenderOutput::depth
+             : output == "normal"                                                ? RenderOutput::normal
+             : output == "error" || brick_quantity(args) != BrickQuantity::bound ? RenderOutput::error
+                                                                                 : RenderOutput::colour;
   set_light(args, o);
   set_background(args, o);
   const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
@@ -204,7 +212,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
            {"azimuth", "elevation", "zoom", "frame", "turntable", "tf", "iso", "step", "no-shading",
             "background", "gradient", "light", "step-mode", "classification"},
            "does not apply to a slice");
-  if (flat && !asks_certify(args)) refuse(args, {"show"}, "does not apply to a slice without --certify");
+  const bool in_sigma = brick_quantity(args) != BrickQuantity::bound;
+  if (flat && !asks_certify(args) && !(in_sigma && o.mode == RenderMode::error))
+    refuse(args, {"show"}, "does not apply to a slice without --certify, but for sigma in --mode error");
+  if (in_sigma && o.mode == RenderMode::error)
+    refuse(args, {"projections"}, "goes with the error itself, not with --show sigma and error-in-sigma");
   // What a slice takes of it is the window; an error picture's colours always run to epsilon.
   if (o.mode == RenderMode::error) refuse(args, {"tf-range"}, "does not apply to --mode error");
   if (!flat) refuse(args, {"slice-axis", "slice-position"}, "applies to --mode slice and error");
@@ -214,7 +226,7 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
     refuse(args, {"no-shading", "gradient", "light", "background", "tf", "step"},
            "does not apply to --mode integral, which sums up densities cell by cell");
     const std::string show = args.text_or("show", "colour");
-    if (show == "depth" || show == "normal" || show == "error")
+    if (show == "depth" || o.output == RenderOutput::error || show == "normal")
       throw InputError(fmt::format("--show {} does not apply to --mode integral: it is of whole rays", show));
   }
   if (o.mode != RenderMode::dvr) refuse(args, {"step-mode", "classification"}, "applies to --mode dvr");
@@ -230,9 +242,11 @@ void check_combination(const Arguments& args, const RenderOptions& o) {
   if (o.output == RenderOutput::depth || o.output == RenderOutput::error)
     refuse(args, {"gradient"}, "applies to --show colour and normal");
   if (o.output == RenderOutput::error) {
-    refuse(args, {"caption"}, "is part of --show error");
+    const std::string show = args.text_or("show", "error");
+    refuse(args, {"caption"}, fmt::format("is part of --show {}", show));
     if (method_option(args) != "vdvr" || args.has("unverified"))
-      throw InputError("--show error is of certified volumes: it does not go with --method or --unverified");
+      throw InputError(fmt::format(
+          "--show {} is of certified volumes: it does not go with --method or --unverified", show));
   }
   if (o.output == RenderOutput::normal && o.mode == RenderMode::mip)
     throw InputError("--show normal does not apply to --mode mip: a maximum has no surface");

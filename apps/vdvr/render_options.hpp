@@ -7,6 +7,7 @@
 
 #include "apps/common/arguments.hpp"
 #include "apps/vdvr/view.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {
@@ -26,6 +27,9 @@ std::vector<IsoSurface> surfaces_for(const Arguments& args, double threshold);
 
 /// Everything that the words alone decide; what depends on the volume is filled in by the command.
 RenderOptions render_options(const Arguments& args);
+
+/// What --show says of bricks: bound where it speaks of something else.
+BrickQuantity brick_quantity(const Arguments& args);
 
 /// Throws InputError, before anything is read, for options that exclude each other.
 void check_combination(const Arguments& args, const RenderOptions& options);

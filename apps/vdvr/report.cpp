@@ -182,11 +182,17 @@ std::string in_sigma(const Certificate& c) {
   if (!c.noise) return "";
   const NoiseRecord& n = *c.noise;
   return fmt::format(
-      "<li>In units of the scan's own noise: interpolation errs by at most {} sigma of the brick{}. Sigma, "
+      "<li>In units of the scan's own noise: interpolation errs by at most {} sigma of the brick{}{}. Sigma, "
       "the "
       "standard deviation of F, runs from {} to {}, {} in the middle: an estimate, from {}.</li>\n",
       number_html(worst_in_sigma(c, c.budget.sampler.buffer.value), "noise.worst.buffer"),
       n.tolerance_sigmas ? fmt::format(", where {} was asked for", number_text(*n.tolerance_sigmas)) : "",
+      n.rms_in_sigma
+          ? fmt::format(" ({} in the root mean square, estimated at {} points): the noise of this volume is "
+                        "at most {:.3g} "
+                        "times that of F, in practice below it",
+                        number_html(*n.rms_in_sigma, "noise.rms.sigmas"), n.rms_points, 1 + *n.rms_in_sigma)
+          : "",
       number_html(n.least, "noise.sigma.least"), number_html(n.largest, "noise.sigma.largest"),
       number_html(n.median, "noise.sigma.median"), escaped(n.source));
 }

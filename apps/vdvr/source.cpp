@@ -158,12 +158,11 @@ const Certificate& Source::certificate() const {
 }
 
 RenderResult Source::draw(const RenderOptions& options, const Progress& progress) {
-  if (options.output == RenderOutput::error && !bounds_set_) {
+  if (options.output == RenderOutput::error && shown_.values.empty()) {
     const bool image3d = renderer_ && renderer_->sampler(options.sampler) == SamplerKind::image3d;
-    const std::vector<float> bounds = brick_bounds(certificate(), image3d);
-    if (crew_) crew_->set_bounds(bounds);
-    else renderer_->set_bounds(bounds);
-    bounds_set_ = true;
+    shown_ = brick_values(scene_->volume, certificate(), image3d, shown_.quantity);
+    if (crew_) crew_->set_bounds(shown_.values);
+    else renderer_->set_bounds(shown_.values);
   }
   return crew_ ? crew_->render(options, progress) : renderer_->render(options);
 }

@@ -9,6 +9,7 @@
 #include "apps/vdvr/pictures.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/d2vr.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/paged_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/render_crew.hpp"
@@ -47,6 +48,10 @@ class Source {
   SafeSampler take_sampler(SamplerKind asked, bool unverified);
   /// As take_sampler() found it, else as the file has it; throws InputError where there is none.
   [[nodiscard]] const Certificate& certificate() const;
+  /// What RenderOutput::error shows of a brick; before the first picture.
+  void show(BrickQuantity quantity) { shown_.quantity = quantity; }
+  /// As the latest such picture has it.
+  [[nodiscard]] const BrickValues& shown() const { return shown_; }
   /// `progress` hears of pictures by several devices, or by bricks.
   [[nodiscard]] RenderResult draw(const RenderOptions& options, const Progress& progress = {});
   /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
@@ -81,7 +86,7 @@ class Source {
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;
   std::optional<Certificate> here_;  ///< on the devices that draw
-  bool bounds_set_ = false;
+  BrickValues shown_;                // empty until a picture asks
 };
 
 }  // namespace vdvr::cli

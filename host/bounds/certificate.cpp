@@ -74,6 +74,8 @@ Json noise(const Certificate& c) {
     if (sampler.image3d)
       j["worst"]["image3d"] = finite("noise.worst.image3d", worst_in_sigma(c, sampler.image3d->value));
   }
+  if (n.rms_in_sigma)
+    j["rms"] = {{"sigmas", finite("noise.rms.sigmas", *n.rms_in_sigma)}, {"points", n.rms_points}};
   j["brick_sigma_sha256"] = n.sha256;
   return j;
 }
@@ -230,6 +232,12 @@ void read_noise(const Member& m, Certificate& c) {
     if (!(*n.tolerance_sigmas > 0))
       throw FileError(fmt::format("certificate: member 'noise.tolerance_sigmas' is {}; it must be positive",
                                   *n.tolerance_sigmas));
+  }
+  if (m.has("rms")) {
+    n.rms_in_sigma = m.at("rms").at("sigmas").number();
+    n.rms_points = m.at("rms").at("points").integer();
+    if (!(*n.rms_in_sigma >= 0 && n.rms_points > 0))
+      throw FileError("certificate: member 'noise.rms' is no mean of any points");
   }
   n.sha256 = m.at("brick_sigma_sha256").text();
 }

@@ -118,6 +118,31 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   return out;
 }
 
+std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet& scan,
+                                            const Tolerance& tolerance, std::optional<double> multiple,
+                                            const ScanNoise& noise, const CertifyOptions& options,
+                                            const Progress& progress) {
+  std::vector<FilterForecast> out;
+  for (const auto& [filter, name] : ramp_windows) {
+    CertifyOptions with = options;
+    with.field.filter = filter;
+    FilterForecast row{filter, 0, {}};
+    try {
+      if (multiple) {
+        const PlanInSigma made = make_plan_in_sigma(device, scan, *multiple, noise, with, progress);
+        row = {filter, made.plan.samples_ratio, made.sigma.range};
+      } else {
+        const Plan plan = make_plan(device, scan, tolerance, with, progress);
+        row = {filter, plan.samples_ratio, sigma_of_plan(device, scan, plan, noise, progress).range};
+      }
+    } catch (const ToleranceError&) {
+      // It says so by storing nothing.
+    }
+    out.push_back(row);
+  }
+  return out;
+}
+
 Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   Refinement out;
   for (const float s : sigma.of_brick) {
@@ -134,27 +159,46 @@ BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double m
   PlanInSigma made = make_plan_in_sigma(device, scan, multiple, noise, options, progress);
   options.build.refinement = refinement_in_sigma(made.sigma, multiple);
   BuildResult result = certify(device, scan, std::move(made.plan), options, progress);
-  note_noise(result.certificate, noise, made.sigma, multiple);
+  note_noise(device, scan, result, noise, made.sigma, multiple, progress);
   return result;
 }
 
 void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
                 std::optional<double> multiple) {
   const SigmaRange& range = sigma.range;
-  c.noise =
-      NoiseRecord{noise.model.source, noise.model.photons,         range.least, range.median, range.largest,
-                  multiple,           sigma_sha256(sigma.of_brick)};
+  c.noise = NoiseRecord{.source = noise.model.source,
+                        .photons = noise.model.photons,
+                        .least = range.least,
+                        .median = range.median,
+                        .largest = range.largest,
+                        .tolerance_sigmas = multiple,
+                        .rms_in_sigma = {},
+                        .sha256 = sigma_sha256(sigma.of_brick)};
   c.brick_sigma = sigma.of_brick;
   if (!multiple || c.comparison) return;
-  c.holds_buffer = within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value);
+  c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value);
   if (c.total_image3d && c.holds_image3d)
-    c.holds_image3d = within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
+    c.holds_image3d =
+        *c.holds_image3d && within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
   if (!c.holds_buffer) {
     const double worst = worst_in_sigma(c, c.budget.sampler.buffer.value);
     throw ToleranceError(
         fmt::format("a brick's bound is {:.4g} of its sigma, where {:.4g} is asked: allow "
                     "at least {:.3g}sigma",
                     worst, *multiple, 1.02 * worst));
+  }
+}
+
+void note_noise(Device& device, const ProjectionSet& scan, BuildResult& built, const ScanNoise& noise,
+                const BrickSigma& sigma, std::optional<double> multiple, const Progress& progress) {
+  note_noise(built.certificate, noise, sigma, multiple);
+  try {
+    if (const auto mean = mean_error(device, scan, built.volume, built.certificate, progress)) {
+      built.certificate.noise->rms_in_sigma = mean->in_sigma;
+      built.certificate.noise->rms_points = mean->points;
+    }
+  } catch (const ResourceError&) {
+    // The volume and all that is promised of it stand without.
   }
 }
 

@@ -282,9 +282,11 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   const std::int64_t gold = (b.nx + 2 * halo_) * (b.ny + 2 * halo_), nodes = b.nx * b.ny * slab.stride;
   const std::int64_t per_block = 4 * (gold * b.gold_stride + 4 * nodes);
   // Blocks that go together are told of, launched and asked for together; what fits them takes as much again.
+  // A CPU has them in its caches; a card runs dry between small launches.
   const auto left = static_cast<std::int64_t>(state_.memory.left());
-  const std::int64_t bytes = std::max(std::min<std::int64_t>(64 << 20, left / 3),
-                                      std::min<std::int64_t>(256 << 20, left / 8)),
+  const std::int64_t large = std::int64_t{256} << (state_.info.is_cpu ? 20 : 23),
+                     wanted = std::max(std::min<std::int64_t>(64 << 20, left / 3), std::min(large, left / 8)),
+                     bytes = std::min(wanted, static_cast<std::int64_t>(state_.info.max_allocation)),
                      together = std::clamp<std::int64_t>(bytes / per_block, 1,
                                                          static_cast<std::int64_t>(work.first.size()));
   const std::uint64_t samples = count(together * gold * b.gold_stride + gold_room);

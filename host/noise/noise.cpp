@@ -78,7 +78,11 @@ std::string photons_text(const std::optional<double>& photons) {
 
 std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOptions& options,
                                     const std::optional<LineIntegralNoise>& by_flats, std::string* why) {
-  if (std::optional<ScanNoise> given = stated(options)) return given;
+  if (std::optional<ScanNoise> given = stated(options)) {
+    if (is_prepared(scan.report.preparation))
+      given->words += "; the projections were prepared, which lowers their noise: sigma is too large";
+    return given;
+  }
   const auto none = [&](std::string reason) -> std::optional<ScanNoise> {
     if (why) *why = std::move(reason);
     return std::nullopt;

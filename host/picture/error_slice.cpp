@@ -67,14 +67,17 @@ struct PixelGrid {
   std::size_t plane = 0;  ///< 0 or 1: which of the grid's two planes is the slice
 };
 
-SliceFrame frame_of(const Grid& volume, const ErrorSliceOptions& o, double epsilon) {
+SliceFrame frame_of(const Grid& volume, const ErrorSliceOptions& o, double end,
+                    BrickQuantity quantity = BrickQuantity::bound) {
   SliceFrame f;
   f.grid = volume;
   f.axis = o.axis;
   f.position = o.position;
-  f.colours = error_colours(epsilon);
-  f.quantity = "|V − F|";
-  f.unit = per_unit(volume.unit);
+  f.colours = error_colours(end);
+  f.quantity = quantity == BrickQuantity::bound   ? "|V − F|"
+               : quantity == BrickQuantity::sigma ? "sigma"
+                                                  : "|V − F| / sigma";
+  if (quantity != BrickQuantity::bound_in_sigma) f.unit = per_unit(volume.unit);
   // What the caption says is known only when the slice is done.
   f.caption_lines = o.width < 400 ? 4 : 2;
   return f;
@@ -114,10 +117,10 @@ PixelGrid pixel_grid(const Grid& volume, const ErrorSliceOptions& o, const Slice
 
 std::string number(double value) { return number_text(value); }
 
-/// Below pictures of rays: the colours from 0 to epsilon, and a line of text.
-void draw_caption(Image& image, double epsilon, const std::string& line) {
+/// Below pictures of rays: the colours from 0 to what `high` says, and a line of text.
+void draw_caption(Image& image, const std::string& high, const std::string& line) {
   constexpr double small = 12;
-  const std::string low = "0", high = fmt::format("epsilon {}", number(epsilon));
+  const std::string low = "0";
   const std::int64_t top = image.height - kErrorCaption + kMargin;
   const auto above = static_cast<double>(top);
   const std::int64_t left = 2 * kMargin + std::lround(text_width(low, small));
@@ -145,9 +148,9 @@ ErrorSlice empty_slice(const SlicePlace& place) {
 
 /// The frame, where one is wanted and has room.
 void put_in_frame(ErrorSlice& slice, SliceFrame frame, const SlicePlace& place, const ErrorSliceOptions& o,
-                  const std::string& line) {
+                  const std::string& line, const std::string& key) {
   if (!place.framed) return;
-  frame.caption = {line, "Grey: not compared. Cyan: above epsilon, the end of the scale."};
+  frame.caption = {line, key};
   slice.image = framed_slice(frame, slice.image, o.width, o.height);
 }
 
@@ -209,7 +212,8 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
   compare(result, pixels, axes_of(options.axis), f, scan, volume, certificate);
   put_in_frame(result, frame, place, options,
                fmt::format("Largest |V − F| here = {} = {:.1f} % of epsilon", number(result.max_error),
-                           100 * result.max_error / certificate.epsilon_abs));
+                           100 * result.max_error / certificate.epsilon_abs),
+               "Grey: not compared. Cyan: above epsilon, the end of the scale.");
   return result;
 }
 
@@ -224,23 +228,70 @@ std::vector<float> bounds_of(const MixedVolume& volume, const Certificate& c, bo
                             static_cast<float>(image3d ? *c.total_image3d : c.total_buffer));
 }
 
-Colour bound_colour(float bound, double epsilon) {
-  if (!std::isfinite(bound)) return kNotCompared;
-  const auto b = static_cast<double>(bound);
-  return b <= epsilon ? error_colour(b / epsilon) : kAbove;
+float largest_of(const std::vector<float>& values) {
+  float largest = 0;
+  for (const float v : values)
+    if (std::isfinite(v)) largest = std::max(largest, v);
+  return largest;
 }
 
-std::string share_text(double bound, double epsilon) {
-  return fmt::format("|V − F| ≤ {} = {:.1f} % of epsilon", number(bound), 100 * bound / epsilon);
+/// A share of the scale's end.
+Colour value_colour(float value, double end) {
+  if (!std::isfinite(value)) return kNotCompared;
+  const auto v = static_cast<double>(value);
+  return v <= end ? error_colour(end > 0 ? v / end : 0) : kAbove;
+}
+
+std::string end_text(BrickQuantity quantity, double end) {
+  switch (quantity) {
+    case BrickQuantity::bound:
+      return fmt::format("epsilon {}", number(end));
+    case BrickQuantity::sigma:
+      return number(end);
+    case BrickQuantity::bound_in_sigma:
+      return fmt::format("{} sigma", number(end));
+  }
+  return {};
+}
+
+/// What is said of the largest value that a picture shows.
+std::string largest_text(BrickQuantity quantity, double end, double largest) {
+  switch (quantity) {
+    case BrickQuantity::bound:
+      return fmt::format("|V − F| ≤ {} = {:.1f} % of epsilon", number(largest), 100 * largest / end);
+    case BrickQuantity::sigma:
+      return fmt::format("Noise of the scan itself (estimated): sigma of F up to {}", number(largest));
+    case BrickQuantity::bound_in_sigma:
+      return fmt::format("|V − F| ≤ {} sigma of the scan's own noise (estimated)", number(largest));
+  }
+  return {};
 }
 
 }  // namespace
 
+BrickValues brick_values(const MixedVolume& volume, const Certificate& c, bool image3d,
+                         BrickQuantity quantity) {
+  BrickValues out;
+  out.quantity = quantity;
+  if (quantity != BrickQuantity::bound && (!c.noise || c.brick_sigma.size() != volume.level.size()))
+    throw InputError(
+        "the certificate does not know the scan's noise: build it with `epsilon` in sigma, or state "
+        "`photons` "
+        "or `sigma_p`");
+  out.values = quantity == BrickQuantity::sigma ? c.brick_sigma : bounds_of(volume, c, image3d);
+  if (quantity == BrickQuantity::bound_in_sigma)
+    for (std::size_t b = 0; b < out.values.size(); ++b) out.values[b] /= c.brick_sigma[b];
+  out.end = quantity == BrickQuantity::bound ? c.epsilon_abs : static_cast<double>(largest_of(out.values));
+  if (quantity == BrickQuantity::bound_in_sigma && c.noise->tolerance_sigmas)
+    out.end = *c.noise->tolerance_sigmas;
+  return out;
+}
+
 ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool image3d,
-                       const ErrorSliceOptions& options) {
-  const std::vector<float> bounds = bounds_of(volume, c, image3d);
+                       const ErrorSliceOptions& options, BrickQuantity quantity) {
+  const BrickValues shown = brick_values(volume, c, image3d, quantity);
   const Index3 n = volume.bricks();
-  const SliceFrame frame = frame_of(volume.grid, options, c.epsilon_abs);
+  const SliceFrame frame = frame_of(volume.grid, options, shown.end, quantity);
   const SlicePlace place = place_of(frame, options);
   const PixelGrid pixels = pixel_grid(volume.grid, options, place);
   const Axes axes = axes_of(options.axis);
@@ -255,32 +306,35 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
       at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
       const Vec3 point = pixels.grid.position(at);
       const Index3 brick = brick_at(volume, point);
-      const float bound =
+      const float value =
           is_inside(c.roi, point)
-              ? bounds[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
+              ? shown.values[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
               : std::numeric_limits<float>::infinity();
-      put(result.image, left + x, top + y, bound_colour(bound, c.epsilon_abs));
-      if (!std::isfinite(bound)) continue;
+      put(result.image, left + x, top + y, value_colour(value, shown.end));
+      if (!std::isfinite(value)) continue;
       ++result.pixels;
-      result.max_error = std::max(result.max_error, static_cast<double>(bound));
-      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = bound;
+      result.max_error = std::max(result.max_error, static_cast<double>(value));
+      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = value;
     }
-  put_in_frame(result, frame, place, options,
-               fmt::format("{} where covered, sampler {}", share_text(result.max_error, c.epsilon_abs),
-                           image3d ? "image3d" : "buffer"));
+  const std::string sampler = quantity == BrickQuantity::sigma
+                                  ? ""
+                                  : fmt::format(" where covered, sampler {}", image3d ? "image3d" : "buffer");
+  put_in_frame(result, frame, place, options, largest_text(quantity, shown.end, result.max_error) + sampler,
+               fmt::format("Grey: nothing is known. Cyan: above {}, the end of the scale.",
+                           end_text(quantity, shown.end)));
   return result;
 }
 
-Image bound_picture(const FloatImage& bounds, double epsilon) {
-  Image image = blank(bounds.width, bounds.height + kErrorCaption, kPaper);
+Image bound_picture(const FloatImage& shown, double end, BrickQuantity quantity) {
+  Image image = blank(shown.width, shown.height + kErrorCaption, kPaper);
   double most = 0;
-  for (std::int64_t i = 0; i < bounds.width * bounds.height; ++i) {
-    const float bound = bounds.values[static_cast<std::size_t>(i)];
-    if (std::isnan(bound)) continue;
-    put(image, i, 0, bound_colour(bound, epsilon));
-    if (std::isfinite(bound)) most = std::max(most, static_cast<double>(bound));
+  for (std::int64_t i = 0; i < shown.width * shown.height; ++i) {
+    const float value = shown.values[static_cast<std::size_t>(i)];
+    if (std::isnan(value)) continue;
+    put(image, i, 0, value_colour(value, end));
+    if (std::isfinite(value)) most = std::max(most, static_cast<double>(value));
   }
-  draw_caption(image, epsilon, share_text(most, epsilon) + " of what is seen");
+  draw_caption(image, end_text(quantity, end), largest_text(quantity, end, most) + " of what is seen");
   return image;
 }
 

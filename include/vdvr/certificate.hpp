@@ -55,6 +55,10 @@ struct NoiseRecord {
   double least = 0, median = 0, largest = 0;  ///< the standard deviation sigma of F at covered samples
   /// Promised: at covered points of each brick |V - F| is at most that many sigmas of the brick.
   std::optional<double> tolerance_sigmas;
+  /// The root mean square of (V - F) / sigma at `rms_points` points between samples: an estimate. Nothing in
+  /// files of earlier versions.
+  std::optional<double> rms_in_sigma;
+  std::int64_t rms_points = 0;
   std::string sha256;  ///< of Certificate::brick_sigma
 };
 

@@ -1,9 +1,11 @@
-// A picture of |V - F| on one slice, bounded by the certificate or measured pixel by pixel: the certified
-// field against F reconstructed on the pixels themselves. Called by the commands run and render --mode error.
+// Pictures of what bricks are worth: the bound of |V - F|, sigma of the scan's own noise, or the one in units
+// of the other; and of |V - F| itself on one slice, measured pixel by pixel against F reconstructed there.
+// Called by the commands run and render.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/device.hpp"
@@ -14,6 +16,21 @@
 #include "vdvr/projections.hpp"
 
 namespace vdvr {
+
+/// The latter two where the certificate has a `noise`.
+enum class BrickQuantity { bound, sigma, bound_in_sigma };
+
+/// A number for each brick, and what pictures of it say.
+struct BrickValues {
+  std::vector<float> values;  ///< [bz][by][bx]; infinite where nothing is known
+  BrickQuantity quantity = BrickQuantity::bound;
+  double end =
+      0;  ///< of the colours: epsilon, the largest sigma, what is promised in sigma or else the largest
+};
+/// Of image3d the certificate must be that of the device that draws (safe_sampler.hpp). Throws InputError
+/// where the certificate has no total for the sampler, or does not know sigma.
+VDVR_API BrickValues brick_values(const MixedVolume& volume, const Certificate& certificate, bool image3d,
+                                  BrickQuantity quantity);
 
 struct ErrorSliceOptions {
   int axis = 2;                            ///< 0 x, 1 y, 2 z
@@ -41,17 +58,18 @@ VDVR_API ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const
                                 const Certificate& certificate, const ErrorSliceOptions& options,
                                 const Progress& progress = {});
 
-/// The same picture from the certificate alone: every pixel shows the bound of |V - F| at the covered points
-/// of its brick (`max_error`, `errors`), or where the file has none by brick the certificate's total; grey
-/// and NaN in bricks that were not tested or lie outside the region of interest. Points that are not covered
-/// cannot be told apart without the projections: the caption says where it holds. Of image3d the certificate
-/// must be that of the device that draws (safe_sampler.hpp). Host only. Throws InputError when the
-/// certificate has no total for the sampler, and as above.
+/// The same picture from the certificate alone: every pixel shows its brick's value (`max_error`, `errors`),
+/// of bounds at the covered points of the brick; grey and NaN in bricks that were not tested or lie outside
+/// the region of interest. Points that are not covered cannot be told apart without the projections: the
+/// caption says where it holds. Host only. Throws as brick_values() and as above.
 VDVR_API ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& certificate, bool image3d,
-                                const ErrorSliceOptions& options);
+                                const ErrorSliceOptions& options,
+                                BrickQuantity quantity = BrickQuantity::bound);
 
-/// RenderOutput::error as a picture: bounds in the colours of error slices, nothing black, bricks that were
-/// not tested grey; below it the colours, as in an error slice. `bounds` is kErrorCaption pixels less high.
-VDVR_API Image bound_picture(const FloatImage& bounds, double epsilon_abs);
+/// RenderOutput::error as a picture of brick_values() that were set as bounds: in the colours of error slices
+/// up to `end`, nothing black, bricks of which nothing is known grey; below it the colours, as in an error
+/// slice. `shown` is kErrorCaption pixels less high.
+VDVR_API Image bound_picture(const FloatImage& shown, double end,
+                             BrickQuantity quantity = BrickQuantity::bound);
 
 }  // namespace vdvr

@@ -90,6 +90,14 @@ class VDVR_API UniformWriter {
   std::unique_ptr<State> state_;
 };
 
+/// Where sigma goes beside a volume: NAME-sigma with the volume's ending.
+VDVR_API std::filesystem::path sigma_path(const std::filesystem::path& volume);
+/// Sigma of F (Certificate::brick_sigma), float32, at the samples of `grid`, which is that of an exported
+/// volume, in the same format but vtm. Throws InputError where the certificate does not know it, and as
+/// UniformWriter.
+VDVR_API ExportResult export_sigma(const VdvrFile& file, const std::filesystem::path& path, const Grid& grid,
+                                   const ExportOptions& options, const Progress& progress = {});
+
 /// log2 of samples per cell along x, y, z of the finest brick: what makes uniform samples hold all of V.
 VDVR_API std::array<int, 3> finest_per_cell(const MixedVolume& volume);
 

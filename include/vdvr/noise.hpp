@@ -58,6 +58,21 @@ VDVR_API Volume noise_of_field(Device& device, const ProjectionSet& scan, const 
                                const LineIntegralNoise& noise, const Grid& grid,
                                const Progress& progress = {});
 
+/// The noise of averaged flats. It is common to all views, so that it makes rings, which neither the
+/// projections alone nor the split of the views show: at r columns from the axis it adds at(r) of F's
+/// variance to it (docs/noise.md).
+struct RingNoise {
+  std::int64_t flats = 0;
+  double at_axis = 0;  ///< of the variance
+  double slope = 0;    ///< at(r) = slope / r, where that is less
+  [[nodiscard]] double at(double r) const { return r * at_axis > slope ? slope / r : at_axis; }
+  /// Columns within which it adds more than a tenth.
+  [[nodiscard]] double radius() const { return at_axis > 0.1 ? slope / 0.1 : 0; }
+};
+/// Of parallel beam and a scan whose line integrals are of `flats` averaged flats; nothing of others. Cost: a
+/// pass over at most a million samples.
+VDVR_API std::optional<RingNoise> ring_noise(const ProjectionSet& scan, std::int64_t flats);
+
 /// The grid of a sample per brick corner, on which noise_of_field() is asked for.
 VDVR_API Grid noise_grid(const Grid& grid, int granularity);
 

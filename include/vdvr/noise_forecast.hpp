@@ -10,6 +10,7 @@
 #include "vdvr/export.hpp"
 #include "vdvr/field_options.hpp"
 #include "vdvr/certify.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/grid.hpp"
 #include "vdvr/noise.hpp"
 #include "vdvr/plan.hpp"
@@ -59,15 +60,43 @@ struct PlanInSigma {
 VDVR_API PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
                                         const ScanNoise& noise, const CertifyOptions& options = {},
                                         const Progress& progress = {});
+/// What the same tolerance stores with another ramp filter, and what noise that leaves in F.
+struct FilterForecast {
+  RampWindow filter = RampWindow::ram_lak;
+  double samples_ratio = 0;  ///< 0: the tolerance is out of reach
+  SigmaRange sigma;
+};
+/// Of all filters, the same epsilon, or with `multiple` as many sigmas of each. Cost: a plan of each. Throws
+/// what make_plan() throws but ToleranceError.
+VDVR_API std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet& scan,
+                                                     const Tolerance& tolerance,
+                                                     std::optional<double> multiple, const ScanNoise& noise,
+                                                     const CertifyOptions& options = {},
+                                                     const Progress& progress = {});
 /// How build() holds each brick to `multiple` times its sigma.
 VDVR_API Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple);
 /// Plans, builds and notes it. Throws what certify() throws.
 VDVR_API BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
                                       const ScanNoise& noise, CertifyOptions options = {},
                                       const Progress& progress = {});
+/// What interpolation errs by on average: the root mean square of (V - F) / sigma over covered points between
+/// samples. An estimate, where the largest is proved.
+struct MeanError {
+  double in_sigma = 0;
+  std::int64_t points = 0;
+};
+/// Of a certificate with its `brick_sigma`. Nothing where fewer than a hundred points are covered. Cost: a
+/// reconstruction of some ten thousand to a million samples. Throws what reconstruct() throws.
+VDVR_API std::optional<MeanError> mean_error(Device& device, const ProjectionSet& scan,
+                                             const MixedVolume& volume, const Certificate& certificate,
+                                             const Progress& progress = {});
 /// Writes what is known of the noise into the certificate of a build: with `multiple` of a build so refined,
 /// which is then promised. Throws ToleranceError where a brick's bound is more.
 VDVR_API void note_noise(Certificate& certificate, const ScanNoise& noise, const BrickSigma& sigma,
                          std::optional<double> multiple = {});
+/// The same, and the mean error, where memory is left to find it.
+VDVR_API void note_noise(Device& device, const ProjectionSet& scan, BuildResult& built,
+                         const ScanNoise& noise, const BrickSigma& sigma, std::optional<double> multiple = {},
+                         const Progress& progress = {});
 
 }  // namespace vdvr

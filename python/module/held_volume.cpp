@@ -18,7 +18,8 @@ std::optional<Certificate> HeldVolume::certificate() const {
   return file_.certificate.comparison ? std::nullopt : std::optional(file_.certificate);
 }
 
-RenderResult HeldVolume::render(const std::shared_ptr<Device>& device, const RenderOptions& options) {
+RenderResult HeldVolume::render(const std::shared_ptr<Device>& device, const RenderOptions& options,
+                                BrickQuantity quantity) {
   const std::lock_guard guard(lock_);
   if (device_ != device) {
     renderer_.reset();
@@ -40,11 +41,12 @@ RenderResult HeldVolume::render(const std::shared_ptr<Device>& device, const Ren
     bounds_of_.reset();
   }
   if (options.output == RenderOutput::error) {
-    const SamplerKind used = renderer_->sampler(drawn.sampler);
-    if (bounds_of_ != used)
-      renderer_->set_bounds(
-          brick_bounds(safe->second.certificate.value_or(file_.certificate), used == SamplerKind::image3d));
-    bounds_of_ = used;
+    const std::pair wanted{renderer_->sampler(drawn.sampler), quantity};
+    if (bounds_of_ != wanted)
+      renderer_->set_bounds(brick_values(file_.volume, safe->second.certificate.value_or(file_.certificate),
+                                         wanted.first == SamplerKind::image3d, quantity)
+                                .values);
+    bounds_of_ = wanted;
   }
   return renderer_->render(drawn);
 }

@@ -10,6 +10,7 @@
 #include "parts.hpp"
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/camera.hpp"
+#include "vdvr/error_slice.hpp"
 #include "vdvr/framing.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/raycast.hpp"
@@ -34,6 +35,10 @@ void add_choices(nb::module_& m) {
       .value("depth", RenderOutput::depth)
       .value("normal", RenderOutput::normal)
       .value("error", RenderOutput::error);
+  nb::enum_<BrickQuantity>(m, "BrickQuantity")
+      .value("bound", BrickQuantity::bound)
+      .value("sigma", BrickQuantity::sigma)
+      .value("bound_in_sigma", BrickQuantity::bound_in_sigma);
   nb::enum_<GradientKind>(m, "GradientKind")
       .value("auto", GradientKind::automatic)
       .value("central", GradientKind::central)

@@ -165,20 +165,20 @@ OrbitFrame frame_of(HeldVolume& held, const RenderOptions& options, double azimu
 }
 
 nb::object render(HeldVolume& held, const std::shared_ptr<Device>& device, const RenderOptions& options,
-                  bool values) {
+                  BrickQuantity quantity, bool values) {
   RenderResult result;
-  run_long(nb::none(), [&](const Progress&) { result = held.render(device, options); });
+  run_long(nb::none(), [&](const Progress&) { result = held.render(device, options, quantity); });
   return values ? values_of(std::move(result.values)) : picture_of(std::move(result.image));
 }
 
 /// The position is to be given.
-nb::object error_picture(HeldVolume& held, const RenderOptions& o, bool values) {
+nb::object error_picture(HeldVolume& held, const RenderOptions& o, BrickQuantity quantity, bool values) {
   const MixedVolume& v = held.file().volume;
   ErrorSlice slice;
   run_long(nb::none(), [&](const Progress&) {
     // Values have no frame.
     const ErrorSliceOptions options{o.slice_axis, o.slice_position.value(), o.width, o.height, !values};
-    slice = bound_slice(v, held.file().certificate, false, options);
+    slice = bound_slice(v, held.file().certificate, false, options, quantity);
   });
   return values ? values_of(std::move(slice.errors)) : picture_of(std::move(slice.image));
 }
@@ -269,8 +269,8 @@ void add_volumes(nb::module_& m) {
           "spacing"_a.none(), "box"_a.none())
       .def("on_lattice", &on_lattice, "lattice"_a, "bounds"_a)
       .def("frame_view", &frame_of, "options"_a, "azimuth_deg"_a, "elevation_deg"_a)
-      .def("render", &render, "device"_a, "options"_a, "values"_a)
-      .def("error_picture", &error_picture, "options"_a, "values"_a)
+      .def("render", &render, "device"_a, "options"_a, "quantity"_a, "values"_a)
+      .def("error_picture", &error_picture, "options"_a, "quantity"_a, "values"_a)
       .def("vtk_boxes", &vtk_boxes, "most_blocks"_a)
       .def("release", &HeldVolume::release, nb::call_guard<nb::gil_scoped_release>())
       .def(

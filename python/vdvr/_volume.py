@@ -169,7 +169,8 @@ class Volume:
         iso : densities of surfaces, mode "iso"; by default one between background and object.
         slice_axis, slice_position : "x", "y" or "z", and where on it; by default the middle.
         clip : x0, y0, z0, x1, y1, z1: draw what lies in this box alone; of every mode but slices.
-        show : "colour", "depth", "normal", or "error": the largest bound of the samples behind a pixel.
+        show : "colour", "depth", "normal", or of the samples behind a pixel "error", their largest bound, "sigma", what the
+            scan's own noise leaves in them (estimated), "error-in-sigma", the one in units of the other; mode "error" too.
         step : of a ray, in cells.
         step_mode : "adaptive" (finer where the transfer function changes much along one), "fixed" or "level" (step
             / 2^l in bricks of level l); by default adaptive of mode "dvr" with classification "post", else fixed.
@@ -181,14 +182,16 @@ class Volume:
         o = _core.RenderOptions()
         o.width, o.height = sizes(size)
         o.mode = choice(_core.RenderMode, mode, "mode")
-        o.output = choice(_core.RenderOutput, show, "show")
+        in_sigma = {"sigma": _core.BrickQuantity.sigma, "error-in-sigma": _core.BrickQuantity.bound_in_sigma}
+        quantity = in_sigma.get(show, _core.BrickQuantity.bound)
+        o.output = choice(_core.RenderOutput, "error" if show in in_sigma else show, "show")
         o.slice_axis = axis(slice_axis)
         o.slice_position = None if slice_position is None else number(slice_position, "slice_position")
         if mode == "error":
             if o.slice_position is None:
                 g, a = self.grid, o.slice_axis
                 o.slice_position = g.origin[a] + 0.5 * g.cells[a] * g.spacing[a]
-            return self._held.error_picture(o, values)
+            return self._held.error_picture(o, quantity, values)
         bright = self._held.brightness
         window = None if transfer_range is None else _window(transfer_range)
         integral = mode == "integral"
@@ -215,7 +218,7 @@ class Volume:
                 raise _core.InputError(f"background: {background}; give three or six numbers from 0 to 1")
             o.background_top, o.background_bottom = given[:3], given[-3:]
         o.sampler = choice(_core.SamplerKind, sampler, "sampler")
-        return self._held.render(self._open_device(device), o, values)
+        return self._held.render(self._open_device(device), o, quantity, values)
 
     def _transfer(self, transfer: TransferLike, window: Optional[Tuple[float, float]]) -> "_core.TransferFunction":
         if isinstance(transfer, str) and transfer in _core.transfer_presets():

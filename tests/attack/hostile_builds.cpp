@@ -39,6 +39,7 @@ std::string text_of_case(const Case& c) {
     text += ", base " + std::to_string(1 << (*base)[2]) + "x" + std::to_string(1 << (*base)[1]) + "x" +
             std::to_string(1 << (*base)[0]);
   if (c.options.roi) text += ", roi";
+  if (c.sigma_seed) text += ", in sigma";
   if (c.window) text += ", window";
   text += c.against == Against::absolute  ? ", absolute"
           : c.against == Against::largest ? ", of the largest"

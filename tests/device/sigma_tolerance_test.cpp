@@ -95,6 +95,55 @@ BOOST_AUTO_TEST_CASE(each_point_is_within_the_sigmas_of_its_brick) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(the_mean_error_is_that_of_points_drawn_by_chance) {
+  for (const double multiple : {1.0, 2.5}) {
+    const BuildResult& result = built(multiple);
+    const NoiseRecord& noise = *result.certificate.noise;
+    BOOST_REQUIRE(noise.rms_in_sigma.has_value());
+    BOOST_TEST(noise.rms_points > 5000);
+    const CertifiedPoints at(result.volume, result.certificate);
+    const std::vector<Vec3> points = covered_points(at, result.volume.grid);
+    const std::vector<double> f = ExactField(noisy_scan(), {}).at(points);
+    double squares = 0, fourth = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double e = (static_cast<double>(sample_at(result.volume, points[i])) - f[i]) /
+                       static_cast<double>(at.sigma(points[i]));
+      squares += e * e;
+      fourth += e * e * e * e;
+    }
+    const auto n = static_cast<double>(points.size());
+    const double mean = squares / n, of_mean = std::sqrt((fourth / n - mean * mean) / n);
+    // Four standard errors of the drawn points' mean; F on the device lies within a hundredth of epsilon of
+    // F.
+    const double rms = *noise.rms_in_sigma, exact = 0.02 * multiple * std::sqrt(mean);
+    BOOST_TEST_INFO("mean square " << rms * rms << ", of points drawn " << mean << " +- " << of_mean);
+    BOOST_TEST(std::abs(rms * rms - mean) <= 4 * of_mean + exact);
+    BOOST_TEST(rms < multiple);
+    const Certificate read = certificate_from_json(to_json(result.certificate));
+    BOOST_TEST(read.noise->rms_in_sigma.value() == rms);
+    BOOST_TEST(read.noise->rms_points == noise.rms_points);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(other_filters_leave_less_noise_and_store_less) {
+  const auto rows = foresee_filters(vdvr::support::device(), noisy_scan(),
+                                    Tolerance{{}, built(1).certificate.noise->median}, {}, stated_noise());
+  BOOST_TEST_REQUIRE(rows.size() == ramp_windows.size());
+  const auto row = [&](RampWindow filter) {
+    return *std::find_if(rows.begin(), rows.end(),
+                         [&](const FilterForecast& r) { return r.filter == filter; });
+  };
+  // Ram-Lak is what the built volume has.
+  BOOST_TEST(std::abs(row(RampWindow::ram_lak).sigma.median / built(1).certificate.noise->median - 1) < 1e-6);
+  // In the order of what they leave of the highest frequencies.
+  const std::array order{RampWindow::ram_lak, RampWindow::shepp_logan, RampWindow::cosine,
+                         RampWindow::hamming};
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    BOOST_TEST(row(order[i]).sigma.median < row(order[i - 1]).sigma.median);
+    BOOST_TEST(row(order[i]).samples_ratio <= row(order[i - 1]).samples_ratio);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(bricks_of_more_noise_take_fewer_samples_than_one_tolerance_for_all) {
   const double least = built(1).certificate.noise->least;
   const BuildResult uniform = certify(vdvr::support::device(), noisy_scan(), Tolerance{{}, least});

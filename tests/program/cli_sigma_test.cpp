@@ -54,6 +54,7 @@ BOOST_AUTO_TEST_CASE(a_volume_of_one_sigma_says_so_and_is_verified) {
   BOOST_TEST(noise.at("source") == "flats");
   BOOST_TEST(noise.at("worst").at("buffer").get<double>() <= 1);
   BOOST_TEST(noise.at("worst").at("buffer").get<double>() > 0);
+  BOOST_TEST(noise.at("rms").at("sigmas").get<double>() < noise.at("worst").at("buffer").get<double>());
   BOOST_TEST(run({"verify", file, "--projections", noisy()}).code == 0);
   BOOST_TEST(run({"info", file}).out.find("sigma of its brick") != std::string::npos);
   std::ofstream(at("p.csv")) << "x,y,z\n0,0,0\n1000,0,0\n";
@@ -84,10 +85,60 @@ BOOST_AUTO_TEST_CASE(plan_foresees_what_one_sigma_stores) {
   BOOST_TEST(std::abs(foreseen - stored) < 0.2 * stored);
 }
 
+BOOST_AUTO_TEST_CASE(plan_compares_filters_and_tells_of_rings) {
+  // Small: a plan for each filter.
+  const std::string small = at("small.h5");
+  const Ended made = run({"simulate", "--phantom", "sphere", "--detector", "25x5", "--angles", "30",
+                          "--photons", "300", "-o", small});
+  BOOST_TEST_REQUIRE(made.code == 0, made.err);
+  const auto field =
+      json_of({"plan", small, "--epsilon", "4sigma", "--compare-filters", "--json"}).at("noise").at("field");
+  BOOST_TEST(field.at("filters").size() == 5u);
+  for (const auto& row : field.at("filters")) BOOST_TEST(row.at("samples_ratio").get<double>() > 0);
+  BOOST_TEST(field.at("rings").at("flats") == 10);
+  BOOST_TEST(field.at("rings").at("radius").get<double>() > 0);
+  check_refused({"plan", noisy(), "--epsilon", "1sigma", "--compare-filters", "--filter", "hann"},
+                "--compare-filters");
+  check_refused({"plan", small_scan(), "--epsilon", "3%", "--compare-filters"}, "--photons");
+}
+
+BOOST_AUTO_TEST_CASE(sigma_is_drawn_and_exported) {
+  built();
+  const std::string& file = one_sigma();
+  const auto of_slice = [&](const char* show) {
+    return json_of(
+        {"render", file, "--mode", "error", "--show", show, "-o", at("s.png"), "--force", "--json"});
+  };
+  const double sigma = of_slice("sigma").at("sigma").get<double>(),
+               share = of_slice("error-in-sigma").at("bound_in_sigma").get<double>();
+  const auto& noise = built().at("certificate").at("noise");
+  BOOST_TEST(sigma <= noise.at("sigma").at("largest").get<double>() * (1 + 1e-6));
+  BOOST_TEST(sigma >= noise.at("sigma").at("least").get<double>() * (1 - 1e-6));
+  BOOST_TEST(share <= noise.at("worst").at("buffer").get<double>() * (1 + 1e-6));
+  BOOST_TEST(share > 0);
+  for (const char* mode : {"dvr", "iso", "mip"})
+    for (const char* show : {"sigma", "error-in-sigma"})
+      BOOST_TEST(run({"render", file, "--mode", mode, "--show", show, "-o", at("r.png"), "--size", "200x160",
+                      "--force"})
+                     .code == 0);
+  BOOST_TEST(run({"export", file, "--sigma", "-o", at("v.npy")}).code == 0);
+  BOOST_TEST(fs::file_size(at("v-sigma.npy")) == fs::file_size(at("v.npy")));
+  const std::string clean = at("clean.vdvr");
+  BOOST_TEST_REQUIRE(run({"build", small_scan(), "--epsilon", "5%", "-o", clean, "--force"}).code == 0);
+  check_refused({"render", clean, "--mode", "error", "--show", "sigma", "-o", at("n.png")}, "noise");
+  check_refused({"export", clean, "--sigma", "-o", at("n.mha")}, "noise");
+  check_refused({"export", file, "--sigma", "-o", at("n.vtm")}, "--sigma");
+  check_refused({"render", file, "--mode", "slice", "--show", "sigma", "-o", at("n.png")}, "--show");
+  check_refused(
+      {"render", file, "--mode", "error", "--show", "sigma", "--projections", noisy(), "-o", at("n.png")},
+      "--projections");
+}
+
 BOOST_AUTO_TEST_CASE(run_goes_by_the_noise_where_nothing_is_asked) {
   const fs::path folder = at("result");
   const auto result = json_of({"run", noisy(), "-o", folder.string(), "--json"});
   BOOST_TEST(result.at("certificate").at("noise").at("tolerance_sigmas") == 1);
+  BOOST_TEST(fs::exists(folder / "noise.png"));
   const Ended clean = run({"run", small_scan(), "-o", at("clean"), "--json"});
   BOOST_TEST_REQUIRE(clean.code == 0, clean.err);
   const auto json = nlohmann::json::parse(clean.out, nullptr, false);

@@ -153,6 +153,18 @@ window = volume.render(size=(9, 9), mode="integral", azimuth=0, elevation=0,
 assert np.array_equal(window, greys)
 raises(vdvr.InputError, "box", lambda: volume.to_numpy(box=(90, 90, 90, 99, 99, 99)))
 raises(vdvr.InputError, "[..., 3]", lambda: volume([1.0, 2.0]))
+# Sigma: a build that is held to it, at points, in pictures.
+noisy = vdvr.build(scan, "4sigma", sigma_p=0.05)
+middle = noisy.sigma([[0.0, 0.0, 0.0]])
+assert middle.shape == (1,) and middle[0] > 0 and noisy.certificate["noise"]["tolerance_sigmas"] == 4
+of_pixels = noisy.render(size=(20, 16), mode="mip", show="sigma", values=True)
+in_sigma = noisy.render(size=(20, 16), mode="mip", show="error-in-sigma", values=True)
+assert np.nanmax(of_pixels) <= noisy.certificate["noise"]["sigma"]["largest"] * 1.000001 and np.nanmin(of_pixels) > 0
+seen = in_sigma[np.isfinite(in_sigma)]
+assert seen.size and seen.max() <= 4
+assert noisy.render(size=(160, 120), mode="error", show="sigma").shape == (120, 160, 3)
+raises(vdvr.InputError, "noise", lambda: volume.render(mode="error", show="sigma"))
+raises(vdvr.InputError, "none of", lambda: volume.render(show="sigmas"))
 volume.save("noise.vdvr", overwrite=True)
 raises(vdvr.InputError, "exists already", lambda: volume.save("noise.vdvr"))
 no_driver = subprocess.run([sys.executable, "-c", "import vdvr; vdvr.device()"], capture_output=True, text=True,

@@ -51,6 +51,8 @@ struct Case {
   double epsilon = 0.03;
   Against against = Against::range;
   std::optional<std::pair<double, double>> window;
+  /// A tolerance of its own for each brick, 1 to 8 epsilon, promised in sigma; drawn from this.
+  std::optional<std::uint64_t> sigma_seed;
   Scale scale;
   double low = 0, high = 0;  ///< of F over covered grid samples at scale 1, in double
 };
@@ -64,11 +66,12 @@ struct Inputs {
   PlanSettings settings;
   BuildOptions options;
   Tolerance tolerance;
+  std::optional<std::uint64_t> sigma_seed;
   bool data_exact = true;  ///< the scan's floats are those of scale 1 times a factor, to the bit
 };
 
 inline Inputs inputs_at(const Case& c, const Scale& s) {
-  Inputs in{c.scan, c.grid, c.field, c.rates, c.settings, c.options, {}, s.is_exact()};
+  Inputs in{c.scan, c.grid, c.field, c.rates, c.settings, c.options, {}, c.sigma_seed, s.is_exact()};
   ParallelGeometry& g = in.scan.geometry;
   g.pitch_u *= s.pitch_u;
   g.pitch_v *= s.pitch_v;
@@ -464,6 +467,8 @@ inline Case draw_case(std::uint64_t seed) {
     // A lattice of integers has steps of powers of two: at other factors only float32 can be compared.
     if (!exact && chance(random, 0.5)) c.options.storage = StorageChoice::f32;
   }
+  // Last, so that what is drawn before stays as it was.
+  if (chance(random, 0.25) && c.settings.comparison.closing != Closing::paper) c.sigma_seed = random();
   return c;
 }
 

@@ -7,9 +7,11 @@
 #include <cstdio>
 #include <set>
 
+#include "host/volume/bricks.hpp"
 #include "tests/support/hostile_case.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/noise_forecast.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -59,12 +61,37 @@ inline std::string text_of(const Vec3& p) {
   return "(" + text_of(p[0]) + ", " + text_of(p[1]) + ", " + text_of(p[2]) + ")";
 }
 
+/// Sigma of each brick, whatever the scan: 1 to 8 epsilon.
+inline BrickSigma drawn_sigma(const Plan& plan, std::uint64_t seed) {
+  Random random(seed);
+  BrickSigma sigma;
+  // What is asked of a brick lies a little below what is promised of it.
+  const double least = plan.epsilon_abs * (1 + 0x1p-16);
+  sigma.range = {least, 4 * least, 8 * least};
+  const Index3 n = Bricks(plan.grid, plan.layout.granularity).along();
+  for (std::int64_t b = 0; b < n[0] * n[1] * n[2]; ++b)
+    sigma.of_brick.push_back(static_cast<float>(least * (1 + 7 * unit(random))));
+  return sigma;
+}
+
+inline BuildResult built_of(Device& device, const Inputs& in, const Plan& plan) {
+  if (!in.sigma_seed) return build(device, in.scan, plan, in.options);
+  const BrickSigma sigma = drawn_sigma(plan, *in.sigma_seed);
+  BuildOptions options = in.options;
+  options.refinement = refinement_in_sigma(sigma, 1);
+  BuildResult result = build(device, in.scan, plan, options);
+  ScanNoise noise;
+  noise.model.source = "stated";
+  if (result.certificate.holds_buffer) note_noise(result.certificate, noise, sigma, 1.0);
+  return result;
+}
+
 inline Outcome attempt(Device& device, const Inputs& in) {
   Outcome out;
   const auto start = Clock::now();
   try {
     const Plan plan = make_plan(device, in.scan, in.grid, in.field, in.rates, in.tolerance, in.settings);
-    out.built = build(device, in.scan, plan, in.options);
+    out.built = built_of(device, in, plan);
     out.kind = "built";
   } catch (const ToleranceError& e) {
     out.kind = "tolerance";
@@ -117,9 +144,14 @@ inline void check_certificate(const BuildResult& result, Report& r) {
                                 ", epsilon " + text_of(c.epsilon_abs));
   if (c.holds_buffer && !(c.total_buffer <= c.epsilon_abs))
     r.fail("does not hold", "total " + text_of(c.total_buffer) + " above epsilon " + text_of(c.epsilon_abs));
+  if (c.noise && !(worst_in_sigma(c, c.budget.sampler.buffer.value) <= c.noise->tolerance_sigmas.value_or(0)))
+    r.fail("does not hold", "a brick's bound is above what is promised in sigma");
   try {
     const std::string json = to_json(c);
-    if (to_json(certificate_from_json(json)) != json) r.fail("json", "the certificate reads back otherwise");
+    Certificate read = certificate_from_json(json);
+    read.brick_totals = c.brick_totals;  // datasets of the file
+    read.brick_sigma = c.brick_sigma;
+    if (to_json(read) != json) r.fail("json", "the certificate reads back otherwise");
   } catch (const std::exception& e) {
     r.fail("not finite", e.what());
   }

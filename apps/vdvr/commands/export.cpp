@@ -24,6 +24,7 @@ void refuse_unused(const Arguments& args, ExportFormat format) {
   const bool vtm = format == ExportFormat::vtm;
   only("oversampling", !vtm, "uniform samples");
   only("blocks", vtm, "vtm");
+  only("sigma", !vtm, "uniform samples");
 }
 
 ExportOptions options_of(const Arguments& args, const CommonOptions& common, ExportFormat format) {
@@ -86,6 +87,9 @@ int export_command(Arguments& args) {
       .value("blocks", "N",
              std::string("vtm: at most about so many .vti files (default ") + default_blocks +
                  "); fewer hold more points")
+      .flag(
+          "sigma",
+          "also NAME-sigma beside it, of the same samples: what the scan's own noise leaves in F (estimated)")
       .flag("unverified", "export although content and certificate do not match");
   add_volume_output(
       args, "mha|nrrd|tiff|hdf5|npy|raw|ome-zarr|vtm",
@@ -98,15 +102,27 @@ int export_command(Arguments& args) {
   refuse_unused(args, format);
   const ExportOptions options = options_of(args, common, format);
   check_volume_output(output, format, common.force, {path});
+  if (args.has("sigma")) check_volume_output(sigma_path(output), format, common.force, {path});
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume", path.string()));
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args, args.has("unverified"));
+  if (args.has("sigma") && file.certificate.brick_sigma.empty())
+    throw InputError(fmt::format(
+        "{}: --sigma: the certificate does not know the scan's noise; build it with --photons or --sigma-p",
+        path.string()));
   const ExportResult result = export_volume(file, output, options, progress.callback());
+  Json json = result_json(output, options, result);
+  if (args.has("sigma")) {
+    export_sigma(file, sigma_path(output), result.grid, options, progress.callback());
+    json["sigma"] = sigma_path(output).string();
+  }
   progress.clear();
-  print_result(common, result_json(output, options, result),
-               [&] { print_export(output, options, result, file); });
+  print_result(common, json, [&] {
+    print_export(output, options, result, file);
+    if (args.has("sigma")) fmt::print("sigma          {}\n", sigma_path(output).string());
+  });
   return 0;
 }
 

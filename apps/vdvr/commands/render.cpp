@@ -32,9 +32,33 @@ void write_error_slice(const std::filesystem::path& output, OutputKind kind, con
   else write_png(output, slice.image);
 }
 
+int print_in_sigma(const CommonOptions& common, const std::filesystem::path& output, const ErrorSlice& slice,
+                   const Certificate& certificate, BrickQuantity quantity) {
+  const bool is_sigma = quantity == BrickQuantity::sigma;
+  const NoiseRecord& noise = *certificate.noise;
+  const Json json = {{"output", output.string()},
+                     {"mode", "error"},
+                     {is_sigma ? "sigma" : "bound_in_sigma", slice.max_error},
+                     {"median_sigma", noise.median},
+                     {"noise_source", noise.source},
+                     {"tolerance_sigmas", noise.tolerance_sigmas ? Json(*noise.tolerance_sigmas) : Json()},
+                     {"pixels", slice.pixels}};
+  print_result(common, json, [&] {
+    if (is_sigma)
+      fmt::print("{}: sigma of F is up to {:.6g} on {} pixels, by an estimate from {}\n", output.string(),
+                 slice.max_error, slice.pixels, noise.source);
+    else
+      fmt::print(
+          "{}: |V - F| is at most {:.4g} sigma on {} pixels, where covered; sigma is an estimate, from {}\n",
+          output.string(), slice.max_error, slice.pixels, noise.source);
+  });
+  return 0;
+}
+
 /// What the certificate alone says of a slice, but for a texture unit, which the device must tell.
 int render_bound(const CommonOptions& common, const RenderOptions& o, const std::filesystem::path& output,
-                 OutputKind kind, const Scene& scene, const ErrorSliceOptions& options) {
+                 OutputKind kind, const Scene& scene, const ErrorSliceOptions& options,
+                 BrickQuantity quantity) {
   const bool image3d = o.sampler == SamplerKind::image3d;
   const auto on_device = [&] {
     Device device = open_device(common);
@@ -42,8 +66,9 @@ int render_bound(const CommonOptions& common, const RenderOptions& o, const std:
     return certificate_on(device, scene.volume, *scene.certificate);
   };
   const Certificate certificate = image3d ? on_device() : *scene.certificate;
-  const ErrorSlice slice = bound_slice(scene.volume, certificate, image3d, options);
+  const ErrorSlice slice = bound_slice(scene.volume, certificate, image3d, options, quantity);
   write_error_slice(output, kind, slice);
+  if (quantity != BrickQuantity::bound) return print_in_sigma(common, output, slice, certificate, quantity);
   const double epsilon = certificate.epsilon_abs;
   const Json json = {{"output", output.string()},
                      {"mode", "error"},
@@ -76,7 +101,8 @@ int render_error(const Arguments& args, const CommonOptions& common, const Rende
   // Values have no frame: the slice alone has the size asked for.
   const bool framed = kind == OutputKind::picture && !args.has("plain");
   const ErrorSliceOptions options{o.slice_axis, o.slice_position.value_or(middle), o.width, o.height, framed};
-  if (!args.has("projections")) return render_bound(common, o, output, kind, scene, options);
+  if (!args.has("projections"))
+    return render_bound(common, o, output, kind, scene, options, brick_quantity(args));
   const auto projections = args.path("projections");
   const ProjectionSet scan = load_certified_scan(projections, args, *scene.certificate, progress.callback());
   check_projections(projections, scan, *scene.certificate);
@@ -286,6 +312,7 @@ int render_command(Arguments& args) {
   // The base samples alone are another field than the one certified.
   const bool certified = scene.verified && method == "vdvr" && !comparison && source.trusted();
   o.skip_empty = !args.has("no-skip");
+  source.show(brick_quantity(args));
 
   if (asks_certify(args) && !certifies) {
     const int code = certify_render(args, common, source, o, overlay, output, progress.callback());

@@ -49,8 +49,20 @@ auto timed(std::map<std::string, double>& seconds, const std::string& name, Step
 }
 
 std::vector<std::string> file_names() {
-  return {"volume.vdvr", "dvr.png",     "bound.png", "iso.png",     "slice-x.png",
-          "slice-y.png", "slice-z.png", "error.png", "report.html", "certificate.json"};
+  return {"volume.vdvr", "dvr.png",   "bound.png", "iso.png",     "slice-x.png",     "slice-y.png",
+          "slice-z.png", "error.png", "noise.png", "report.html", "certificate.json"};
+}
+
+/// Where the noise is known: the bounds in its units, on the error picture's slice.
+void draw_noise(const OutputFolder& folder, Outcome& out) {
+  const Certificate& c = out.built.certificate;
+  if (!c.noise) return;
+  const ErrorSlice slice =
+      bound_slice(out.built.volume, c, false, {2, c.worst_at[2], kPictureSide, kPictureSide},
+                  BrickQuantity::bound_in_sigma);
+  write_png(folder.file("noise.png"), slice.image);
+  out.files.emplace_back("noise.png",
+                         "how far samples can lie from F there, in sigma of the scan's own noise");
 }
 
 /// The error slice and its picture lie across z through the dense part: there the interpolation errs
@@ -124,6 +136,7 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   write_png(folder.file("error.png"), out.error.image);
   out.files.emplace_back(
       "error.png", fmt::format("|V - F| on the slice at z = {:.4g}", out.built.certificate.worst_at[2]));
+  draw_noise(folder, out);
 }
 
 std::string bytes_of(const std::filesystem::path& path) {

@@ -1,0 +1,95 @@
+// What interpolation errs by on average, in units of the scan's own noise: V against F reconstructed at
+// points between samples. An estimate from some ten thousand points, beside the largest error, which is
+// proved. Declared in vdvr/noise_forecast.hpp.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/system/casts.hpp"
+#include "vdvr/certified_region.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/noise_forecast.hpp"
+#include "vdvr/reconstruct.hpp"
+#include "vdvr/region_of_interest.hpp"
+
+namespace vdvr {
+namespace {
+
+// Along x and y, and along z, as far as samples of the volume are not further apart than the points.
+constexpr double most_across = 64, most_planes = 6;
+// Of fewer a mean says nothing.
+constexpr std::int64_t least_points = 100;
+
+// What of an axis is looked at, [low, high], and points on it: no whole number of samples apart, so that all
+// places between samples occur alike, by the golden section.
+struct PointsAlong {
+  double first = 0, step = 0;
+  std::int64_t count = 0;
+};
+PointsAlong points_along(double low, double high, double spacing, double most) {
+  const double apart = std::max(1.0, std::floor((high - low) / (most * spacing)));
+  PointsAlong p;
+  p.step = spacing * (apart + 1 - std::numbers::phi);
+  p.first = low + p.step / 3;
+  p.count = std::max<std::int64_t>(2, static_cast<std::int64_t>((high - p.first) / p.step) + 1);
+  return p;
+}
+
+bool in_box(const Grid& grid, const Vec3& point) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double along = point[a] - grid.origin[a];
+    if (!(along >= 0 && along <= static_cast<double>(grid.cells[a]) * grid.spacing[a])) return false;
+  }
+  return true;
+}
+
+Grid points_in(const Grid& grid, const Certificate& c) {
+  Grid points;
+  points.unit = grid.unit;
+  for (std::size_t a = 0; a < 3; ++a) {
+    double low = grid.origin[a], high = low + static_cast<double>(grid.cells[a]) * grid.spacing[a];
+    if (c.roi) {
+      low = std::max(low, (*c.roi)[a]);
+      high = std::min(high, (*c.roi)[a + 3]);
+    }
+    if (c.covered) {
+      low = std::max(low, a == 2 ? c.covered->z.first : -c.covered->radius);
+      high = std::min(high, a == 2 ? c.covered->z.second : c.covered->radius);
+    }
+    const PointsAlong p =
+        points_along(low, std::max(low, high), grid.spacing[a], a == 2 ? most_planes : most_across);
+    points.origin[a] = p.first;
+    points.spacing[a] = p.step;
+    points.cells[a] = p.count - 1;
+  }
+  return points;
+}
+
+}  // namespace
+
+std::optional<MeanError> mean_error(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
+                                    const Certificate& c, const Progress& progress) {
+  const Grid points = points_in(volume.grid, c);
+  const ReconstructOptions exact{c.field, 16, scan.cone ? Interpolation::linear : Interpolation::cubic};
+  const Volume field = reconstruct(device, scan, points, exact, progress);
+  const CertifiedRegion region(scan, c.field);
+  const Index3 n = points.samples(), bricks = volume.bricks();
+  MeanError mean;
+  for (std::int64_t i = 0; i < points.sample_count(); ++i) {
+    const Vec3 point = points.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]});
+    const auto truth = static_cast<double>(field.samples[at(i)]);
+    if (!in_box(volume.grid, point) || !region.contains(point) || !is_inside(c.roi, point)) continue;
+    if (c.window && !(truth >= c.window->first && truth <= c.window->second)) continue;
+    const Index3 brick = brick_at(volume, point);
+    const auto sigma =
+        static_cast<double>(c.brick_sigma[at((brick[2] * bricks[1] + brick[1]) * bricks[0] + brick[0])]);
+    const double error = static_cast<double>(sample_at(volume, point)) - truth;
+    mean.in_sigma += error * error / (sigma * sigma);
+    ++mean.points;
+  }
+  if (mean.points < least_points) return std::nullopt;
+  mean.in_sigma = std::sqrt(mean.in_sigma / static_cast<double>(mean.points));
+  return mean;
+}
+
+}  // namespace vdvr
