@@ -163,7 +163,6 @@ void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups,
   out.put(scan.fft_length);
   out.put(scan.view_max);
   out.put(scan.ramp_error);
-  out.put(static_cast<std::uint8_t>(scan.limited_angle));
   for (const double v :
        {sups.value, sups.second_u, sups.second_v, sups.sampled_second_u, sups.sampled_second_v})
     out.put(v);
@@ -186,7 +185,6 @@ void get_scan(ByteReader& in, FilteredScan& scan, FieldSups& sups, GoldSettings&
   scan.fft_length = in.get<std::int64_t>();
   scan.view_max = in.get_vector<double>();
   scan.ramp_error = in.get<double>();
-  scan.limited_angle = in.get<std::uint8_t>() != 0;
   for (double* v :
        {&sups.value, &sups.second_u, &sups.second_v, &sups.sampled_second_u, &sups.sampled_second_v})
     *v = in.get<double>();

@@ -132,7 +132,6 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
   out.geometry = used_geometry(scan, field, units);
   const ParallelGeometry& g = out.geometry;
   const ViewWeights weights = view_weights(g.theta_rad);
-  out.limited_angle = weights.wedges > 0;
 
   out.fft_length = fft::good_length(2 * g.columns - 1);
   const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method, precision);

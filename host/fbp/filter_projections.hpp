@@ -32,7 +32,6 @@ struct FilteredScan {
   std::vector<double> view_max;   ///< max |q| of each view's samples
   double ramp_error =
       0;  ///< sum over views of a bound on the error of any filtered sample (docs/error-bounds.md)
-  bool limited_angle = false;
 };
 
 /// What is certified is filtered in double precision and rounded once; fp32 is faster. Geometry and samples

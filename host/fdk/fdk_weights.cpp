@@ -50,7 +50,6 @@ FdkWeights::FdkWeights(const ConeGeometry& cone, std::int64_t columns, std::int6
   const ViewWeights weights =
       view_weights(angles, 2 * pi, redundancy_ == Redundancy::short_scan ? Arc::open : Arc::closed);
   require_directions(weights);
-  limited_angle_ = weights.wedges > 0;
   notes_ = weights.notes;
   // A turn sees every ray twice.
   for (std::size_t k = 0; k < view_.size(); ++k) view_[k] *= 0.5 * weights.weight[k];

@@ -33,9 +33,8 @@ class FdkWeights {
   /// The cosine of the angle between the ray through a pixel and the line from the source to the axis.
   [[nodiscard]] double cosine(std::size_t k, double column, double row) const;
 
-  /// Whether there are wedges that no source was in; of a short scan its opening is none.
-  [[nodiscard]] bool limited_angle() const { return limited_angle_; }
-  /// For the user: those, gaps in doubt, views that share their weight.
+  /// For the user: wedges that no source was in (of a short scan its opening is none), gaps in doubt, views
+  /// that share their weight.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:
@@ -51,7 +50,6 @@ class FdkWeights {
   std::vector<double> view_, after_first_;  // the latter: angle since the first view of a short scan
   double overlap_fan_ = 0;                  // of a displaced detector: the fan that all see on both sides
   bool displaced_up_ = false;               // it reaches farther towards high columns
-  bool limited_angle_ = false;
   std::vector<std::string> notes_;
 };
 

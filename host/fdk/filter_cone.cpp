@@ -88,7 +88,6 @@ ConeFrame::ConeFrame(const ProjectionSet& scan, const FieldOptions& field, const
   g.center += static_cast<double>(weights.pad_before());
   g.pitch_u = std::ldexp(g.pitch_u, -units.across);
   g.pitch_v = std::ldexp(g.pitch_v, -units.along);
-  filtered.limited_angle = weights.limited_angle();
   for (std::size_t k = 0; k < cone.views.size(); ++k) {
     ViewMatrix matrix = padded(cone.views[k], weights);
     // Vectors of z read rows that grow with z.

@@ -167,8 +167,6 @@ SourceArc source_arc(const ConeGeometry& cone) {
   arc.first_rad = angles[(widest + 1) % angles.size()];
   arc.largest_gap_rad = gaps[widest];
   arc.arc_rad = turn - arc.largest_gap_rad;
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2), gaps.end());
-  arc.median_gap_rad = gaps[gaps.size() / 2];
   return arc;
 }
 

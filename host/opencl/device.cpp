@@ -51,69 +51,63 @@ std::string lacking(std::uint64_t bytes, const std::string& what, std::uint64_t 
 
 }  // namespace
 
-void MemoryAccount::set_limits(std::uint64_t limit, std::uint64_t of_device) {
+void MemoryAccount::set_limits(std::uint64_t of_host, std::uint64_t of_device, bool shared) {
   const std::lock_guard guard(lock_);
-  limit_ = limit;
-  device_limit_ = std::min(limit, of_device);
+  host_.limit = of_host;
+  device_.limit = of_device;
+  shared_ = shared;
 }
 
-void MemoryAccount::add(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
+void MemoryAccount::Side::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept,
+                               const char* where) {
   if (bytes > room())
-    throw ResourceError(lacking(bytes, what, room(), limit_) +
+    throw ResourceError(lacking(bytes, what, room(), limit) + where +
                         "; raise `max_memory`, or choose a smaller `size`");
-  used_ += bytes;
-  peak_ = std::max(peak_, used_ + kept);
+  used += bytes;
+  peak = std::max(peak, used + kept);
 }
+
+MemoryAccount::Side& MemoryAccount::device_side() { return shared_ ? host_ : device_; }
+const MemoryAccount::Side& MemoryAccount::device_side() const { return shared_ ? host_ : device_; }
 
 void MemoryAccount::take(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   const std::lock_guard guard(lock_);
-  if (bytes > device_room() && bytes <= room())
-    throw ResourceError(lacking(bytes, what, device_room(), device_limit_) +
-                        " on the device; choose a smaller `size` or another `device`");
-  add(bytes, what, kept);
-  on_device_ += bytes;
+  device_side().take(bytes, what, kept, shared_ ? "" : " on the device");
 }
 
 void MemoryAccount::take_host(std::uint64_t bytes, const std::string& what, std::uint64_t kept) {
   const std::lock_guard guard(lock_);
-  add(bytes, what, kept);
+  host_.take(bytes, what, shared_ ? kept : 0, "");
 }
 
 void MemoryAccount::give(std::uint64_t bytes) noexcept {
   const std::lock_guard guard(lock_);
-  used_ -= bytes;
-  on_device_ -= bytes;
+  device_side().used -= bytes;
 }
 
 void MemoryAccount::give_host(std::uint64_t bytes) noexcept {
   const std::lock_guard guard(lock_);
-  used_ -= bytes;
-}
-
-std::uint64_t MemoryAccount::room() const { return limit_ > used_ ? limit_ - used_ : 0; }
-
-std::uint64_t MemoryAccount::device_room() const {
-  return std::min(room(), device_limit_ > on_device_ ? device_limit_ - on_device_ : 0);
+  host_.used -= bytes;
 }
 
 std::uint64_t MemoryAccount::peak() const {
   const std::lock_guard guard(lock_);
-  return peak_;
+  return shared_ ? host_.peak : host_.peak + device_.peak;
 }
 
 std::uint64_t MemoryAccount::left() const {
   const std::lock_guard guard(lock_);
-  return device_room();
+  return device_side().room();
 }
 
 std::uint64_t MemoryAccount::host_left() const {
   const std::lock_guard guard(lock_);
-  return room();
+  return host_.room();
 }
 
 std::uint64_t MemoryAccount::limit() const {
   const std::lock_guard guard(lock_);
-  return limit_;
+  return host_.limit;
 }
 
 namespace {
@@ -431,8 +425,8 @@ Device::Device(const std::string& selector, std::uint64_t max_memory_bytes) {
   const std::uint64_t device_memory = state_->info.global_memory;
   const bool shared = shares_host_memory(*state_);
   const std::uint64_t most = shared ? device_memory : io::physical_memory();
-  state_->memory.set_limits(max_memory_bytes == 0 ? most : std::min(max_memory_bytes, most),
-                            shared ? device_memory : device_memory / 10 * 9);
+  const std::uint64_t asked = max_memory_bytes == 0 ? UINT64_MAX : max_memory_bytes;
+  state_->memory.set_limits(std::min(asked, most), std::min(asked, device_memory / 10 * 9), shared);
 }
 
 Device::~Device() {

@@ -1,6 +1,7 @@
 #include "host/opencl/pace.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "host/opencl/state.hpp"
@@ -12,10 +13,16 @@ namespace {
 // Of a kernel that was not measured yet, the part that is: 64 of them as long as may be are no harm.
 constexpr std::uint64_t first_part = 64;
 
-double seconds_of(const cl::Event& event) {
-  const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
-             end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
-  return end > begin ? 1e-9 * static_cast<double>(end - begin) : 0;
+// As the device has it; where it tells nothing, since the launch was enqueued.
+double seconds_of(const Launched& launched) {
+  try {
+    const auto begin = launched.event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
+               end = launched.event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+    if (end > begin) return 1e-9 * static_cast<double>(end - begin);
+  } catch (const cl::Error&) {
+    // It is only slower to find out.
+  }
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - launched.at).count();
 }
 
 }  // namespace
@@ -95,7 +102,7 @@ void State::keep_pace(Launched latest, bool wait) {
   if (ended.event() == nullptr) return;
   // Outside the lock: another thread's launch need not wait for this one's.
   ended.event.wait();
-  ended.pace->learn(seconds_of(ended.event), ended.items);
+  ended.pace->learn(seconds_of(ended), ended.items);
 }
 
 Pace& State::pace_of(const std::string& kernel) {

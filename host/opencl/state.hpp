@@ -3,6 +3,7 @@
 // so that each launcher has its own.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -19,32 +20,39 @@
 
 namespace vdvr::opencl {
 
-/// Allocations of ours, counted together against --max-memory; those on the device also against its own
-/// memory, which only a device that computes in the host's shares with the others.
+/// Allocations of ours. A device that computes in the host's memory has one account with it, a card its own:
+/// each is held to
+/// --max-memory, the card's also to most of what it has.
 class MemoryAccount {
  public:
-  /// `limit`: of all together; `of_device`: of what is on the device.
-  void set_limits(std::uint64_t limit, std::uint64_t of_device);
-  /// Throws ResourceError naming `what` and the remedy when a limit would be passed.
+  /// `of_device`: not of a `shared` account.
+  void set_limits(std::uint64_t of_host, std::uint64_t of_device, bool shared);
+  /// On the device. Throws ResourceError naming `what` and the remedy when the limit would be passed.
   /// `kept`: bytes of the pool, for the peak.
   void take(std::uint64_t bytes, const std::string& what, std::uint64_t kept = 0);
   void take_host(std::uint64_t bytes, const std::string& what, std::uint64_t kept);
   void give(std::uint64_t bytes) noexcept;
   void give_host(std::uint64_t bytes) noexcept;
+  /// Of both together.
   [[nodiscard]] std::uint64_t peak() const;
   /// For allocations on the device.
   [[nodiscard]] std::uint64_t left() const;
   [[nodiscard]] std::uint64_t host_left() const;
-  /// Of all together.
+  /// The host's.
   [[nodiscard]] std::uint64_t limit() const;
 
  private:
-  [[nodiscard]] std::uint64_t room() const;
-  [[nodiscard]] std::uint64_t device_room() const;
-  void add(std::uint64_t bytes, const std::string& what, std::uint64_t kept);
+  struct Side {
+    std::uint64_t limit = UINT64_MAX, used = 0, peak = 0;
+    [[nodiscard]] std::uint64_t room() const { return limit > used ? limit - used : 0; }
+    void take(std::uint64_t bytes, const std::string& what, std::uint64_t kept, const char* where);
+  };
+  Side& device_side();
+  [[nodiscard]] const Side& device_side() const;
 
   mutable std::mutex lock_;
-  std::uint64_t limit_ = UINT64_MAX, device_limit_ = UINT64_MAX, used_ = 0, on_device_ = 0, peak_ = 0;
+  Side host_, device_;
+  bool shared_ = true;
 };
 
 /// Freed buffers kept for the next allocation of the same size: fresh pages cost more than the kernels that
@@ -72,6 +80,7 @@ struct Launched {
   Pace* pace = nullptr;
   std::uint64_t items = 0;
   double seconds = 0;  // that it will take, as far as is known
+  std::chrono::steady_clock::time_point at = std::chrono::steady_clock::now();
 };
 
 /// Shared by the Device and by what may outlive it.

@@ -260,9 +260,9 @@ std::string largest_text(BrickQuantity quantity, double end, double largest) {
     case BrickQuantity::bound:
       return fmt::format("|V − F| ≤ {} = {:.1f} % of epsilon", number(largest), 100 * largest / end);
     case BrickQuantity::sigma:
-      return fmt::format("Noise of the scan itself (estimated): sigma of F up to {}", number(largest));
+      return fmt::format("Noise of F (estimated): sigma ≤ {}", number(largest));
     case BrickQuantity::bound_in_sigma:
-      return fmt::format("|V − F| ≤ {} sigma of the scan's own noise (estimated)", number(largest));
+      return fmt::format("|V − F| ≤ {} sigma of F's noise (estimated)", number(largest));
   }
   return {};
 }
@@ -279,8 +279,12 @@ BrickValues brick_values(const MixedVolume& volume, const Certificate& c, bool i
         "`photons` "
         "or `sigma_p`");
   out.values = quantity == BrickQuantity::sigma ? c.brick_sigma : bounds_of(volume, c, image3d);
-  if (quantity == BrickQuantity::bound_in_sigma)
-    for (std::size_t b = 0; b < out.values.size(); ++b) out.values[b] /= c.brick_sigma[b];
+  for (std::size_t b = 0; b < out.values.size(); ++b) {
+    if (quantity == BrickQuantity::bound_in_sigma) out.values[b] /= c.brick_sigma[b];
+    // Of bricks that no view sees sigma is made up.
+    if (quantity == BrickQuantity::sigma && !c.brick_totals.empty() && c.brick_totals[b] < 0)
+      out.values[b] = std::numeric_limits<float>::infinity();
+  }
   out.end = quantity == BrickQuantity::bound ? c.epsilon_abs : static_cast<double>(largest_of(out.values));
   if (quantity == BrickQuantity::bound_in_sigma && c.noise->tolerance_sigmas)
     out.end = *c.noise->tolerance_sigmas;

@@ -72,11 +72,11 @@ VDVR_API ViewMatrix circular_view(const CircularView& view);
 /// The angles of the sources about the axis: where they begin after their largest gap, and how far they go.
 struct SourceArc {
   double first_rad = 0, arc_rad = 0;
-  double largest_gap_rad = 0, median_gap_rad = 0;
+  double largest_gap_rad = 0;
 };
 VDVR_API SourceArc source_arc(const ConeGeometry& cone);
 
-/// What the views themselves tell: a gap above 20 degrees and three median gaps leaves a short scan; of a
+/// What the views themselves tell: a wedge of more than 20 degrees that no source was in leaves a short scan; of a
 /// full turn a detector that reaches at least a tenth of its width farther on one side is displaced.
 VDVR_API Redundancy natural_redundancy(const ConeGeometry& cone, std::int64_t columns);
 

@@ -35,8 +35,9 @@ class VDVR_API Device {
   static std::vector<DeviceInfo> list();
 
   /// `selector`: "" (a GPU if there is one, else the first device), "cpu", "gpu", an index of list(), or part
-  /// of a name. `max_memory_bytes` limits our host and device allocations together; 0: no limit but the
-  /// device's. Throws DeviceError when nothing matches, listing what exists.
+  /// of a name. `max_memory_bytes` limits our host and device allocations together, of a card each of
+  /// both; 0: no limit but the device's, of a card 90 % of its memory. Throws DeviceError when nothing
+  /// matches, listing what exists.
   explicit Device(const std::string& selector = "", std::uint64_t max_memory_bytes = 0);
   ~Device();
   Device(Device&&) noexcept;
@@ -47,7 +48,7 @@ class VDVR_API Device {
   [[nodiscard]] const DeviceInfo& info() const;
   /// Bytes that may still be allocated under --max-memory and the device's own limit.
   [[nodiscard]] std::uint64_t memory_left() const;
-  /// The largest sum of our device allocations so far.
+  /// The largest sum of our allocations so far, host and device.
   [[nodiscard]] std::uint64_t peak_memory() const;
 
   opencl::State& state() { return *state_; }
