@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <utility>
 
 #include "vdvr/error.hpp"
 
@@ -167,9 +168,11 @@ void LinkedFiles::walk(Place& place, const std::string& path) const {
       return;
     }
     if (info.type == H5L_TYPE_HARD) {
-      place.object = Handle(H5Oopen(place.object.id(), step.c_str(), H5P_DEFAULT), H5Oclose);
+      Handle object(H5Oopen(place.object.id(), step.c_str(), H5P_DEFAULT), H5Oclose);
+      // Before the group is closed, which clears what HDF5 says.
+      if (!object) place.problem = fmt::format("{}: cannot be opened (HDF5: {})", shown, reason());
+      place.object = std::move(object);
       place.path = here;
-      if (!place.object) place.problem = fmt::format("{}: cannot be opened (HDF5: {})", shown, reason());
       continue;
     }
     const std::string value = value_of(place.object.id(), step, info.u.val_size);

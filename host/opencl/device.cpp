@@ -371,6 +371,7 @@ std::shared_ptr<opencl::State> opened(const FoundDevice& listed) {
                                     found.info.index, found.info.name, found.trouble));
     state->device = found.device;
     state->info = found.info;
+    if (state->info.is_cpu) state->longest_launch = 2;
     state->context = cl::Context(state->device);
     state->queue = cl::CommandQueue(state->context, state->device, CL_QUEUE_PROFILING_ENABLE);
     test = opencl::test_device(*state);

@@ -34,7 +34,7 @@ void Pace::learn(double seconds, std::uint64_t items) {
 }
 
 Cut cut_of(const std::array<std::uint64_t, 3>& groups, std::uint64_t items_per_group, const Pace& pace,
-           double longest) {
+           double longest, bool watched) {
   Cut cut;
   for (std::size_t a = 1; a < 3; ++a)
     if (groups[a] >= groups[cut.axis]) cut.axis = a;
@@ -43,7 +43,7 @@ Cut cut_of(const std::array<std::uint64_t, 3>& groups, std::uint64_t items_per_g
                      static_cast<double>(groups[2]),
                seconds = pace.seconds_per_item() * static_cast<double>(items_per_group) * all;
   cut.groups = along;
-  if (pace.seconds_per_item() == 0) cut.groups = std::max<std::uint64_t>(1, along / first_part);
+  if (pace.seconds_per_item() == 0 && watched) cut.groups = std::max<std::uint64_t>(1, along / first_part);
   else if (seconds > longest)
     cut.groups = std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(longest / seconds * static_cast<double>(along)));
@@ -59,7 +59,7 @@ void enqueue_in_pieces(State& state, const cl::Kernel& kernel, Pace& pace,
   std::size_t axis = 0;
   for (std::uint64_t done = 0, all = 1; done < all;) {
     throw_if_stopped();
-    const Cut cut = cut_of(groups, items_per_group, pace, state.longest_launch);
+    const Cut cut = cut_of(groups, items_per_group, pace, state.longest_launch, !state.info.is_cpu);
     if (done == 0) {
       axis = cut.axis;
       all = groups[axis];

@@ -35,9 +35,9 @@ struct Cut {
 };
 
 /// The longest axis, the slowest of equals. As many groups as take `longest` seconds at the pace; of a kernel
-/// that nobody measured a small part.
+/// that nobody measured all, or where a watchdog may wait a small part.
 Cut cut_of(const std::array<std::uint64_t, 3>& groups, std::uint64_t items_per_group, const Pace& pace,
-           double longest);
+           double longest, bool watched);
 
 /// Enqueues all of `global`, a multiple of `local`, in pieces. Throws cl::Error, and Stopped between two of
 /// them.

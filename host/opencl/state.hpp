@@ -98,7 +98,8 @@ struct State : std::enable_shared_from_this<State> {
   /// Counts memory of the host, for which the pool makes room. Throws ResourceError. memory.give_host()
   /// returns it.
   void take_host(std::uint64_t bytes, const std::string& what);
-  /// Seconds. Set before kernels are launched.
+  /// Seconds. Set before kernels are launched. A CPU has no watchdog, and PoCL compiles a kernel once more
+  /// for a place other than the first to begin at: there it is more.
   double longest_launch = 0.25;
   /// Waits for earlier launches where many are unfinished: on a CPU all but two. With `wait` for all.
   void keep_pace(Launched latest, bool wait);

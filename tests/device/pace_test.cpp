@@ -20,17 +20,18 @@ using opencl::Pace;
 
 BOOST_AUTO_TEST_CASE(an_unknown_kernel_shows_a_small_part_first) {
   const Pace pace;
-  const Cut cut = opencl::cut_of({3, 640, 640}, 32, pace, 0.25);
+  const Cut cut = opencl::cut_of({3, 640, 640}, 32, pace, 0.25, true);
   BOOST_TEST(cut.axis == 2u);
   BOOST_TEST(cut.groups == 10u);
-  BOOST_TEST(opencl::cut_of({5, 1, 1}, 32, pace, 0.25).groups == 1u);
+  BOOST_TEST(opencl::cut_of({3, 640, 640}, 32, pace, 0.25, false).groups == 640u);
+  BOOST_TEST(opencl::cut_of({5, 1, 1}, 32, pace, 0.25, true).groups == 1u);
 }
 
 BOOST_AUTO_TEST_CASE(pieces_take_no_longer_than_asked) {
   Pace pace;
   pace.learn(1e-3, 1000);  // a microsecond a work-item
   for (const std::uint64_t side : {1, 7, 100, 1000}) {
-    const Cut cut = opencl::cut_of({side, 3, 2}, 64, pace, 0.01);
+    const Cut cut = opencl::cut_of({side, 3, 2}, 64, pace, 0.01, true);
     const double each = 1e-6 * 64 * 3 * 2;
     if (side >= 3) BOOST_TEST(cut.axis == 0u);
     const double piece = cut.axis == 0 ? each * static_cast<double>(cut.groups) : 0;

@@ -442,7 +442,12 @@ BOOST_AUTO_TEST_CASE(hdf5_datasets_that_are_no_volume_are_refused) {
   BOOST_REQUIRE(at != std::string::npos);
   bytes[at + 2] = 2;
   static_cast<void>(folder.file("v.h5", bytes));
-  refused("/volume", "largest extent");
+  // HDF5 1.14 looks for that itself.
+  const std::string longer = message_of(path.string() + ":/volume");
+  BOOST_TEST((longer.find("largest extent") != std::string::npos ||
+              longer.find("cannot be opened (HDF5: ") != std::string::npos),
+             longer);
+  BOOST_TEST(longer.find("gives no reason") == std::string::npos, longer);
 
   // Numbers longer than any machine's, for which HDF5 would copy far beyond a short chunk.
   const hid_t wide = H5Tcopy(H5T_STD_U8LE);
