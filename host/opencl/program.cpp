@@ -1,4 +1,5 @@
-// Builds embedded kernel programs, once per set of defines.
+// Builds embedded kernel programs, once per set of defines. And the names of OpenCL's codes, for error
+// messages.
 //
 // Flags: -cl-std=CL1.2, and no relaxed arithmetic: what a certificate covers must round as the bound assumes.
 // For the same reason no product is joined with a sum unless a kernel says fma. Warnings are errors in tests,
@@ -83,6 +84,55 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
   }
   if (state.on_program) state.on_program(name, defines);
   return state.programs_.emplace(cache_key, std::move(built)).first->second;
+}
+
+std::string code_name(int code) {
+#define VDVR_CODE(name) \
+  case name:            \
+    return #name " (" + std::to_string(code) + ")"
+  switch (code) {
+    VDVR_CODE(CL_SUCCESS);
+    VDVR_CODE(CL_DEVICE_NOT_FOUND);
+    VDVR_CODE(CL_DEVICE_NOT_AVAILABLE);
+    VDVR_CODE(CL_COMPILER_NOT_AVAILABLE);
+    VDVR_CODE(CL_MEM_OBJECT_ALLOCATION_FAILURE);
+    VDVR_CODE(CL_OUT_OF_RESOURCES);
+    VDVR_CODE(CL_OUT_OF_HOST_MEMORY);
+    VDVR_CODE(CL_IMAGE_FORMAT_NOT_SUPPORTED);
+    VDVR_CODE(CL_BUILD_PROGRAM_FAILURE);
+    VDVR_CODE(CL_MAP_FAILURE);
+    VDVR_CODE(CL_INVALID_VALUE);
+    VDVR_CODE(CL_INVALID_DEVICE);
+    VDVR_CODE(CL_INVALID_CONTEXT);
+    VDVR_CODE(CL_INVALID_COMMAND_QUEUE);
+    VDVR_CODE(CL_INVALID_MEM_OBJECT);
+    VDVR_CODE(CL_INVALID_IMAGE_FORMAT_DESCRIPTOR);
+    VDVR_CODE(CL_INVALID_IMAGE_SIZE);
+    VDVR_CODE(CL_INVALID_SAMPLER);
+    VDVR_CODE(CL_INVALID_BINARY);
+    VDVR_CODE(CL_INVALID_BUILD_OPTIONS);
+    VDVR_CODE(CL_INVALID_PROGRAM);
+    VDVR_CODE(CL_INVALID_PROGRAM_EXECUTABLE);
+    VDVR_CODE(CL_INVALID_KERNEL_NAME);
+    VDVR_CODE(CL_INVALID_KERNEL);
+    VDVR_CODE(CL_INVALID_ARG_INDEX);
+    VDVR_CODE(CL_INVALID_ARG_VALUE);
+    VDVR_CODE(CL_INVALID_ARG_SIZE);
+    VDVR_CODE(CL_INVALID_KERNEL_ARGS);
+    VDVR_CODE(CL_INVALID_WORK_DIMENSION);
+    VDVR_CODE(CL_INVALID_WORK_GROUP_SIZE);
+    VDVR_CODE(CL_INVALID_WORK_ITEM_SIZE);
+    VDVR_CODE(CL_INVALID_GLOBAL_OFFSET);
+    VDVR_CODE(CL_INVALID_EVENT);
+    VDVR_CODE(CL_INVALID_OPERATION);
+    VDVR_CODE(CL_INVALID_BUFFER_SIZE);
+    VDVR_CODE(CL_INVALID_GLOBAL_WORK_SIZE);
+    case -1001:
+      return "CL_PLATFORM_NOT_FOUND_KHR (-1001)";
+    default:
+      return "OpenCL code " + std::to_string(code);
+  }
+#undef VDVR_CODE
 }
 
 }  // namespace vdvr::opencl

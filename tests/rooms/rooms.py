@@ -20,7 +20,7 @@ MOST_FILES = 25
 KERNEL_HEADERS = {"shared", "device"}
 # Headers of declarations whose definitions are several files, or generated.
 SEVERAL_SOURCES = {
-    "host/opencl/state.hpp": ["device.cpp", "program.cpp", "codes.cpp"],
+    "host/opencl/state.hpp": ["device.cpp", "program.cpp", "pace.cpp"],
     "host/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
     "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
     "host/opencl/device_end.hpp": ["device.cpp"],
