@@ -76,8 +76,8 @@ struct SourceArc {
 };
 VDVR_API SourceArc source_arc(const ConeGeometry& cone);
 
-/// What the views themselves tell: a wedge of more than 20 degrees that no source was in leaves a short scan; of a
-/// full turn a detector that reaches at least a tenth of its width farther on one side is displaced.
+/// What the views themselves tell: a wedge of more than 20 degrees that no source was in leaves a short scan;
+/// of a full turn a detector that reaches at least a tenth of its width farther on one side is displaced.
 VDVR_API Redundancy natural_redundancy(const ConeGeometry& cone, std::int64_t columns);
 
 /// The view whose column `center` is where the isocentre is seen.
