@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
   const bool is_short = argc > 1 && std::string_view(argv[1]) == "--short";
   const Change none;
   std::vector<Case> cases{{"three ellipses", smooth_object(), none, none, 0.9, 1.1},
-                          {"600 discs of radius 1 to 5", grains(), none, none, 0.75, 1.1}};
+                          {"600 discs of radius 1 to 5", grains(), none, none, 0.75, 1.15}};
   if (!is_short) {
     cases.push_back({"neighbours share .1", smooth_object(), none, [](ProjectionSet& s) { blur(s, 0.1F); }});
     cases.push_back({"neighbours share .2", smooth_object(), none, [](ProjectionSet& s) { blur(s, 0.2F); }});
@@ -149,7 +149,8 @@ int main(int argc, char** argv) {
     for (const int views : {90, 360})
       for (const double photons : {500.0, 5000.0, 500000.0})
         if (!is_short || (views == 360 && photons == 5000)) holds = row(c, views, photons) && holds;
+  const Case few{"three ellipses", smooth_object(), none, none};  // nothing is promised of these
   if (!is_short)
-    for (const double photons : {1.0, 5.0, 10.0, 20.0, 50.0}) row(cases[0], 360, photons);
+    for (const double photons : {1.0, 5.0, 10.0, 20.0, 50.0}) row(few, 360, photons);
   return holds ? 0 : 1;
 }
