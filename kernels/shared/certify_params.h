@@ -47,8 +47,8 @@ typedef struct {
   float colour_lo[3], colour_hi[3];  // of all that may show, light included
   int first_row, rows;               // of the picture, in this launch
   int first_column, columns;
-  int capacity;                      // pieces that the list of a packet holds
-  int items_x, items;                // work-items of the launch: along x, and in all
+  int capacity;        // pieces that the list of a packet holds
+  int items_x, items;  // work-items of the launch: along x, and in all
 } VdvrCertify;
 
 #endif

@@ -30,13 +30,14 @@ BOOST_AUTO_TEST_CASE(an_unknown_kernel_shows_a_small_part_first) {
 BOOST_AUTO_TEST_CASE(pieces_take_no_longer_than_asked) {
   Pace pace;
   pace.learn(1e-3, 1000);  // a microsecond a work-item
+  constexpr double longest = 0.01;
   for (const std::uint64_t side : {1, 7, 100, 1000}) {
-    const Cut cut = opencl::cut_of({side, 3, 2}, 64, pace, 0.01, true);
+    const Cut cut = opencl::cut_of({side, 3, 2}, 64, pace, longest, true);
     const double each = 1e-6 * 64 * 3 * 2;
     if (side >= 3) BOOST_TEST(cut.axis == 0u);
     const double piece = cut.axis == 0 ? each * static_cast<double>(cut.groups) : 0;
-    BOOST_TEST((piece <= 0.01 || cut.groups == 1));
-    if (each * static_cast<double>(side) <= 0.01) BOOST_TEST(cut.groups >= (cut.axis == 0 ? side : 3));
+    BOOST_TEST((piece <= longest || cut.groups == 1));
+    if (each * static_cast<double>(side) <= longest) BOOST_TEST(cut.groups >= (cut.axis == 0 ? side : 3));
   }
 }
 
