@@ -66,9 +66,9 @@ struct UpsampledSlab {
 std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geometry,
                          const UpsampledColumns& columns, std::int64_t rows);
 
-/// Slabs straight from the scan, where columns and rows are the detector's own and the device filters by
-/// products: the filtered scan stays on the device. The values are those of filter_projections in fp32 and
-/// Upsampler.
+/// Slabs straight from the scan, where columns and rows are the detector's own and the device does the
+/// filtering: the filtered scan stays there. The values are those of filter_projections in fp32 and Upsampler;
+/// of products to the bit, of transforms within the error that these are charged for.
 class DirectFilter {
  public:
   /// Keeps references to the state and the scan. Samples are in `units`.
@@ -76,8 +76,7 @@ class DirectFilter {
                const Units& units = {});
   DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
   DirectFilter& operator=(const DirectFilter&) = delete;
-  /// Nothing where the slab needs upsampling. Cost: views * rows * columns^2 multiply-adds, or half of them.
-  /// Throws InputError for a view that is not finite.
+  /// Nothing where the slab needs upsampling. Cost: RowFilter's. Throws InputError for a view that is not finite.
   std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
                                           const Progress& progress);
 

@@ -48,6 +48,11 @@ cl_int to_int(std::int64_t n) {
   return static_cast<cl_int>(n);
 }
 
+// Columns on the device are cut into chunks of 16 samples.
+std::int64_t to_chunks(std::int64_t rows) {
+  return static_cast<std::int64_t>(opencl::round_up(count(rows), 16));
+}
+
 // Views filtered at once: bounded memory, and one FFT plan for all chunks.
 std::int64_t views_per_chunk(const ParallelGeometry& g, std::int64_t bytes_per_view) {
   return std::clamp<std::int64_t>((std::int64_t{64} << 20) / std::max<std::int64_t>(bytes_per_view, 1), 1,
@@ -110,46 +115,54 @@ class FourierFilter : public RowFilter {
 
   void operator()(std::span<const float> rows, std::span<const double> weights, std::span<float> out,
                   const Progress& progress) override {
-    constexpr auto precision = is_double<Real> ? Precision::fp64 : Precision::fp32;
-    const opencl::Defines defines{{"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}};
-    const auto bytes = static_cast<std::int64_t>(3 * sizeof(Real));
-    const std::int64_t bins = length_ / 2 + 1, chunk = views_per_chunk(g_, g_.rows * length_ * bytes),
-                       row_count = chunk * g_.rows;
-    opencl::DeviceArray<float> chunk_rows(state_, count(row_count * g_.columns), "projection chunk");
-    opencl::DeviceArray<Real> padded(state_, count(row_count * length_), "padded projections");
-    opencl::DeviceArray<Real> transformed(state_, count(row_count * bins * 2), "projection spectra");
-    const opencl::DeviceArray<Real> filter(state_, std::span<const Real>(spectrum_), "ramp filter");
-    opencl::DeviceArray<Real> chunk_weights(state_, count(chunk), "view weights");
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> pad(state_, "fbp/filter_rows_fft",
-                                                                       "pad_rows", defines);
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int> multiply(state_, "fbp/filter_rows_fft",
-                                                                    "multiply_spectrum", defines);
+    Chunk chunk(*this, g_.rows);
     opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> crop(
-        state_, "fbp/filter_rows_fft", "crop_transposed", defines);
-    for (std::int64_t first = 0; first < g_.views(); first += chunk) {
-      report(progress, "filter", static_cast<double>(first) / static_cast<double>(g_.views()));
-      const std::int64_t views = std::min(chunk, g_.views() - first);
-      const std::size_t at = static_cast<std::size_t>(first * g_.rows * g_.columns),
-                        n = static_cast<std::size_t>(views * g_.rows * g_.columns);
-      chunk_rows.write(rows.subspan(at, n));
-      const std::vector<Real> rounded(weights.begin() + first, weights.begin() + first + views);
-      chunk_weights.write(rounded);
-      pad({{count(length_), count(row_count), 1}, {64, 1, 1}}, padded.buffer(), chunk_rows.buffer(),
-          to_int(g_.columns), to_int(length_), to_int(row_count));
-      fft::forward_real(state_, precision, length_, row_count, padded.buffer(), transformed.buffer());
-      multiply({{count(bins), count(row_count), 1}, {64, 1, 1}}, transformed.buffer(), filter.buffer(),
-               to_int(bins), to_int(row_count));
-      fft::inverse_real(state_, precision, length_, row_count, transformed.buffer(), padded.buffer());
-      crop({{count(g_.rows), count(g_.columns), count(views)}, {1, 64, 1}}, chunk_rows.buffer(),
-           padded.buffer(), chunk_weights.buffer(), to_int(g_.columns), to_int(g_.rows), to_int(length_),
-           to_int(views));
-      chunk_rows.read(out.subspan(at, n));
+        state_, "fbp/filter_rows_fft", "crop_transposed", defines());
+    const std::size_t per_view = static_cast<std::size_t>(g_.rows * g_.columns);
+    while (chunk.next(weights, progress)) {
+      const std::size_t at = static_cast<std::size_t>(chunk.first) * per_view,
+                        n = static_cast<std::size_t>(chunk.views) * per_view;
+      chunk.rows.write(rows.subspan(at, n));
+      chunk.filter();
+      crop({{count(g_.rows), count(g_.columns), count(chunk.views)}, {1, 64, 1}}, chunk.rows.buffer(),
+           chunk.padded.buffer(), chunk.weights.buffer(), to_int(g_.columns), to_int(g_.rows),
+           to_int(length_), to_int(chunk.views));
+      chunk.rows.read(out.subspan(at, n));
     }
   }
 
-  bool to_device(std::span<const float>, std::span<const double>, const DeviceColumns&,
-                 const Progress&) override {
-    return false;
+  bool to_device(std::span<const float> rows, std::span<const double> weights, const DeviceColumns& target,
+                 const Progress& progress) override {
+    const auto height = static_cast<std::int64_t>(target.rows.size());
+    Chunk chunk(*this, height);
+    opencl::DeviceArray<cl_int> broken(state_, count(chunk.most_views), "views that are not finite");
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, cl_int, VdvrFilteredRows> crop(
+        state_, "fbp/filter_rows_fft", "crop_to_chunks", defines());
+    const std::int64_t z_padded = to_chunks(height);
+    while (chunk.next(weights, progress)) {
+      chunk.rows.write_mapped([&](std::span<float> mapped) {
+        parallel_for(chunk.views, {}, "", [&](std::int64_t k) {
+          gather(rows, chunk.first + k, target.rows, mapped.data() + k * height * g_.columns);
+        });
+      });
+      chunk.filter();
+      broken.fill(0);
+      const VdvrFilteredRows shape{.out = {count(chunk.first * target.count * 16), count(target.count * 16),
+                                           count(g_.views() * target.count * 16)},
+                                   .columns = to_int(g_.columns),
+                                   .z_padded = to_int(z_padded),
+                                   .views = to_int(chunk.views),
+                                   .offset = 0,
+                                   .first_column = to_int(target.first),
+                                   .out_columns = to_int(target.count)};
+      crop({{count(z_padded), count(target.count), count(chunk.views)}, {16, 4, 1}}, target.values->buffer(),
+           broken.buffer(), chunk.padded.buffer(), chunk.weights.buffer(), to_int(height), to_int(length_),
+           shape);
+      const std::vector<cl_int> found = broken.to_host();
+      for (std::int64_t k = 0; k < chunk.views; ++k)
+        if (found[static_cast<std::size_t>(k)] != 0) throw not_finite(chunk.first + k);
+    }
+    return true;
   }
 
   [[nodiscard]] double error(double weight, double row_norm, double largest) const override {
@@ -158,6 +171,62 @@ class FourierFilter : public RowFilter {
   }
 
  private:
+  static opencl::Defines defines() { return {{"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}}; }
+
+  // Some views of so many rows each, and their transforms.
+  struct Chunk {
+    Chunk(const FourierFilter& of, std::int64_t rows_of_view)
+        : f(of),
+          height(rows_of_view),
+          bins(of.length_ / 2 + 1),
+          most_views(views_per_chunk(of.g_, height * of.length_ * std::int64_t{3 * sizeof(Real)})),
+          rows(of.state_, count(most_views * height * of.g_.columns), "projection chunk"),
+          padded(of.state_, count(most_views * height * of.length_), "padded projections"),
+          transformed(of.state_, count(most_views * height * bins * 2), "projection spectra"),
+          spectrum(of.state_, std::span<const Real>(of.spectrum_), "ramp filter"),
+          weights(of.state_, count(most_views), "view weights"),
+          pad(of.state_, "fbp/filter_rows_fft", "pad_rows", defines()),
+          multiply(of.state_, "fbp/filter_rows_fft", "multiply_spectrum", defines()) {}
+
+    // On to the next views; false after the last.
+    bool next(std::span<const double> all_weights, const Progress& progress) {
+      first += views;
+      views = std::min(most_views, f.g_.views() - first);
+      if (views == 0) return false;
+      report(progress, "filter", static_cast<double>(first) / static_cast<double>(f.g_.views()));
+      const std::vector<Real> rounded(all_weights.begin() + first, all_weights.begin() + first + views);
+      weights.write(rounded);
+      return true;
+    }
+    // From `rows` to `padded`: all of a chunk, also where fewer views are left, for a plan is made once.
+    void filter() {
+      constexpr auto precision = is_double<Real> ? Precision::fp64 : Precision::fp32;
+      const std::int64_t n = most_views * height;
+      pad({{count(f.length_), count(n), 1}, {64, 1, 1}}, padded.buffer(), rows.buffer(), to_int(f.g_.columns),
+          to_int(f.length_), to_int(n));
+      fft::forward_real(f.state_, precision, f.length_, n, padded.buffer(), transformed.buffer());
+      multiply({{count(bins), count(n), 1}, {64, 1, 1}}, transformed.buffer(), spectrum.buffer(),
+               to_int(bins), to_int(n));
+      fft::inverse_real(f.state_, precision, f.length_, n, transformed.buffer(), padded.buffer());
+    }
+
+    const FourierFilter& f;
+    std::int64_t height, bins, most_views, first = 0, views = 0;
+    opencl::DeviceArray<float> rows;
+    opencl::DeviceArray<Real> padded, transformed, spectrum, weights;
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> pad;
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int> multiply;
+  };
+
+  // [view][v][u] -> [z][u] of the rows wanted.
+  void gather(std::span<const float> scan, std::int64_t view, std::span<const std::int64_t> wanted,
+              float* target) const {
+    for (const std::int64_t v : wanted) {
+      std::copy_n(scan.data() + (view * g_.rows + v) * g_.columns, g_.columns, target);
+      target += g_.columns;
+    }
+  }
+
   opencl::State& state_;
   const ParallelGeometry& g_;
   std::int64_t length_;
@@ -262,7 +331,7 @@ class ProductFilter : public RowFilter {
                   const Progress& progress) override {
     std::vector<std::int64_t> all(static_cast<std::size_t>(g_.rows));
     std::iota(all.begin(), all.end(), 0);
-    Chunk chunk(state_, g_, padded(all));
+    Chunk chunk(state_, g_, to_chunks(g_.rows));
     const std::int64_t view_size = chunk.view_size;
     opencl::DeviceArray<float> product(state_, count(chunk.most_views * view_size), "filtered chunk");
     const std::size_t per_view = static_cast<std::size_t>(g_.rows) * columns_;
@@ -280,7 +349,7 @@ class ProductFilter : public RowFilter {
 
   bool to_device(std::span<const float> rows, std::span<const double> weights, const DeviceColumns& target,
                  const Progress& progress) override {
-    Chunk chunk(state_, g_, padded(target.rows));
+    Chunk chunk(state_, g_, to_chunks(static_cast<std::int64_t>(target.rows.size())));
     while (next(chunk, rows, weights, target.rows, progress)) {
       launch(chunk, *target.values, target.first, target.count,
              {count(chunk.first * target.count * 16), count(target.count * 16),
@@ -318,10 +387,6 @@ class ProductFilter : public RowFilter {
     opencl::DeviceArray<Real> weights;
     opencl::DeviceArray<cl_int> broken;
   };
-
-  static std::int64_t padded(std::span<const std::int64_t> rows) {
-    return static_cast<std::int64_t>(opencl::round_up(rows.size(), 16));
-  }
 
   // Puts the next views' rows on the device; false after the last.
   bool next(Chunk& chunk, std::span<const float> scan, std::span<const double> weights,
@@ -408,6 +473,10 @@ bool has_double(const opencl::State& state) {
 
 }  // namespace
 
+bool has_transform(const DeviceInfo& device, std::int64_t columns, Precision precision) {
+  return device.is_cpu || fft::good_length(2 * columns - 1) <= fft::longest_in_one_kernel(precision);
+}
+
 InputError not_finite(std::int64_t view) {
   return InputError(fmt::format(
       "view {} of the scan is not finite after filtering in fp32; check or scale its line integrals", view));
@@ -418,8 +487,10 @@ std::unique_ptr<RowFilter> make_row_filter(opencl::State& state, const ParallelG
                                            Precision precision) {
   if (precision == Precision::fp64 && !has_double(state)) method = FilterMethod::host;
   if (method == FilterMethod::automatic)
-    method = geometry.columns <= column_tuning(state.info).product_columns ? FilterMethod::product
-                                                                           : FilterMethod::fourier;
+    method = geometry.columns <= column_tuning(state.info).product_columns ||
+                     !has_transform(state.info, geometry.columns, precision)
+                 ? FilterMethod::product
+                 : FilterMethod::fourier;
   if (method == FilterMethod::host) return std::make_unique<HostFilter>(geometry, kernel);
   const auto made = [&]<class Real>(Real) -> std::unique_ptr<RowFilter> {
     if (method == FilterMethod::product)

@@ -49,8 +49,11 @@ class RowFilter {
 /// What a view is refused with whose line integrals overflow fp32.
 InputError not_finite(std::int64_t view);
 
-/// `kernel`: g[0 .. columns - 1] of an even kernel. `automatic` takes what the device's tuning says, and the
-/// host where the device lacks the precision.
+/// Whether the device can be given FilterMethod::fourier: GPUs up to what clFFT makes one kernel of.
+bool has_transform(const DeviceInfo& device, std::int64_t columns, Precision precision);
+
+/// `kernel`: g[0 .. columns - 1] of an even kernel. `automatic` takes what the device's tuning says, products
+/// where it has no transform, and the host where the device lacks the precision.
 std::unique_ptr<RowFilter> make_row_filter(opencl::State& state, const ParallelGeometry& geometry,
                                            const std::vector<double>& kernel, FilterMethod method,
                                            Precision precision);

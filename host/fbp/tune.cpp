@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "host/fbp/back_project.hpp"
+#include "host/fbp/filter_rows.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/opencl/kernel.hpp"
 #include "vdvr/error.hpp"
@@ -163,6 +164,7 @@ TuneResult tune(Device& device, std::int64_t size, std::int64_t views, int repet
   std::stable_sort(result.candidates.begin(), result.candidates.end(),
                    [](const TuneCandidate& a, const TuneCandidate& b) { return a.gups > b.gups; });
   for (const std::int64_t columns : {256, 512, 1024, 2048, 4096}) {
+    if (!has_transform(device.info(), columns, Precision::fp64)) break;
     result.filters.push_back(time_filter(device, columns, size * size * views / 4, repetitions));
     if (result.filters.back().product_seconds < result.filters.back().fourier_seconds)
       result.product_columns = columns;

@@ -14,6 +14,12 @@ std::int64_t good_length(std::int64_t n);
 
 enum class Precision { fp32, fp64 };
 
+/// The longest rows that one kernel of clFFT transforms. Of longer ones it makes several, which assign const
+/// pointers to others: NVIDIA's compiler refuses them, as OpenCL C does; PoCL's does not.
+constexpr std::int64_t longest_in_one_kernel(Precision precision) {
+  return precision == Precision::fp64 ? 2048 : 4096;
+}
+
 /// Real to Hermitian along contiguous rows: T in[batch][length] -> T2 out[batch][length/2 + 1], T float or
 /// double. Enqueues only.
 void forward_real(opencl::State& state, Precision precision, std::int64_t length, std::int64_t batch,

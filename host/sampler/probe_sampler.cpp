@@ -162,36 +162,70 @@ std::pair<double, double> trilinear(const std::vector<double>& tile, const Probe
   return {value, difference};
 }
 
-// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude, or to
-// the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
-// weights err even where all samples are equal.
-double measure_constants(opencl::State& state, double delta, SampleType type) {
+// What the unit made of tiles whose trilinear value is known.
+struct Reading {
+  double magnitude;                       // the tile's largest, or the whole scale of a normalised format
+  bool constant;                          // of one value
+  std::vector<double> error, difference;  // of each point; the cell's differences are summed over the axes
+};
+
+// Constant, affine and random tiles. Units that round products of weights err even where all samples are
+// equal.
+std::vector<Reading> read_tiles(opencl::State& state, SampleType type) {
   std::mt19937 random(7);
   const bool normalised = type != SampleType::f32;
   std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
   // Normalised formats hold 0 to 1 only.
   const double offset = normalised ? 0 : 100, slope = normalised ? 0.01 : 1;
-  const std::vector<std::vector<float>> tiles{
-      cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; }),
-      cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; }),
-      cube([&](double x, double y, double z) {
-        return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
-      }),
-      cube([&](double, double, double) { return uniform(random); })};
+  const std::vector<std::pair<bool, std::vector<float>>> tiles{
+      {true, cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; })},
+      {true, cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; })},
+      {false, cube([&](double x, double y, double z) {
+         return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
+       })},
+      {false, cube([&](double, double, double) { return uniform(random); })}};
   const auto points = scattered_points();
-  double rho = 0;
-  for (const auto& values : tiles) {
+  std::vector<Reading> all;
+  for (const auto& [constant, values] : tiles) {
     const Tile tile = make_tile(state, values, type);
     const auto read = read_points(state, tile.image, points);
-    double magnitude = normalised ? 1 : 0;
-    for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
+    Reading r{normalised ? 1.0 : 0.0, constant, {}, {}};
+    for (const double v : tile.truth) r.magnitude = std::max(r.magnitude, std::abs(v));
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto [truth, difference] = trilinear(tile.truth, points[i]);
-      const double beyond = (std::abs(static_cast<double>(read[i]) - truth) - delta * difference) / magnitude;
-      if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
+      const double error = std::abs(static_cast<double>(read[i]) - truth);
+      // NaN counts as the largest error there is.
+      r.error.push_back(std::isnan(error) ? std::numeric_limits<double>::infinity() : error);
+      r.difference.push_back(difference);
     }
+    all.push_back(std::move(r));
+  }
+  return all;
+}
+
+// rho: the largest error beyond delta times the differences, relative to the tile's magnitude.
+double beyond(const std::vector<Reading>& tiles, double delta, bool constant_alone) {
+  double rho = 0;
+  for (const Reading& r : tiles) {
+    if (constant_alone && !r.constant) continue;
+    for (std::size_t i = 0; i < r.error.size(); ++i)
+      rho = std::max(rho, (r.error[i] - delta * r.difference[i]) / r.magnitude);
   }
   return rho;
+}
+
+// The weight's error that explains what is off where samples differ, beyond what is off where they do not,
+// and beyond seven lerps in fp32. On combs two of three fractions are 0, and units err less there.
+double weight_error_between(const std::vector<Reading>& tiles) {
+  const double rho = beyond(tiles, 0, true) + 16 * 0x1p-24;
+  double worst = 0;
+  for (const Reading& r : tiles) {
+    if (r.constant) continue;
+    for (std::size_t i = 0; i < r.error.size(); ++i)
+      if (r.error[i] > rho * r.magnitude)
+        worst = std::max(worst, (r.error[i] - rho * r.magnitude) / r.difference[i]);
+  }
+  return worst;
 }
 
 // Charges delta; says for which class.
@@ -221,8 +255,10 @@ std::string charge(FilterProbe& p) {
 std::string measure_filter(opencl::State& state, FilterProbe& p, SampleType type) {
   for (std::size_t axis = 0; axis < 3; ++axis)
     p.weight_error = std::max(p.weight_error, measure_weights(state, axis, type));
+  const std::vector<Reading> tiles = read_tiles(state, type);
+  p.weight_error = std::max(p.weight_error, weight_error_between(tiles));
   std::string note = charge(p);
-  p.constant_error = measure_constants(state, p.delta, type);
+  p.constant_error = beyond(tiles, p.delta, false);
   return note;
 }
 

@@ -20,19 +20,22 @@ typedef struct {
 #define FIRST_OF(a, b, c) a
 #define SECOND_OF(a, b, c) b
 #define THIRD_OF(a, b, c) c
-#define APPLY(pick, ...) pick(__VA_ARGS__)
-#define COEFFICIENTS(pick, A, B, C, sign)                                                           \
-  LANES(APPLY(pick, A), APPLY(pick, B), APPLY(pick, C), sign(APPLY(pick, C)), sign(APPLY(pick, B)), \
-        sign(APPLY(pick, A)))
+// A list becomes arguments where it is handed on: OpenCL C has no macros of any number of them.
+#define TAKE(pick, list) pick(list)
+#define TAP(pick, kind, tap) TAKE(pick, VDVR_SIX_##kind##_##tap)
+#define COEFFICIENTS(pick, kind, sign)                                                        \
+  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), sign(TAP(pick, kind, C)), \
+        sign(TAP(pick, kind, B)), sign(TAP(pick, kind, A)))
 #define SAME(x) (x)
 #define OPPOSITE(x) (-(x))
-#define EVEN(pick) COEFFICIENTS(pick, VDVR_SIX_EVEN_A, VDVR_SIX_EVEN_B, VDVR_SIX_EVEN_C, SAME)
-#define ODD(pick) COEFFICIENTS(pick, VDVR_SIX_ODD_A, VDVR_SIX_ODD_B, VDVR_SIX_ODD_C, OPPOSITE)
+#define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)
+#define ODD_OF(pick) COEFFICIENTS(pick, ODD, OPPOSITE)
 
 static inline __attribute__((always_inline)) float8 taps(float g) {
   const float s = g * g;
-  return fma((float8)(g), VDVR_SIX_FUSED_HORNER(float8, s, ODD(FIRST_OF), ODD(SECOND_OF), ODD(THIRD_OF)),
-             VDVR_SIX_FUSED_HORNER(float8, s, EVEN(FIRST_OF), EVEN(SECOND_OF), EVEN(THIRD_OF)));
+  return fma((float8)(g),
+             VDVR_SIX_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
+             VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
 }
 
 static inline __attribute__((always_inline)) float sum_of(float8 v) {

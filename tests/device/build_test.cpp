@@ -9,6 +9,7 @@
 
 #include "host/sampler/sampler_terms.hpp"
 #include "tests/reference/mixed_field.hpp"
+#include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
@@ -86,7 +87,10 @@ void check_certificate(const ProjectionSet& scan, const Built& built, const std:
                        Applies&& applies) {
   const Certificate& c = built.result.certificate;
   BOOST_TEST(c.holds_buffer);
-  BOOST_TEST(c.holds_image3d.value_or(true));
+  // Weights of 8 bits can be too coarse for a tolerance; then the certificate says so.
+  BOOST_TEST(c.holds_image3d.value_or(true) == (c.total_image3d.value_or(0) <= c.epsilon_abs));
+  static const bool exact_weights = probe_filters(support::device()).delta <= 0x1p-22;
+  if (exact_weights) BOOST_TEST(c.holds_image3d.value_or(true));
   BOOST_TEST(c.total_buffer <= c.epsilon_abs);
   BOOST_TEST(c.measured_max <= c.measured_total);
   BOOST_TEST(c.measured_total <= c.total_buffer);
@@ -512,10 +516,13 @@ BOOST_AUTO_TEST_CASE(marschner_lobb_is_certified) {
 double node_tolerance_of(const Built& built) {
   Device device;
   const Plan& plan = built.plan;
-  const SamplerTerms t = sampler_terms(field_slopes(as_mixed(plan.base)), plan.grid, probe_sampler(device),
+  const SamplerProbe probe = probe_filters(device);
+  const SamplerTerms t = sampler_terms(field_slopes(as_mixed(plan.base)), plan.grid, probe,
                                        longest_atlas(device.info()), plan.epsilon_abs, plan.rates.gold);
+  // Of coarse weights nothing is reserved: bricks are raised for them.
+  const double image3d = t.image3d && probe.delta <= 0x1p-22 ? t.image3d->value : 0.0;
   return plan.epsilon_abs - built.result.certificate.budget.arithmetic.value -
-         1.25 * std::max(t.buffer.value, t.image3d ? t.image3d->value : 0.0);
+         1.25 * std::max(t.buffer.value, image3d);
 }
 
 // Here a neighbour that is raised for a brick's sake rounds to the samples it had, so that the brick is not

@@ -299,7 +299,7 @@ BOOST_AUTO_TEST_CASE(rows_are_rounded_once_at_every_size) {
   }
 }
 
-// On devices that filter by products; others have no direct way.
+// Products are to the bit: a transform depends on which rows it takes together.
 BOOST_AUTO_TEST_CASE(slab_straight_from_the_scan_is_that_of_the_filtered_scan) {
   Device device;
   for (const RampWindow filter : {RampWindow::ram_lak, RampWindow::hann})
@@ -315,13 +315,17 @@ BOOST_AUTO_TEST_CASE(slab_straight_from_the_scan_is_that_of_the_filtered_scan) {
       DirectFilter direct(device.state(), scan, field);
       const auto slab = direct(wanted, positions, {});
       // Columns are mirrored once at most.
-      BOOST_REQUIRE(slab.has_value() == (device.info().is_cpu && wanted.pad <= columns));
+      BOOST_REQUIRE(slab.has_value() == (wanted.pad <= columns));
       if (!slab) continue;
       const FilteredScan filtered =
           filter_projections(device.state(), scan, field, {}, FilterMethod::automatic, Precision::fp32);
       Upsampler upsampler(device.state(), filtered);
       const HostSlab expected(upsampler(wanted, positions)), computed(*slab);
-      BOOST_TEST((computed.values == expected.values));
+      double off = 0;
+      BOOST_REQUIRE(computed.values.size() == expected.values.size());
+      for (std::size_t i = 0; i < computed.values.size(); ++i)
+        off = std::max(off, static_cast<double>(std::abs(computed.values[i] - expected.values[i])));
+      BOOST_TEST(off <= (device.info().is_cpu ? 0.0 : 2 * filtered.ramp_error));
     }
 }
 
@@ -332,7 +336,6 @@ BOOST_AUTO_TEST_CASE(direct_filter_leaves_upsampling_to_others_and_refuses_overf
   DirectFilter direct(device.state(), scan, {});
   BOOST_TEST(!direct(upsampled_columns(24, 2, 1), whole, {}).has_value());
   BOOST_TEST(!direct(upsampled_columns(24, 1, 1), between, {}).has_value());
-  if (!device.info().is_cpu) return;
   scan.geometry.pitch_u = 0.01;  // taps of 25
   for (const float bad : {std::numeric_limits<float>::max(), std::numeric_limits<float>::quiet_NaN()}) {
     scan.data[2 * 6 * 24 + 24 + 7] = bad;  // view 2, row 1

@@ -8,6 +8,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/live_renderer.hpp"
+#include "vdvr/safe_sampler.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;
@@ -81,12 +82,14 @@ BOOST_AUTO_TEST_CASE(the_bounds_colours_are_mixed_in_where_something_is_seen) {
   LiveRenderer live(device(), volume(), certificate());
   const ResidentVolume resident(device(), volume());
   Renderer renderer(device(), resident);
-  renderer.set_bounds(brick_bounds(*certificate(), false));
+  const SafeSampler safe = safe_sampler(device(), volume(), certificate());
+  const bool image3d = renderer.sampler(safe.sampler) == SamplerKind::image3d;
+  renderer.set_bounds(brick_bounds(*safe.certificate, image3d));
   for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip}) {
     LiveView view = first_view(live.scene(), 90, 80);
     view.mode = mode;
     RenderOptions o = options_of(view, live.scene(), 90, 80);
-    o.sampler = SamplerKind::buffer;
+    o.sampler = safe.sampler;
     const Image plain = renderer.render(o).image;
     o.output = RenderOutput::error;
     const FloatImage bounds = renderer.render(o).values;
@@ -108,7 +111,11 @@ BOOST_AUTO_TEST_CASE(slices_of_the_bound_are_those_of_render) {
   LiveRenderer live(device(), volume(), certificate());
   LiveView view = first_view(live.scene(), 200, 180);
   view.mode = RenderMode::error;
-  const Image truth = bound_slice(volume(), *certificate(), false, {2, view.slice_position, 200, 180}).image;
+  const SafeSampler safe = safe_sampler(device(), volume(), certificate());
+  const bool image3d =
+      Renderer(device(), ResidentVolume(device(), volume())).sampler(safe.sampler) == SamplerKind::image3d;
+  const Image truth =
+      bound_slice(volume(), *safe.certificate, image3d, {2, view.slice_position, 200, 180}).image;
   BOOST_TEST(same(live.draw(view, 200, 180, true).image, truth));
   view.mode = RenderMode::slice;
   const Image plain = live.draw(view, 200, 180, false).image;

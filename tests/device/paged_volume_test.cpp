@@ -111,7 +111,8 @@ BOOST_AUTO_TEST_CASE(pictures_by_bricks_are_those_of_the_whole_volume_to_the_bit
       BOOST_TEST(paged.counts().largest_part > 0u);
       BOOST_TEST(paged.counts().largest_part <= paged.memory_bytes());
       BOOST_TEST(paged.memory_bytes() <= budget);
-      BOOST_TEST(small.peak_memory() <= budget + kAside);
+      // A card has a limit of its own beside the host's.
+      BOOST_TEST(small.peak_memory() <= (small.info().is_cpu ? 1 : 2) * (budget + kAside));
     }
 }
 

@@ -194,7 +194,7 @@ BOOST_AUTO_TEST_CASE(the_texture_unit_finds_the_same_roots_within_the_probe) {
   const double field = 3 * (probe.delta + 2 * n * u) * 2 + probe.constant_error;
   Judgement j;
   for (const double value : {0.2, 0.85}) {
-    RenderOptions o = surface_at(orbit_camera(v.grid, 37, 21, 1), value);
+    RenderOptions o = surface_at(orbit_camera(v.grid, 37, 21, 1), value, 65);
     o.sampler = SamplerKind::image3d;
     judge(v, o, j, 7 * field);
   }

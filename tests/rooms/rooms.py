@@ -32,6 +32,8 @@ DOUBLE_CONSTANT = re.compile(r"(?<![\w.])(?:(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|
 # PoCL 3.1 shares such an array among all groups (device/shared_column.h).
 LOCAL_ARRAY = re.compile(r"\b__local\b[^;(){}*]*[;=\[]")
 # Long launches are cut (host/opencl/pace.hpp), which work-items do not see as long as they ask for global places.
+# NVIDIA's compiler refuses them, as the standard does.
+VARIADIC = re.compile(r"#\s*define\s+\w+\([^)\n]*\.\.\.\s*\)")
 OF_THE_LAUNCH = re.compile(r"\bget_(?:group_id|num_groups|global_size|global_offset)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
 
@@ -152,6 +154,8 @@ def faults_of_kernels(root):
             yield f"{name}: {found[0]} is no argument"
         if found := OF_THE_LAUNCH.search(text):
             yield f"{name}: {found[0]} is of a launch, which may be a piece"
+        if found := VARIADIC.search(text):
+            yield f"{name}: `{found[0]}` takes any number of arguments, which no macro of OpenCL C may"
 
 
 def plant(root, path, text):
@@ -178,6 +182,7 @@ FAULTS = [
     ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
     ("kernels/kept/fourth_differences.cl", "__kernel void h() { __local float room[32]; }\n", "is no argument"),
     ("kernels/kept/fourth_differences.cl", "__kernel void h() { int i = get_group_id(0); }\n", "may be a piece"),
+    ("kernels/kept/cone_nodes.cl", "#define CALL(f, ...) f(__VA_ARGS__)\n", "which no macro of OpenCL C may"),
 ]
 
 

@@ -5,7 +5,8 @@
 //
 // Another device. Each of these is also added to the driver's version, so that nothing is taken for, or kept
 // for, the device below:
-//   VDVR_SHIM_GPU=1               a GPU, whose memory is not the host's
+//   VDVR_SHIM_GPU=1               a GPU, whose memory is not the host's, and whose compiler takes what
+//                                 OpenCL C has and no more
 //   VDVR_SHIM_WORK_GROUP=N        work-items of a group: launches of larger groups are refused
 //   VDVR_SHIM_COMPUTE_UNITS=N     any number
 //   VDVR_SHIM_LOCAL_MEM=N         bytes of local memory, at most what there is
@@ -193,6 +194,14 @@ float4 __attribute__((overloadable)) shim_read(__read_only image3d_t image, floa
 #endif
 )";
 
+// What NVIDIA's compiler refuses, as the standard does, and PoCL's warns of or takes. `#line`: messages name
+// lines of the source itself.
+constexpr const char* as_the_standard_has_it = R"(
+#pragma clang diagnostic error "-Wincompatible-pointer-types"
+#pragma clang diagnostic error "-Wincompatible-pointer-types-discards-qualifiers"
+#line 1
+)";
+
 std::string joined(cl_uint count, const char** texts, const size_t* lengths) {
   std::string source;
   for (cl_uint i = 0; i < count; ++i)
@@ -203,6 +212,7 @@ std::string joined(cl_uint count, const char** texts, const size_t* lengths) {
 
 std::string as_the_device_compiles(std::string source) {
   const cl_ulong bits = setting("VDVR_SHIM_FILTER_BITS");
+  if (setting("VDVR_SHIM_GPU") != 0) source = as_the_standard_has_it + source;
   if (lacks("VDVR_SHIM_FP64")) source = without_fp64 + with_marked_constants(source);
   if (bits != 0 && source.find("read_imagef") != std::string::npos)
     source = "#define FILTER_BITS " + std::to_string(bits) + "\n#define FILTER_TO_BITS " +
