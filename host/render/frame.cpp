@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 
+#include "host/opencl/kernel.hpp"
 #include "host/sampler/resident_volume.hpp"
 #include "shared/raycast_params.h"
 #include "vdvr/error.hpp"
@@ -123,6 +125,37 @@ void Frame::update_distance(const RenderOptions& o, float slack, bool base_first
     distance_ = DeviceArray<cl_uchar>(*field_.state, distance.size(), "distances to occupied bricks");
   distance_.write(distance);
   distance_key_ = std::move(key);
+}
+
+void Frame::develop(const RenderOptions& o) {
+  const std::uint64_t fours = (picture_.size() + 3) / 4;
+  if (values_.size() != fours) {
+    rgb_ = {};
+    values_ = {};
+    rgb_ = DeviceArray<cl_uchar4>(*field_.state, 3 * fours, "picture in bytes");
+    values_ = DeviceArray<cl_float4>(*field_.state, fours, "values of pixels");
+  }
+  const char* nothing = o.mode == RenderMode::iso ? "1" : o.mode == RenderMode::mip ? "2" : "0";
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl_int> kernel(*field_.state, "render/develop",
+                                                                    "develop", {{"VDVR_NOTHING", nothing}});
+  kernel({{fours, 1, 1}, {64, 1, 1}}, rgb_.buffer(), values_.buffer(), picture_.buffer(),
+         static_cast<cl_int>(picture_.size()));
+}
+
+Image Frame::image(const RenderOptions& o) const {
+  Image image{o.width, o.height, std::vector<std::uint8_t>(3 * picture_.size())};
+  rgb_.read_mapped([&](std::span<const cl_uchar4> bytes) {
+    std::memcpy(image.rgb.data(), bytes.data(), image.rgb.size());
+  });
+  return image;
+}
+
+FloatImage Frame::values(const RenderOptions& o) const {
+  FloatImage image{o.width, o.height, std::vector<float>(picture_.size())};
+  values_.read_mapped([&](std::span<const cl_float4> fours) {
+    std::memcpy(image.values.data(), fours.data(), image.values.size() * sizeof(float));
+  });
+  return image;
 }
 
 std::int64_t Frame::samples() const {

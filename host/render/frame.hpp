@@ -39,6 +39,12 @@ class Frame {
   void set_bounds(std::span<const float> bounds);
 
   [[nodiscard]] const DrawnField& field() const { return field_; }
+  /// The picture as it is shown, and the values of its pixels, made on the device; of colours, in all modes
+  /// but integral. Enqueues: `image` and `values` say when it is there.
+  void develop(const RenderOptions& options);
+  [[nodiscard]] Image image(const RenderOptions& options) const;
+  [[nodiscard]] FloatImage values(const RenderOptions& options) const;
+
   /// [y][x] as kernels/render/raycast.cl writes it.
   [[nodiscard]] const opencl::DeviceArray<cl_float4>& picture() const { return picture_; }
   [[nodiscard]] const cl::Buffer& table() const { return table_.buffer(); }
@@ -58,6 +64,8 @@ class Frame {
 
   DrawnField field_;
   opencl::DeviceArray<cl_float4> picture_, table_;
+  opencl::DeviceArray<cl_uchar4> rgb_;     ///< 3 to each 4 pixels, and
+  opencl::DeviceArray<cl_float4> values_;  ///< 1 of kernels/render/develop.cl
   opencl::DeviceArray<cl_uint> row_samples_;
   opencl::DeviceArray<cl_uchar> distance_;
   opencl::DeviceArray<float> bounds_;

@@ -121,11 +121,18 @@ RenderResult Renderer::render(const RenderOptions& options) {
   r.sampler = enqueued.sampler;
   r.sampler_reason = std::move(enqueued.sampler_reason);
   r.gradient = enqueued.gradient;
-  // Converted where they lie: a copy of them would be a tenth of a fast frame.
-  frame.picture().read_mapped([&](Pixels pixels) {
+  if (options.output == RenderOutput::colour && options.mode != RenderMode::integral) {
+    frame.develop(options);
+    r.image = frame.image(options);
     r.seconds = enqueued.seconds();
-    convert(pixels, options, r);
-  });
+    r.values = frame.values(options);
+  } else {
+    // Converted where they lie: a copy of them would be a tenth of a fast frame.
+    frame.picture().read_mapped([&](Pixels pixels) {
+      r.seconds = enqueued.seconds();
+      convert(pixels, options, r);
+    });
+  }
   r.samples = frame.samples();
   return r;
 }

@@ -5,12 +5,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <random>
+#include <utility>
 
 #include "host/opencl/kernel.hpp"
 #include "vdvr/probe_sampler.hpp"
@@ -162,70 +164,114 @@ std::pair<double, double> trilinear(const std::vector<double>& tile, const Probe
   return {value, difference};
 }
 
-// What the unit made of tiles whose trilinear value is known.
-struct Reading {
-  double magnitude;                       // the tile's largest, or the whole scale of a normalised format
-  bool constant;                          // of one value
-  std::vector<double> error, difference;  // of each point; the cell's differences are summed over the axes
-};
-
-// Constant, affine and random tiles. Units that round products of weights err even where all samples are
-// equal.
-std::vector<Reading> read_tiles(opencl::State& state, SampleType type) {
+// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude, or to
+// the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
+// weights err even where all samples are equal.
+double measure_constants(opencl::State& state, double delta, SampleType type) {
   std::mt19937 random(7);
   const bool normalised = type != SampleType::f32;
   std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
   // Normalised formats hold 0 to 1 only.
   const double offset = normalised ? 0 : 100, slope = normalised ? 0.01 : 1;
-  const std::vector<std::pair<bool, std::vector<float>>> tiles{
-      {true, cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; })},
-      {true, cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; })},
-      {false, cube([&](double x, double y, double z) {
-         return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
-       })},
-      {false, cube([&](double, double, double) { return uniform(random); })}};
+  const std::vector<std::vector<float>> tiles{
+      cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; }),
+      cube([&](double, double, double) { return normalised ? 0.61803 : -777.77; }),
+      cube([&](double x, double y, double z) {
+        return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
+      }),
+      cube([&](double, double, double) { return uniform(random); })};
   const auto points = scattered_points();
-  std::vector<Reading> all;
-  for (const auto& [constant, values] : tiles) {
+  double rho = 0;
+  for (const auto& values : tiles) {
     const Tile tile = make_tile(state, values, type);
     const auto read = read_points(state, tile.image, points);
-    Reading r{normalised ? 1.0 : 0.0, constant, {}, {}};
-    for (const double v : tile.truth) r.magnitude = std::max(r.magnitude, std::abs(v));
+    double magnitude = normalised ? 1 : 0;
+    for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto [truth, difference] = trilinear(tile.truth, points[i]);
-      const double error = std::abs(static_cast<double>(read[i]) - truth);
-      // NaN counts as the largest error there is.
-      r.error.push_back(std::isnan(error) ? std::numeric_limits<double>::infinity() : error);
-      r.difference.push_back(difference);
+      const double beyond = (std::abs(static_cast<double>(read[i]) - truth) - delta * difference) / magnitude;
+      if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
     }
-    all.push_back(std::move(r));
-  }
-  return all;
-}
-
-// rho: the largest error beyond delta times the differences, relative to the tile's magnitude.
-double beyond(const std::vector<Reading>& tiles, double delta, bool constant_alone) {
-  double rho = 0;
-  for (const Reading& r : tiles) {
-    if (constant_alone && !r.constant) continue;
-    for (std::size_t i = 0; i < r.error.size(); ++i)
-      rho = std::max(rho, (r.error[i] - delta * r.difference[i]) / r.magnitude);
   }
   return rho;
 }
 
-// The weight's error that explains what is off where samples differ, beyond what is off where they do not,
-// and beyond seven lerps in fp32. On combs two of three fractions are 0, and units err less there.
-double weight_error_between(const std::vector<Reading>& tiles) {
-  const double rho = beyond(tiles, 0, true) + 16 * 0x1p-24;
-  double worst = 0;
-  for (const Reading& r : tiles) {
-    if (r.constant) continue;
-    for (std::size_t i = 0; i < r.error.size(); ++i)
-      if (r.error[i] > rho * r.magnitude)
-        worst = std::max(worst, (r.error[i] - rho * r.magnitude) / r.difference[i]);
+// Of one cell; bit a of a corner's number is its place on axis a.
+using Corners = std::array<double, 8>;
+
+Corners trilinear_weights(const std::array<double, 3>& fraction) {
+  Corners w{};
+  for (std::size_t c = 0; c < 8; ++c) {
+    w[c] = 1;
+    for (std::size_t a = 0; a < 3; ++a) w[c] *= (c >> a & 1u) != 0 ? fraction[a] : 1 - fraction[a];
   }
-  return worst;
+  return w;
+}
+
+// What is moved along each axis where `off` is brought to one corner, the axes in this order.
+std::array<double, 3> moved(Corners off, const std::array<std::size_t, 3>& order) {
+  std::array<double, 3> amount{};
+  for (const std::size_t axis : order) {
+    const std::size_t bit = std::size_t{1} << axis;
+    double up = 0, down = 0;
+    for (std::size_t c = 0; c < 8; ++c) ((c & bit) != 0 ? up : down) += std::abs(off[c]);
+    // The side where less is moves to the other.
+    const std::size_t kept = up <= down ? 0 : bit;
+    for (std::size_t c = 0; c < 8; ++c)
+      if ((c & bit) == kept) off[c] += std::exchange(off[c ^ bit], 0.0);
+    amount[axis] = std::min(up, down);
+  }
+  return amount;
+}
+
+// What weights err by on the axis where they err most: the fractions that they look like, and what they are
+// not of these.
+double weight_error_of(const Corners& read, const std::array<double, 3>& fraction) {
+  std::array<double, 3> seen{};
+  for (std::size_t c = 0; c < 8; ++c)
+    for (std::size_t a = 0; a < 3; ++a) seen[a] += (c >> a & 1u) != 0 ? read[c] : 0.0;
+  Corners off = read;
+  const Corners looks_like = trilinear_weights(seen);
+  for (std::size_t c = 0; c < 8; ++c) off[c] -= looks_like[c];
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& order :
+       {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
+    const std::array<double, 3> amount = moved(off, order);
+    double most = 0;
+    for (std::size_t a = 0; a < 3; ++a) most = std::max(most, amount[a] + std::abs(seen[a] - fraction[a]));
+    least = std::min(least, most);
+  }
+  return least;
+}
+
+// The weights of all corners of a cell, by tiles of which every second sample along each axis is 1, all
+// others 0, and what they err by for any samples. On combs two of three fractions are 0, and units err less
+// there.
+double measure_corners(opencl::State& state, SampleType type) {
+  const auto points = scattered_points();
+  std::array<std::vector<float>, 8> read;
+  for (std::uint32_t parity = 0; parity < 8; ++parity)
+    read[parity] = read_points(state,
+                               make_tile(state, cube([&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+                                           return (x % 2 | y % 2 << 1 | z % 2 << 2) == parity ? 1.0 : 0.0;
+                                         }),
+                                         type)
+                                   .image,
+                               points);
+  double worst = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ProbePoint& p = points[i];
+    Corners weights{};
+    for (std::uint32_t c = 0; c < 8; ++c) {
+      std::uint32_t parity = 0;
+      for (std::uint32_t a = 0; a < 3; ++a) parity |= (p.cell[a] + (c >> a & 1u)) % 2 << a;
+      weights[c] = static_cast<double>(read[parity][i]);
+      if (std::isnan(weights[c])) return std::numeric_limits<double>::infinity();
+    }
+    worst = std::max(worst, weight_error_of(weights, p.fraction));
+  }
+  // Seven lerps in fp32 are charged for by themselves.
+  return std::max(0.0, worst - 16 * 0x1p-24);
 }
 
 // Charges delta; says for which class.
@@ -255,10 +301,9 @@ std::string charge(FilterProbe& p) {
 std::string measure_filter(opencl::State& state, FilterProbe& p, SampleType type) {
   for (std::size_t axis = 0; axis < 3; ++axis)
     p.weight_error = std::max(p.weight_error, measure_weights(state, axis, type));
-  const std::vector<Reading> tiles = read_tiles(state, type);
-  p.weight_error = std::max(p.weight_error, weight_error_between(tiles));
+  p.weight_error = std::max(p.weight_error, measure_corners(state, type));
   std::string note = charge(p);
-  p.constant_error = beyond(tiles, p.delta, false);
+  p.constant_error = measure_constants(state, p.delta, type);
   return note;
 }
 

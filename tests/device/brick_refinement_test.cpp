@@ -138,8 +138,10 @@ BOOST_AUTO_TEST_CASE(what_is_asked_twice_or_beyond_the_plan_s_epsilon_ends) {
   BOOST_TEST(calls == 2);
   const std::vector<float> asked = half_of(result.volume, finest * c.range()),
                            bounds = brick_bounds(result.certificate, false);
+  // What the buffer takes of the refined volume was not known when this was as far as the plan goes.
+  const auto buffer = static_cast<float>(result.certificate.budget.sampler.buffer.value);
   for (std::size_t i = 0; i < asked.size(); ++i)
-    if (std::isfinite(bounds[i])) BOOST_TEST(bounds[i] <= asked[i]);
+    if (std::isfinite(bounds[i])) BOOST_TEST(bounds[i] <= asked[i] + buffer);
 }
 
 BOOST_AUTO_TEST_CASE(a_refinement_of_other_bricks_is_refused) {

@@ -71,8 +71,9 @@ BOOST_AUTO_TEST_CASE(the_certificate_says_that_light_is_that_of_f_and_holds_less
   BOOST_REQUIRE_MESSAGE(box.code == 0, box.err);
   BOOST_TEST(Json::parse(box.out).at("step") == "box");
   BOOST_TEST(Json::parse(box.out).at("levels") == lit.at("levels"));
+  // With the buffer, whose light F's rays can be held to.
   const Ended r = run({"render", small_volume(), "--certify", "--certify-light=as-drawn", "--size", "40x40",
-                       "-o", at("drawn.png"), "--json"});
+                       "--sampler", "buffer", "-o", at("drawn.png"), "--json"});
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   const Json drawn = Json::parse(r.out);
   BOOST_TEST(drawn.at("light") == "as drawn");
@@ -104,7 +105,8 @@ BOOST_AUTO_TEST_CASE(what_was_changed_is_found) {
   });
   // A picture that is as drawn cannot be passed off as one under the light of F.
   const Ended made =
-      run({"render", small_volume(), "--certify", "--size", "40x40", "-o", at("plain.png"), "--force"});
+      run({"render", small_volume(), "--certify", "--size", "40x40", "--sampler", "buffer", "-o",
+           at("plain.png"), "--force"});
   BOOST_REQUIRE_MESSAGE(made.code == 0, made.err);
   Json json = json_of(at("plain.certificate.json"));
   json["light"] = "lit";

@@ -1,5 +1,7 @@
 // The seal of a file, and what verify finds of a file that was edited and sealed again.
 #define BOOST_TEST_MODULE seal
+#include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host/verify/verify_attack.hpp"
@@ -421,7 +423,14 @@ BOOST_AUTO_TEST_CASE(edits_of_a_promise_that_were_sealed_again_are_found) {
   c.options_json = options.dump();
   BOOST_TEST(finds(c, "options.geometry.pitch_u"));
   c = right;
-  c.worst_at = made().volume.grid.position({0, 0, 0});
+  // In the middle of the brick of the least total.
+  const Index3 n = made().volume.bricks();
+  const auto least = std::distance(
+      c.brick_totals.begin(), std::min_element(c.brick_totals.begin(), c.brick_totals.end(),
+                                               [](float a, float b) { return a >= 0 && (b < 0 || a < b); }));
+  const std::int64_t middle = made().volume.granularity / 2, g = made().volume.granularity;
+  c.worst_at = made().volume.grid.position(
+      {least % n[0] * g + middle, least / n[0] % n[1] * g + middle, least / (n[0] * n[1]) * g + middle});
   BOOST_TEST(finds(c, "worst_at"));
   c = right;
   c.roi = std::array<double, 6>{0.1, 0.1, 0.1, 0.5, 0.5, 0.5};
