@@ -74,8 +74,8 @@ FilterErrors filters_of(const std::vector<Crew::Kind>& kinds) {
 }
 
 // Of integer samples.
-Lattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
-                   StorageChoice storage, const FilterErrors& filters) {
+IntegerLattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
+                          StorageChoice storage, const FilterErrors& filters) {
   return choose_lattice(base, storage,
                         most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
                         units.density(), filters);
@@ -92,7 +92,8 @@ Room room_for(const opencl::State& state, const ProjectionSet& scan, const Build
   return room;
 }
 
-GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const Lattice& lattice, bool cone) {
+GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const IntegerLattice& lattice,
+                           bool cone) {
   const Comparison& comparison = plan.settings.comparison;
   GoldSettings settings{plan.grid,
                         plan.layout.granularity,
@@ -109,7 +110,7 @@ GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const 
   return settings;
 }
 
-OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const Lattice& lattice,
+OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const IntegerLattice& lattice,
                        const Room& room) {
   OpenBricks bricks;
   bricks.grid = plan.grid;
@@ -142,7 +143,8 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const L
 }
 
 // At the gold rate V is gold, but for the rounding of what is stored and of gold computed in other blocks.
-[[noreturn]] void refuse_stored(const Inputs& in, const Lattice& lattice, float total, double tolerance) {
+[[noreturn]] void refuse_stored(const Inputs& in, const IntegerLattice& lattice, float total,
+                                double tolerance) {
   const std::string found = fmt::format(
       "epsilon {:.4g} is out of reach: a brick at the gold rate may err by {:.4g} of the {:.4g} "
       "left for it, ",
@@ -295,7 +297,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 }
 
 // The volume of these base samples within the tolerance; of a share, what it classifies, and no volume.
-Measured measured_volume(const Inputs& in, const std::vector<float>& base, const Lattice& lattice,
+Measured measured_volume(const Inputs& in, const std::vector<float>& base, const IntegerLattice& lattice,
                          const NodeTolerance& tolerance, const Accept& accept,
                          const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
@@ -396,7 +398,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     return refinement ? refinement->with_bricks(*less) : NodeTolerance(*less);
   };
   // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
-  const auto volume_on = [&](const Lattice& lattice) {
+  const auto volume_on = [&](const IntegerLattice& lattice) {
     for (;;) {
       const double tolerance = samplers.begin();
       MixedVolume volume =

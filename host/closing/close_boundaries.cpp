@@ -155,7 +155,7 @@ void CloseBoundaries::for_each_tile(const std::function<void(std::int64_t)>& vis
 }
 
 void CloseBoundaries::update_units() {
-  const Lattice& l = open_.lattice;
+  const IntegerLattice& l = open_.lattice;
   stored_.unit.assign(stored_.level.size(), 0);
   if (l.step == 0) return;
   for (std::size_t i = 0; i < stored_.unit.size(); ++i) {

@@ -26,7 +26,7 @@ struct OpenBricks {
   std::vector<LevelTriple> level;      ///< [bz][by][bx]; 0 where a brick takes no part
   std::vector<std::uint8_t> involved;  ///< [bz][by][bx]
   TileStore samples;                   ///< per brick: its tile at its level; empty at level 0
-  Lattice lattice;
+  IntegerLattice lattice;
   bool sampled = true;  ///< the samples are gold itself, whatever the level
   /// What |V - F| may be in each brick; empty: the same in all.
   std::vector<float> tolerance;

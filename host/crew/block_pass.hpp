@@ -29,7 +29,7 @@ struct BlockPass {
   GoldStream::For purpose = GoldStream::For::measuring;
   std::int64_t number = 0;  ///< of the passes at this rate
   NodeTolerance tolerance = 0.0;
-  Lattice lattice{};                   ///< of tiles
+  IntegerLattice lattice{};            ///< of tiles
   std::vector<std::uint8_t> selected;  ///< by brick
   std::vector<LevelTriple> level;      ///< by brick, for `extract`
 };

@@ -44,7 +44,7 @@ void CrewMember::learn(const std::vector<Bytes>& records) {
 }
 
 // Passes of one build bring one lattice.
-GoldRates& CrewMember::rates(const Lattice& lattice) {
+GoldRates& CrewMember::rates(const IntegerLattice& lattice) {
   if (!rates_) {
     fitting_.reset();
     settings_.lattice = lattice;

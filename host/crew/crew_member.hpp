@@ -35,7 +35,7 @@ class CrewMember {
 
  private:
   GoldStream& stream();
-  GoldRates& rates(const Lattice& lattice);
+  GoldRates& rates(const IntegerLattice& lattice);
   std::shared_ptr<GoldSource> source();
 
   opencl::State& state_;

@@ -65,15 +65,15 @@ ParallelGeometry get_geometry(ByteReader& in) {
   return g;
 }
 
-void put(ByteWriter& out, const Lattice& l) {
+void put(ByteWriter& out, const IntegerLattice& l) {
   out.put(l.step);
   out.put(static_cast<std::uint8_t>(l.base));
   out.put(static_cast<std::uint8_t>(l.least));
   out.put(l.base_shift);
   out.put(l.finest_shift);
 }
-Lattice get_lattice(ByteReader& in) {
-  Lattice l;
+IntegerLattice get_lattice(ByteReader& in) {
+  IntegerLattice l;
   l.step = in.get<double>();
   l.base = static_cast<SampleType>(in.get<std::uint8_t>());
   l.least = static_cast<SampleType>(in.get<std::uint8_t>());

@@ -37,7 +37,7 @@ struct GoldSettings {
   int coarse_rate = 0;       ///< of a coarser gold that is tested first; 0: none
   int finer_rate = 0;        ///< of the finer gold that will measure what this one proposes; 0: none
   bool grid_only = false;    ///< slack counts as 0: the paper's test, for comparison
-  Lattice lattice{};         ///< on which tiles will be stored; classification leaves room for it
+  IntegerLattice lattice{};  ///< on which tiles will be stored; classification leaves room for it
   LevelTriple coarsening{};  ///< log2 of cells per base cell, z, y, x
   /// Of heights that blocks of kept gold share (kept_gold.hpp).
   std::uint64_t heights_bytes = std::uint64_t{1} << 30;

@@ -163,10 +163,11 @@ class Forecast {
     const auto more = static_cast<double>(out.rounds.size() - 1);
     out.seconds = plan_.seconds + more * (foreseen.seconds - foreseen.kept_seconds) + pictures;
     for (const auto& raises : raises_) out.seconds += foresight_.repair_seconds(raises);
-    const Lattice lattice = choose_lattice(foresight_.stored(), storage,
-                                           most_rounding(from_world(plan_.epsilon_abs, foresight_.units()),
-                                                         plan_.layout.levels == Levels::anisotropic),
-                                           foresight_.units().density(), filters_);
+    const IntegerLattice lattice =
+        choose_lattice(foresight_.stored(), storage,
+                       most_rounding(from_world(plan_.epsilon_abs, foresight_.units()),
+                                     plan_.layout.levels == Levels::anisotropic),
+                       foresight_.units().density(), filters_);
     out.bytes =
         static_cast<std::uint64_t>(out.samples_ratio * static_cast<double>(plan_.grid.sample_count())) *
         bytes_of(lattice.base);

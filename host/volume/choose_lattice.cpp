@@ -18,13 +18,14 @@ int floor_log2(double x) { return std::ilogb(x); }
 
 std::int64_t most_code(SampleType type) { return type == SampleType::u8 ? 255 : 65535; }
 
-Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding, int density) {
+IntegerLattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding,
+                              int density) {
   return choose_lattice(base, choice, rounding, density, {});
 }
 
-Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding, int density,
-                       const FilterErrors& filters) {
-  Lattice lattice;
+IntegerLattice choose_lattice(std::span<const float> base, StorageChoice choice, double rounding, int density,
+                              const FilterErrors& filters) {
+  IntegerLattice lattice;
   if (choice == StorageChoice::f32 || base.empty()) return lattice;
   const auto [least, largest] = std::minmax_element(base.begin(), base.end());
   const float lo = *least, hi = *largest;

@@ -17,7 +17,7 @@ struct FilterErrors {
 
 /// As choose_lattice() of quantise.hpp, but `automatic` takes no type whose filter may err by more than
 /// `most_rounding`: what integers save would go into the bricks that have to make up for it.
-Lattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding, int density,
-                       const FilterErrors& filters);
+IntegerLattice choose_lattice(std::span<const float> base, StorageChoice choice, double most_rounding,
+                              int density, const FilterErrors& filters);
 
 }  // namespace vdvr

@@ -25,7 +25,8 @@ void put(std::span<const float> samples, double unit, double first, T* out) {
 
 }  // namespace
 
-std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, SampleType type, int most) {
+std::optional<int> fitting_shift(float lo, float hi, const IntegerLattice& lattice, SampleType type,
+                                 int most) {
   const double largest = std::max(std::abs(static_cast<double>(lo)), std::abs(static_cast<double>(hi)));
   // Rounding to the coarsest step may add half of it.
   if (!(largest + std::ldexp(lattice.step, most) < kCodes * lattice.step)) return std::nullopt;
@@ -36,7 +37,7 @@ std::optional<int> fitting_shift(float lo, float hi, const Lattice& lattice, Sam
   return std::nullopt;
 }
 
-double rounding_of(std::span<const float> tile, const Lattice& lattice) {
+double rounding_of(std::span<const float> tile, const IntegerLattice& lattice) {
   if (lattice.step == 0 || tile.empty()) return 0;
   const auto [lo, hi] = range_of(tile);
   for (const SampleType type : {SampleType::u8, SampleType::u16}) {
@@ -63,7 +64,7 @@ SampleBlock empty_block(SampleType type, std::uint64_t tiles, std::uint64_t tile
   return b;
 }
 
-void pack(std::span<const float> samples, const Lattice& lattice, int shift, std::uint64_t tile,
+void pack(std::span<const float> samples, const IntegerLattice& lattice, int shift, std::uint64_t tile,
           SampleBlock& block) {
   const std::size_t first_sample = tile * samples.size();
   if (block.type == SampleType::f32) {
@@ -78,18 +79,18 @@ void pack(std::span<const float> samples, const Lattice& lattice, int shift, std
   else put(samples, unit, first, block.u8.data() + first_sample);
 }
 
-void round_base(std::vector<float>& base, const Lattice& lattice) {
+void round_base(std::vector<float>& base, const IntegerLattice& lattice) {
   if (lattice.base == SampleType::f32) return;
   for (float& s : base) s = round_to(s, lattice.base_step());
 }
 
-SampleBlock pack_base(std::span<const float> base, const Lattice& lattice) {
+SampleBlock pack_base(std::span<const float> base, const IntegerLattice& lattice) {
   SampleBlock b = empty_block(lattice.base, 1, base.size());
   pack(base, lattice, lattice.base_shift, 0, b);
   return b;
 }
 
-std::pair<float, float> base_limits(std::span<const float> base, const Lattice& lattice) {
+std::pair<float, float> base_limits(std::span<const float> base, const IntegerLattice& lattice) {
   if (lattice.base == SampleType::f32)
     return {-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
   const auto [lo, hi] = range_of(base);

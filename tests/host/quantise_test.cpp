@@ -35,7 +35,7 @@ BOOST_AUTO_TEST_CASE(rounding_errs_by_half_a_step_and_decodes_exactly) {
     for (const StorageChoice choice : {StorageChoice::u8, StorageChoice::u16}) {
       std::vector<float> base = random_base(lo, hi, 3);
       const std::vector<float> exact = base;
-      const Lattice lattice = choose_lattice(base, choice, 0);
+      const IntegerLattice lattice = choose_lattice(base, choice, 0);
       BOOST_TEST((lattice.base == (choice == StorageChoice::u8 ? SampleType::u8 : SampleType::u16)));
       round_base(base, lattice);
       const SampleBlock block = pack_base(base, lattice);
@@ -55,7 +55,7 @@ BOOST_AUTO_TEST_CASE(auto_takes_the_smallest_type_whose_half_step_is_allowed) {
   // 1.125 / 255 lies between 2^-8 and 2^-7: half a step of 8 bits is 2^-8.
   BOOST_TEST((choose_lattice(base, StorageChoice::automatic, 0x1p-8).base == SampleType::u8));
   BOOST_TEST(choose_lattice(base, StorageChoice::automatic, 0.1).base_step() == 0x1p-7);
-  const Lattice wide = choose_lattice(base, StorageChoice::automatic, 0x1.fp-9);
+  const IntegerLattice wide = choose_lattice(base, StorageChoice::automatic, 0x1.fp-9);
   BOOST_TEST((wide.base == SampleType::u16));
   BOOST_TEST((wide.least == SampleType::u8));
   BOOST_TEST(wide.base_step() == 0x1p-8);  // the coarsest of which half is allowed
@@ -73,7 +73,7 @@ BOOST_AUTO_TEST_CASE(auto_takes_no_type_whose_filter_errs_by_more_than_rounding_
   // All that 8 bits of step 2^-7 hold is 255 / 128.
   const double rounding = 0x1p-8, limit = rounding / (255 * 0x1p-7);
   BOOST_TEST((chosen(rounding, {limit, 0}).base == SampleType::u8));
-  const Lattice badly = chosen(rounding, {1.01 * limit, 0});
+  const IntegerLattice badly = chosen(rounding, {1.01 * limit, 0});
   BOOST_TEST((badly.base == SampleType::u16));
   BOOST_TEST((badly.least == SampleType::u16));  // nor do tiles take it
   BOOST_TEST(badly.base_step() == 0x1p-7);       // the coarsest of which half is allowed
@@ -84,7 +84,7 @@ BOOST_AUTO_TEST_CASE(auto_takes_no_type_whose_filter_errs_by_more_than_rounding_
 
 BOOST_AUTO_TEST_CASE(a_tile_takes_the_finest_step_that_fits_and_none_coarser_than_the_base) {
   const std::vector<float> base = random_base(0, 1, 5);
-  const Lattice l = choose_lattice(base, StorageChoice::u8, 0);
+  const IntegerLattice l = choose_lattice(base, StorageChoice::u8, 0);
   const auto fits = [&](float lo, float hi, SampleType type) {
     return fitting_shift(lo, hi, l, type, l.base_shift);
   };
@@ -104,7 +104,7 @@ BOOST_AUTO_TEST_CASE(a_tile_takes_the_finest_step_that_fits_and_none_coarser_tha
 BOOST_AUTO_TEST_CASE(no_tile_has_a_step_finer_than_a_quarter_of_the_bases) {
   for (const double far : {0.0, 7.0, 1e6})  // from 0: a base whose own step is the file's has nothing finer
     for (const StorageChoice choice : {StorageChoice::u8, StorageChoice::u16}) {
-      const Lattice l = choose_lattice(random_base(far, far + 1, 5), choice, 0);
+      const IntegerLattice l = choose_lattice(random_base(far, far + 1, 5), choice, 0);
       const auto at = static_cast<float>(far + 0.5);
       BOOST_TEST(fitting_shift(at, at, l, SampleType::u16, l.base_shift).value() ==
                  std::max(l.base_shift - 2, 0));
@@ -114,7 +114,7 @@ BOOST_AUTO_TEST_CASE(no_tile_has_a_step_finer_than_a_quarter_of_the_bases) {
 BOOST_AUTO_TEST_CASE(a_base_holds_every_value_within_its_limits) {
   std::vector<float> base = random_base(-0.3, 1, 7);
   for (const StorageChoice choice : {StorageChoice::u8, StorageChoice::u16}) {
-    const Lattice l = choose_lattice(base, choice, 0);
+    const IntegerLattice l = choose_lattice(base, choice, 0);
     std::vector<float> moved = base;
     round_base(moved, l);
     const auto [lo, hi] = base_limits(moved, l);

@@ -96,17 +96,17 @@ BOOST_AUTO_TEST_CASE(frames_are_asked_for_by_json_of_bounded_size) {
 
 BOOST_AUTO_TEST_CASE(targets_are_names_that_we_know) {
   const auto asked = [](const std::string& rest) { return target_of("/t/" + rest).asked; };
-  BOOST_TEST((asked("") == Asked::page));
-  BOOST_TEST((asked("page.css") == Asked::style));
+  BOOST_TEST((asked("") == Resource::page));
+  BOOST_TEST((asked("page.css") == Resource::style));
   const Target frame = target_of("/t/frame/Ab1/moving");
-  BOOST_TEST((frame.asked == Asked::frame && frame.client == "Ab1" && frame.moving));
+  BOOST_TEST((frame.asked == Resource::frame && frame.client == "Ab1" && frame.moving));
   BOOST_TEST(!target_of("/t/frame/a/still").moving);
   for (const std::string rest : {"page.html", "frame", "frame/", "frame//still", "frame/a/", "frame/a/still/",
                                  "frame/a.b/still", "frame/../still", "scene.json/", "../page.js"})
-    BOOST_TEST((asked(rest) == Asked::nothing), rest);
-  BOOST_TEST((asked("frame/" + std::string(33, 'a') + "/still") == Asked::nothing));
-  BOOST_TEST((target_of("/t").asked == Asked::nothing));
-  BOOST_TEST((target_of("").asked == Asked::nothing));
+    BOOST_TEST((asked(rest) == Resource::nothing), rest);
+  BOOST_TEST((asked("frame/" + std::string(33, 'a') + "/still") == Resource::nothing));
+  BOOST_TEST((target_of("/t").asked == Resource::nothing));
+  BOOST_TEST((target_of("").asked == Resource::nothing));
 }
 
 BOOST_AUTO_TEST_CASE(tokens_differ_and_are_compared_whole) {

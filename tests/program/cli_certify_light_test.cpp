@@ -104,9 +104,8 @@ BOOST_AUTO_TEST_CASE(what_was_changed_is_found) {
     j["picture"]["head_light"] = false;
   });
   // A picture that is as drawn cannot be passed off as one under the light of F.
-  const Ended made =
-      run({"render", small_volume(), "--certify", "--size", "40x40", "--sampler", "buffer", "-o",
-           at("plain.png"), "--force"});
+  const Ended made = run({"render", small_volume(), "--certify", "--size", "40x40", "--sampler", "buffer",
+                          "-o", at("plain.png"), "--force"});
   BOOST_REQUIRE_MESSAGE(made.code == 0, made.err);
   Json json = json_of(at("plain.certificate.json"));
   json["light"] = "lit";

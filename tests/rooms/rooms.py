@@ -32,6 +32,8 @@ DOUBLE_CONSTANT = re.compile(r"(?<![\w.])(?:(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|
 # PoCL 3.1 shares such an array among all groups (device/shared_column.h).
 LOCAL_ARRAY = re.compile(r"\b__local\b[^;(){}*]*[;=\[]")
 # Long launches are cut (host/opencl/pace.hpp), which work-items do not see as long as they ask for global places.
+SCOPE_OR_TYPE = re.compile(r"^namespace ([\w:]*) ?\{|^\}  // namespace ?([\w:]*)|"
+                           r"^(?:struct|class|enum class|enum) (?:VDVR_API )?(\w+)(?: final)?(?: :[^;{]*)?\s*\{", re.M)
 # NVIDIA's compiler refuses them, as the standard does.
 VARIADIC = re.compile(r"#\s*define\s+\w+\([^)\n]*\.\.\.\s*\)")
 OF_THE_LAUNCH = re.compile(r"\bget_(?:group_id|num_groups|global_size|global_offset)\b")
@@ -102,8 +104,26 @@ def faults(root):
             for name in includes(path):
                 if name.split("/")[0] in ("host", "shared", "device", "tests"):
                     yield f"{path.relative_to(root)}: includes {name}, but only include/vdvr is public"
+    yield from faults_of_names(root)
     for path in sorted((root / "tests").glob("*.[ch]pp")):
         yield f"{path.relative_to(root)}: lies loose in tests/"
+
+
+def faults_of_names(root):
+    """Types of one name in one namespace, in two headers: nothing tells where both are linked."""
+    seen = {}
+    for path in [p for folder in ("include", "host", "apps") for p in files(root / folder, ".hpp")]:
+        scopes = []
+        for found in SCOPE_OR_TYPE.finditer(path.read_text(encoding="utf-8")):
+            opened, closed, name = found.groups()
+            if opened is not None:
+                scopes.append(opened)
+            elif closed is not None:
+                scopes = scopes[:-1]
+            else:
+                full = "::".join(scopes + [name])
+                if seen.setdefault(full, path) != path:
+                    yield f"{path.relative_to(root)}: {full} is another in {seen[full].relative_to(root)}"
 
 
 def faults_of_host_file(root, room, path):
@@ -182,6 +202,7 @@ FAULTS = [
     ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
     ("kernels/kept/fourth_differences.cl", "__kernel void h() { __local float room[32]; }\n", "is no argument"),
     ("kernels/kept/fourth_differences.cl", "__kernel void h() { int i = get_group_id(0); }\n", "may be a piece"),
+    ("host/fbp/twice.hpp", "namespace vdvr {\nstruct Grid {\n};\n}  // namespace vdvr\n", "vdvr::Grid is another in"),
     ("kernels/kept/cone_nodes.cl", "#define CALL(f, ...) f(__VA_ARGS__)\n", "which no macro of OpenCL C may"),
 ]
 

@@ -179,8 +179,8 @@ int refusal_of(const RequestHead& head, const Access& access) {
   // One answer for a wrong token and for a wrong name: who has no token learns nothing.
   if (!parts || !same_text(parts->first, access.token)) return 404;
   const Target target = target_of(head.target);
-  if (target.asked == Asked::nothing) return 404;
-  if ((head.method == "POST") != (target.asked == Asked::frame)) return 405;
+  if (target.asked == Resource::nothing) return 404;
+  if ((head.method == "POST") != (target.asked == Resource::frame)) return 405;
   if (head.method != "POST") return 0;
   // Only such a type makes a browser ask before it sends what another page wants to be sent.
   if (lower(head.content_type) != "application/json") return 415;
@@ -191,15 +191,15 @@ Target target_of(std::string_view text) {
   const auto parts = token_and_rest(text);
   if (!parts) return {};
   std::string_view rest = parts->second;
-  if (rest.empty()) return {Asked::page, {}, false};
-  if (rest == "page.js") return {Asked::script, {}, false};
-  if (rest == "page.css") return {Asked::style, {}, false};
-  if (rest == "scene.json") return {Asked::scene, {}, false};
+  if (rest.empty()) return {Resource::page, {}, false};
+  if (rest == "page.js") return {Resource::script, {}, false};
+  if (rest == "page.css") return {Resource::style, {}, false};
+  if (rest == "scene.json") return {Resource::scene, {}, false};
   const auto frame = taken(rest, "/"), client = taken(rest, "/");
   if (!frame || *frame != "frame" || !client || client->empty() || client->size() > 32) return {};
   if (!std::all_of(client->begin(), client->end(), is_word)) return {};
   if (rest != "moving" && rest != "still") return {};
-  return {Asked::frame, std::string(*client), rest == "moving"};
+  return {Resource::frame, std::string(*client), rest == "moving"};
 }
 
 }  // namespace vdvr::cli

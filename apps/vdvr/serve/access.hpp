@@ -39,9 +39,9 @@ bool is_allowed_host(std::string_view host, const std::vector<std::string>& name
 int refusal_of(const RequestHead& head, const Access& access);
 
 /// What follows the token in a target.
-enum class Asked { nothing, page, script, style, scene, frame };
+enum class Resource { nothing, page, script, style, scene, frame };
 struct Target {
-  Asked asked = Asked::nothing;
+  Resource asked = Resource::nothing;
   std::string client;   ///< of a frame: 1 to 32 letters and digits
   bool moving = false;  ///< of a frame
 };

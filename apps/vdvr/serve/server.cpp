@@ -47,13 +47,13 @@ class Allowance {
   std::chrono::steady_clock::time_point at_ = std::chrono::steady_clock::now();
 };
 
-const char* media_type(Asked asked) {
+const char* media_type(Resource asked) {
   switch (asked) {
-    case Asked::script:
+    case Resource::script:
       return "text/javascript; charset=utf-8";
-    case Asked::style:
+    case Resource::style:
       return "text/css; charset=utf-8";
-    case Asked::scene:
+    case Resource::scene:
       return "application/json";
     default:
       return "text/html; charset=utf-8";
@@ -123,16 +123,16 @@ struct Server::Impl {
   Answer answer(const RequestHead& head, const std::string& body) {
     const Target target = target_of(head.target);
     try {
-      return target.asked == Asked::frame ? draw(target, body) : file(target.asked);
+      return target.asked == Resource::frame ? draw(target, body) : file(target.asked);
     } catch (const std::exception&) {
       return refusal(500, "this cannot be answered");
     }
   }
 
-  [[nodiscard]] Answer file(Asked asked) const {
-    const std::string_view text = asked == Asked::scene    ? std::string_view(options.scene)
-                                  : asked == Asked::script ? page_file("page.js")
-                                  : asked == Asked::style  ? page_file("page.css")
+  [[nodiscard]] Answer file(Resource asked) const {
+    const std::string_view text = asked == Resource::scene    ? std::string_view(options.scene)
+                                  : asked == Resource::script ? page_file("page.js")
+                                  : asked == Resource::style  ? page_file("page.css")
                                                            : page_file("page.html");
     return {200, media_type(asked), std::string(text)};
   }
