@@ -8,6 +8,7 @@
 #include <cmath>
 #include <future>
 
+#include "host/render/raycast.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
 
@@ -122,6 +123,28 @@ BOOST_AUTO_TEST_CASE(what_a_renderer_drew_before_never_shows) {
   const ResidentVolume resident(device, volume());
   for (const std::size_t first : {0, 2, 5})
     BOOST_TEST(draw_and_compare(device, resident, options, alone, first, 2) == 0);
+}
+
+// Bytes and values are made on the device, four pixels at a time; on the host where several devices share a
+// picture. Of pixels that are no multiple of four, of colours beyond 0 and 1, and where nothing is met.
+BOOST_AUTO_TEST_CASE(the_device_develops_as_the_host_does) {
+  const ResidentVolume resident(support::device(), volume());
+  for (const RenderMode mode : {RenderMode::dvr, RenderMode::iso, RenderMode::mip, RenderMode::slice})
+    for (const auto& [width, height] : {std::pair{1, 1}, {33, 31}, {6, 5}, {64, 48}}) {
+      RenderOptions o = pictures(false).front();
+      o.mode = mode;
+      o.width = width;
+      o.height = height;
+      o.camera = orbit_camera(volume().grid, 37, 21, 0.4);
+      o.background_top = {1.25, -0.25, 0.5};
+      RenderResult on_host;
+      convert(raycast_float(support::device(), resident, o).pixels, o, on_host);
+      const RenderResult on_device = raycast(support::device(), resident, o);
+      BOOST_TEST((on_device.image.rgb == on_host.image.rgb));
+      BOOST_TEST(std::ranges::equal(on_device.values.values, on_host.values.values, [](float x, float y) {
+        return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
+      }));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(renderers_in_two_threads_give_the_pictures_of_one) {
