@@ -76,7 +76,8 @@ class DirectFilter {
                const Units& units = {});
   DirectFilter(const DirectFilter&) = delete;  // the filter refers to the geometry
   DirectFilter& operator=(const DirectFilter&) = delete;
-  /// Nothing where the slab needs upsampling. Cost: RowFilter's. Throws InputError for a view that is not finite.
+  /// Nothing where the slab needs upsampling. Cost: RowFilter's. Throws InputError for a view that is not
+  /// finite.
   std::optional<UpsampledSlab> operator()(const UpsampledColumns& columns, std::span<const double> rows,
                                           const Progress& progress);
 

@@ -1,8 +1,8 @@
 // The pieces of the ramp filter around the FFT along u: zero-padding, the product with the kernel's real
 // spectrum, and the crop that turns rows [view][v][u] into columns [view][u][v] with v contiguous, or into
 // columns that are cut along v (shared/chunks.h), as back-projection reads them (method: linear convolution,
-// docs/geometry.md). VDVR_DOUBLE 1: in double precision, rounded once, to the float that
-// is stored. Called by host/fbp/filter_rows.cpp.
+// docs/geometry.md). VDVR_DOUBLE 1: in double precision, rounded once, to the float that is stored. Called by
+// host/fbp/filter_rows.cpp.
 #include "shared/filter_rows.h"
 
 #ifndef VDVR_DOUBLE
