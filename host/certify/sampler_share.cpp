@@ -14,9 +14,6 @@ constexpr double reserve = 1.25;
 // How often a volume may be brought within a smaller tolerance, and how often begun anew for it.
 constexpr int most_times = 4, most_begun_anew = 3;
 
-// Weights of the class that takes no more than rounding does (probe_sampler.cpp).
-constexpr double fp32_weights = 0x1p-22;
-
 double worse_of(const SamplerTerms& sampler) {
   return std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
 }
@@ -33,7 +30,7 @@ SamplerShare::SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& pla
       charges_(plan.settings.comparison.terms != Terms::grid) {
   for (const Crew::Kind& kind : kinds) {
     SamplerTerms sampler = terms(kind, base, longest_atlas(kind.info));
-    const bool coarse = sampler.image3d && (kind.probe.delta > fp32_weights || buffer_alone);
+    const bool coarse = sampler.image3d && (!kind.probe.weighs_in_fp32() || buffer_alone);
     if (coarse) sampler.image3d.reset();
     coarse_ = coarse_ || coarse;
     reserved_ = std::max(reserved_, reserve * worse_of(sampler));

@@ -67,8 +67,8 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
                          const UpsampledColumns& columns, std::int64_t rows);
 
 /// Slabs straight from the scan, where columns and rows are the detector's own and the device does the
-/// filtering: the filtered scan stays there. The values are those of filter_projections in fp32 and Upsampler;
-/// of products to the bit, of transforms within the error that these are charged for.
+/// filtering: the filtered scan stays there. The values are those of filter_projections in fp32 and
+/// Upsampler; of products to the bit, of transforms within the error that these are charged for.
 class DirectFilter {
  public:
   /// Keeps references to the state and the scan. Samples are in `units`.

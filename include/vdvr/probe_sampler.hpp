@@ -23,6 +23,8 @@ struct FilterProbe {
   /// rho: largest error on constant, affine and random tiles beyond delta, relative to the largest sample, or
   /// to the format's whole scale where it is normalised.
   double constant_error = 0;
+  /// Whether it errs by no more than fp32 does; the weights of texture units have few bits.
+  [[nodiscard]] bool weighs_in_fp32() const { return delta <= 0x1p-22; }
 };
 
 /// The device's image3d sampler. What it inherits is that of CL_FLOAT.

@@ -12,6 +12,7 @@
 #include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
+#include "vdvr/probe_sampler.hpp"
 
 using namespace vdvr;
 namespace support = vdvr::testing;
@@ -138,10 +139,13 @@ BOOST_AUTO_TEST_CASE(what_is_asked_twice_or_beyond_the_plan_s_epsilon_ends) {
   BOOST_TEST(calls == 2);
   const std::vector<float> asked = half_of(result.volume, finest * c.range()),
                            bounds = brick_bounds(result.certificate, false);
-  // What the buffer takes of the refined volume was not known when this was as far as the plan goes.
-  const auto buffer = static_cast<float>(result.certificate.budget.sampler.buffer.value);
+  // Where little was reserved (for the buffer alone), the buffer may take more of the refined volume: as far
+  // as the plan goes is short of that.
+  const double more =
+      probe_filters(c.device).weighs_in_fp32() ? 0 : result.certificate.budget.sampler.buffer.value;
   for (std::size_t i = 0; i < asked.size(); ++i)
-    if (std::isfinite(bounds[i])) BOOST_TEST(bounds[i] <= asked[i] + buffer);
+    if (std::isfinite(bounds[i]))
+      BOOST_TEST(static_cast<double>(bounds[i]) <= static_cast<double>(asked[i]) + more);
 }
 
 BOOST_AUTO_TEST_CASE(a_refinement_of_other_bricks_is_refused) {

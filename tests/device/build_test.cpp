@@ -89,7 +89,7 @@ void check_certificate(const ProjectionSet& scan, const Built& built, const std:
   BOOST_TEST(c.holds_buffer);
   // Weights of 8 bits can be too coarse for a tolerance; then the certificate says so.
   BOOST_TEST(c.holds_image3d.value_or(true) == (c.total_image3d.value_or(0) <= c.epsilon_abs));
-  static const bool exact_weights = probe_filters(support::device()).delta <= 0x1p-22;
+  static const bool exact_weights = probe_filters(support::device()).weighs_in_fp32();
   if (exact_weights) BOOST_TEST(c.holds_image3d.value_or(true));
   BOOST_TEST(c.total_buffer <= c.epsilon_abs);
   BOOST_TEST(c.measured_max <= c.measured_total);
@@ -520,7 +520,7 @@ double node_tolerance_of(const Built& built) {
   const SamplerTerms t = sampler_terms(field_slopes(as_mixed(plan.base)), plan.grid, probe,
                                        longest_atlas(device.info()), plan.epsilon_abs, plan.rates.gold);
   // Of coarse weights nothing is reserved: bricks are raised for them.
-  const double image3d = t.image3d && probe.delta <= 0x1p-22 ? t.image3d->value : 0.0;
+  const double image3d = t.image3d && probe.weighs_in_fp32() ? t.image3d->value : 0.0;
   return plan.epsilon_abs - built.result.certificate.budget.arithmetic.value -
          1.25 * std::max(t.buffer.value, image3d);
 }

@@ -153,9 +153,9 @@ BOOST_AUTO_TEST_CASE(bricks_of_more_noise_take_fewer_samples_than_one_tolerance_
   BOOST_TEST(samples(built(2.5)) < samples(built(1)));
 }
 
-BOOST_AUTO_TEST_CASE(what_is_foreseen_is_what_is_stored) {
-  // Bricks that are raised for a coarse texture unit are not foreseen.
-  if (!vdvr::support::filters_exactly()) return;
+// Bricks that are raised for a coarse texture unit are not foreseen.
+BOOST_AUTO_TEST_CASE(what_is_foreseen_is_what_is_stored,
+                     *boost::unit_test::precondition(vdvr::support::on_fp32_weights)) {
   PlanInSigma plan = make_plan_in_sigma(vdvr::support::device(), noisy_scan(), 1, stated_noise());
   const double stored = storage_of(built(1).volume, false).samples_ratio;
   // Raising after closing is not foreseen, and bricks are sampled: plans are held to a fifth elsewhere too.

@@ -139,8 +139,10 @@ double largest(const Unit& unit, const Truth& truth, const std::string& volume, 
 
 }  // namespace
 
+// The builder weighs in fp32, the unit of the layer by few bits.
+BOOST_AUTO_TEST_SUITE(a_coarser_unit, *boost::unit_test::precondition(on_fp32_weights))
+
 BOOST_AUTO_TEST_CASE(what_the_file_says_of_its_builder_is_false_of_a_coarser_unit) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   const Truth truth(tight());
   const Certificate& c = truth.file.certificate;
   BOOST_REQUIRE(c.holds_image3d.value_or(false));
@@ -155,7 +157,6 @@ BOOST_AUTO_TEST_CASE(what_the_file_says_of_its_builder_is_false_of_a_coarser_uni
 }
 
 BOOST_AUTO_TEST_CASE(an_image3d_that_does_not_hold_here_is_refused_by_name_and_nothing_is_written) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   for (const int bits : {4, 8})
     for (const Words& how : {Words{}, Words{"--certify", "--no-shading"}, Words{"--mode", "slice"},
                              Words{"--show", "error"}, Words{"--certify", "--mode", "iso"}}) {
@@ -173,7 +174,6 @@ BOOST_AUTO_TEST_CASE(an_image3d_that_does_not_hold_here_is_refused_by_name_and_n
 }
 
 BOOST_AUTO_TEST_CASE(without_a_name_the_picture_is_the_buffer_s_to_the_bit) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   for (const double z : kSlices)
     BOOST_TEST((slice_on(unit_of(4), tight(), "auto", z) == slice_on(kPlain, tight(), "buffer", z)));
   const Json said =
@@ -184,7 +184,6 @@ BOOST_AUTO_TEST_CASE(without_a_name_the_picture_is_the_buffer_s_to_the_bit) {
 }
 
 BOOST_AUTO_TEST_CASE(verify_tells_a_builder_s_false_term_from_another_device_s_unit) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   const Json elsewhere =
       json_on(unit_of(8), {"verify", tight(), "--projections", scan_file()}).at("samplers");
   BOOST_TEST(elsewhere.at("buffer").at("holds") == true);
@@ -201,7 +200,6 @@ BOOST_AUTO_TEST_CASE(verify_tells_a_builder_s_false_term_from_another_device_s_u
 }
 
 BOOST_AUTO_TEST_CASE(an_image3d_that_holds_here_is_charged_what_this_unit_errs_by) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   const Unit unit = unit_of(8);
   const Truth truth(loose());
   const Certificate& c = truth.file.certificate;
@@ -241,7 +239,6 @@ BOOST_AUTO_TEST_CASE(an_image3d_that_holds_here_is_charged_what_this_unit_errs_b
 }
 
 BOOST_AUTO_TEST_CASE(a_build_on_a_coarse_unit_holds_for_both_samplers_and_costs_little_more) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   const auto samples = [](const std::string& volume) {
     return json_on(kPlain, {"info", volume}).at("storage").at("samples_ratio").get<double>();
   };
@@ -259,7 +256,6 @@ BOOST_AUTO_TEST_CASE(a_build_on_a_coarse_unit_holds_for_both_samplers_and_costs_
 }
 
 BOOST_AUTO_TEST_CASE(auto_storage_takes_no_type_that_the_unit_filters_badly) {
-  if (!filters_exactly()) return;  // the builder weighs in fp32, the unit of the layer by few bits
   const Json probe =
       json_on(kBadlyU8, {"devices", "--device", "0", "--probe"}).at("devices").at(0).at("probe");
   BOOST_TEST(probe.at("f32").at("delta").get<double>() <= 0x1p-22);
@@ -275,3 +271,5 @@ BOOST_AUTO_TEST_CASE(auto_storage_takes_no_type_that_the_unit_filters_badly) {
   for (const auto& [kind, block] : badly.volume.tiles) BOOST_TEST((block.type != SampleType::u8));
   BOOST_TEST(badly.certificate.holds_image3d.value_or(false));
 }
+
+BOOST_AUTO_TEST_SUITE_END()

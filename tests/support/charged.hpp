@@ -1,6 +1,8 @@
 // What a certificate charges for the samplers of a field on the device of a test.
 #pragma once
 
+#include <boost/test/unit_test.hpp>
+
 #include "host/sampler/sampler_terms.hpp"
 #include "tests/support/device.hpp"
 #include "vdvr/probe_sampler.hpp"
@@ -16,6 +18,12 @@ inline double charged_between_samplers(const MixedVolume& v) {
 }
 
 /// Whether the filter weighs as fp32 does; texture units weigh by 8 bits.
-inline bool filters_exactly() { return probe_sampler(device()).delta <= 0x1p-22; }
+inline bool filters_exactly() { return probe_filters(device()).weighs_in_fp32(); }
+
+/// A precondition of tests that take a builder without a coarse texture unit for granted; others are skipped
+/// by name.
+inline boost::test_tools::assertion_result on_fp32_weights(boost::unit_test::test_unit_id) {
+  return filters_exactly();
+}
 
 }  // namespace vdvr::support

@@ -133,7 +133,7 @@ struct Server::Impl {
     const std::string_view text = asked == Resource::scene    ? std::string_view(options.scene)
                                   : asked == Resource::script ? page_file("page.js")
                                   : asked == Resource::style  ? page_file("page.css")
-                                                           : page_file("page.html");
+                                                              : page_file("page.html");
     return {200, media_type(asked), std::string(text)};
   }
 
