@@ -159,7 +159,7 @@ void print_budget(const ErrorBudget& budget, double epsilon_abs) {
 
 void print_noise_record(const Certificate& c) {
   const NoiseRecord& n = *c.noise;
-  const double worst = worst_in_sigma(c, c.budget.sampler.buffer.value);
+  const double worst = worst_in_sigma(c, false);
   fmt::print("  noise        sigma of F {:.4g} ({:.4g} to {:.4g}), estimated from {}{}\n", n.median, n.least,
              n.largest, n.source, n.photons > 0 ? fmt::format(": {:.4g} photons a pixel", n.photons) : "");
   if (worst > 0 && !c.comparison)

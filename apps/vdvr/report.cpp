@@ -185,7 +185,7 @@ std::string in_sigma(const Certificate& c) {
       "<li>In units of the scan's own noise: interpolation errs by at most {} sigma of the brick{}{}. Sigma, "
       "the "
       "standard deviation of F, runs from {} to {}, {} in the middle: an estimate, from {}.</li>\n",
-      number_html(worst_in_sigma(c, c.budget.sampler.buffer.value), "noise.worst.buffer"),
+      number_html(worst_in_sigma(c, false), "noise.worst.buffer"),
       n.tolerance_sigmas ? fmt::format(", where {} was asked for", number_text(*n.tolerance_sigmas)) : "",
       n.rms_in_sigma
           ? fmt::format(" ({} in the root mean square, estimated at {} points): the noise of this volume is "

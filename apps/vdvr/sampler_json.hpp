@@ -6,7 +6,8 @@
 
 namespace vdvr::cli {
 
-/// Its name `sampler`, `value` and `method`; null where the certificate has none.
+/// Its name `sampler`, `value` and `method`; null where the certificate has none. The texture unit's is each
+/// brick's own: the largest of them.
 Json sampler_term_json(const Certificate& certificate, bool image3d);
 
 }  // namespace vdvr::cli

@@ -69,10 +69,9 @@ Json noise(const Certificate& c) {
                 {"largest", finite("noise.sigma.largest", n.largest)}};
   if (n.tolerance_sigmas) j["tolerance_sigmas"] = finite("noise.tolerance_sigmas", *n.tolerance_sigmas);
   if (!c.comparison && !c.brick_totals.empty() && !c.brick_sigma.empty()) {
-    const SamplerTerms& sampler = c.budget.sampler;
-    j["worst"]["buffer"] = finite("noise.worst.buffer", worst_in_sigma(c, sampler.buffer.value));
-    if (sampler.image3d)
-      j["worst"]["image3d"] = finite("noise.worst.image3d", worst_in_sigma(c, sampler.image3d->value));
+    j["worst"]["buffer"] = finite("noise.worst.buffer", worst_in_sigma(c, false));
+    if (c.budget.sampler.image3d)
+      j["worst"]["image3d"] = finite("noise.worst.image3d", worst_in_sigma(c, true));
   }
   if (n.rms_in_sigma)
     j["rms"] = {{"sigmas", finite("noise.rms.sigmas", *n.rms_in_sigma)}, {"points", n.rms_points}};
@@ -239,6 +238,8 @@ void read_noise(const Member& m, Certificate& c) {
     if (!(*n.rms_in_sigma >= 0 && n.rms_points > 0))
       throw FileError("certificate: member 'noise.rms' is no mean of any points");
   }
+  if (m.has("worst") && m.at("worst").has("image3d"))
+    n.worst_image3d = m.at("worst").at("image3d").number();
   n.sha256 = m.at("brick_sigma_sha256").text();
 }
 
@@ -304,8 +305,8 @@ std::string contradiction(const Certificate& c) {
                : "";
   const bool image_fits =
       !c.total_image3d || !c.holds_image3d || !c.budget.sampler.image3d ||
-      *c.holds_image3d == within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
-  if (c.holds_buffer != within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value) || !image_fits)
+      *c.holds_image3d == within_tolerance(c, *c.total_image3d, true);
+  if (c.holds_buffer != within_tolerance(c, c.total_buffer, false) || !image_fits)
     return fmt::format(
         "'holds' does not follow from total and epsilon_abs {}{}", c.epsilon_abs,
         c.noise && c.noise->tolerance_sigmas ? ", or not from the bounds and sigma of bricks" : "");
@@ -327,18 +328,49 @@ std::string contradiction(const Certificate& c) {
   return {};
 }
 
-double worst_in_sigma(const Certificate& c, double sampler) {
+namespace {
+
+// What a bound of a brick holds beside the brick's total.
+double beside_total(const Certificate& c, std::size_t brick, bool image3d) {
+  const SamplerTerms& sampler = c.budget.sampler;
+  return c.budget.arithmetic.value +
+         (image3d ? static_cast<double>(sampler.image3d_by_brick[brick]) : sampler.buffer.value);
+}
+
+}  // namespace
+
+double worst_in_sigma(const Certificate& c, bool image3d) {
+  if (image3d && c.budget.sampler.image3d_by_brick.empty())
+    return c.noise ? c.noise->worst_image3d.value_or(0) : 0;
   double worst = 0;
   for (std::size_t i = 0; i < std::min(c.brick_totals.size(), c.brick_sigma.size()); ++i)
     if (c.brick_totals[i] >= 0)
-      worst = std::max(worst, (static_cast<double>(c.brick_totals[i]) + c.budget.arithmetic.value + sampler) /
+      worst = std::max(worst, (static_cast<double>(c.brick_totals[i]) + beside_total(c, i, image3d)) /
                                   static_cast<double>(c.brick_sigma[i]));
   return worst;
 }
 
-bool within_tolerance(const Certificate& c, double total, double sampler) {
+bool within_tolerance(const Certificate& c, double total, bool image3d) {
   if (!(total <= c.epsilon_abs)) return false;
-  return !c.noise || !c.noise->tolerance_sigmas || worst_in_sigma(c, sampler) <= *c.noise->tolerance_sigmas;
+  return !c.noise || !c.noise->tolerance_sigmas || worst_in_sigma(c, image3d) <= *c.noise->tolerance_sigmas;
+}
+
+void charge_samplers(Certificate& c, SamplerTerms samplers) {
+  c.budget.sampler = std::move(samplers);
+  const double sum = c.measured_total + c.budget.arithmetic.value;
+  c.total_buffer = sum + c.budget.sampler.buffer.value;
+  c.total_image3d.reset();
+  if (!c.budget.sampler.image3d) return;
+  const std::vector<float>& by_brick = c.budget.sampler.image3d_by_brick;
+  double largest = by_brick.empty() ? c.measured_total + c.budget.sampler.image3d->value : 0;
+  for (std::size_t i = 0; i < by_brick.size(); ++i) {
+    // Files of earlier versions have no totals by brick.
+    const double total = c.brick_totals.empty() ? c.measured_total : static_cast<double>(c.brick_totals.at(i));
+    if (total >= 0) largest = std::max(largest, total + static_cast<double>(by_brick[i]));
+  }
+  const double above = std::max(0.0, largest - c.measured_total);
+  c.budget.sampler.image3d->value = above;
+  c.total_image3d = sum + above;
 }
 
 std::string sigma_sha256(const std::vector<float>& brick_sigma) {
@@ -417,16 +449,14 @@ std::vector<float> brick_bounds(const Certificate& c, bool image3d) {
     throw InputError(
         "the file has no bounds by brick: an earlier version wrote it, or nothing is certified; build it "
         "again");
-  if (image3d && !c.budget.sampler.image3d)
-    throw InputError("the certificate says nothing of the image3d sampler; take `sampler` buffer");
-  const double rest =
-      c.budget.arithmetic.value + (image3d ? *c.budget.sampler.image3d : c.budget.sampler.buffer).value;
-  std::vector<float> bounds(c.brick_totals.size());
-  std::transform(c.brick_totals.begin(), c.brick_totals.end(), bounds.begin(), [&](float total) {
-    if (total < 0) return std::numeric_limits<float>::infinity();
-    return std::nextafter(static_cast<float>(static_cast<double>(total) + rest),
-                          std::numeric_limits<float>::infinity());
-  });
+  if (image3d && c.budget.sampler.image3d_by_brick.size() != c.brick_totals.size())
+    throw InputError(
+        "the certificate says nothing of the image3d sampler of this device; take `sampler` buffer");
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  std::vector<float> bounds(c.brick_totals.size(), infinity);
+  for (std::size_t i = 0; i < bounds.size(); ++i)
+    if (const auto total = static_cast<double>(c.brick_totals[i]); total >= 0)
+      bounds[i] = std::nextafter(static_cast<float>(total + beside_total(c, i, image3d)), infinity);
   return bounds;
 }
 

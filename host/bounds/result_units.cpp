@@ -2,32 +2,29 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 namespace vdvr {
 namespace {
 
-void scale(std::optional<double>& value, int exponent) {
-  if (value) value = std::ldexp(*value, exponent);
+// What rounds below the normal numbers rounds up: a bound stays one.
+void scale_bounds(std::vector<float>& bounds, int exponent) {
+  for (float& bound : bounds) {
+    if (bound < 0) continue;  // not tested
+    const float scaled = std::ldexp(bound, exponent);
+    bound = std::ldexp(scaled, -exponent) < bound ? std::nextafter(scaled, INFINITY) : scaled;
+  }
 }
 
 void scale(ErrorBudget& b, int exponent) {
   for (ErrorTerm* term : {&b.grid, &b.gold, &b.projection, &b.arithmetic, &b.sampler.buffer})
     term->value = std::ldexp(term->value, exponent);
   if (b.sampler.image3d) b.sampler.image3d->value = std::ldexp(b.sampler.image3d->value, exponent);
+  scale_bounds(b.sampler.image3d_by_brick, exponent);
 }
 
 void scale(std::vector<Bound>& bounds, int exponent) {
   for (Bound& b : bounds) b.value = std::ldexp(b.value, exponent);
-}
-
-// What rounds below the normal numbers rounds up: a bound stays one.
-void scale_bounds(std::vector<float>& totals, int exponent) {
-  for (float& total : totals) {
-    if (total < 0) continue;  // not tested
-    const float scaled = std::ldexp(total, exponent);
-    total = std::ldexp(scaled, -exponent) < total ? std::nextafter(scaled, INFINITY) : scaled;
-  }
 }
 
 }  // namespace
@@ -54,9 +51,8 @@ Certificate to_world(Certificate c, const Units& units) {
   // `covered` was taken from the scan as it is, in world units.
   const int density = units.density();
   for (double* value :
-       {&c.epsilon_abs, &c.reference_range, &c.total_buffer, &c.measured_max, &c.measured_total})
+       {&c.epsilon_abs, &c.reference_range, &c.measured_max, &c.measured_total})
     *value = to_world(*value, units);
-  scale(c.total_image3d, density);
   scale(c.budget, density);
   scale(c.bounds, density);
   scale_bounds(c.brick_totals, density);
@@ -65,12 +61,10 @@ Certificate to_world(Certificate c, const Units& units) {
   for (const float total : c.brick_totals)
     more = std::max(more, static_cast<double>(total) * (1 - 0x1p-21) - c.measured_total);
   c.measured_total += more;
-  c.total_buffer += more;
+  charge_samplers(c, std::exchange(c.budget.sampler, {}));
   c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
-  if (c.total_image3d) {
-    *c.total_image3d += more;
+  if (c.total_image3d)
     c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
-  }
   c.worst_at = to_world(c.worst_at, units);
   if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
   if (c.roi) c.roi = to_world(*c.roi, units);

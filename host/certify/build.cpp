@@ -393,18 +393,16 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     if (asked && by_brick) return refinement->with_bricks(samplers.now());
     refined = asked;
     if (refined) return std::nullopt;
-    const std::optional<double> less = samplers.smaller(result.certificate);
-    if (!less) return std::nullopt;
-    return refinement ? refinement->with_bricks(*less) : NodeTolerance(*less);
+    std::optional<NodeTolerance> less = samplers.smaller(result.certificate, measured.bricks);
+    if (less && refinement) less->lower_to(refinement->with_bricks(less->of_all));
+    return less;
   };
   // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
   const auto volume_on = [&](const IntegerLattice& lattice) {
     for (;;) {
-      const double tolerance = samplers.begin();
-      MixedVolume volume =
-          measured_volume(in, base, lattice, refinement ? refinement->with_bricks(tolerance) : tolerance,
-                          accept, share)
-              .volume;
+      NodeTolerance tolerance = samplers.begin();
+      if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
+      MixedVolume volume = measured_volume(in, base, lattice, tolerance, accept, share).volume;
       if (!refined && !samplers.anew()) return volume;
     }
   };

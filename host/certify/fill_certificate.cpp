@@ -73,16 +73,12 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
                              ? "sups of |q|: six taps in u, 16 taps from kept gold"
                              : "sups of |q_uu| and of |q|: interpolation in u, 16 taps from kept gold"};
   c.budget.arithmetic = {in.arithmetic, "rounding in fp32 from the ramp filter to back-projection"};
-  c.budget.sampler = sampler;
-  c.total_buffer = c.measured_total + c.budget.arithmetic.value + sampler.buffer.value;
+  charge_samplers(c, sampler);
   c.comparison = plan.settings.comparison.is_never_certified();
   // Of a volume without a tested node nothing is certified.
   const bool certified = !c.comparison && worst;
   c.holds_buffer = certified && c.total_buffer <= c.epsilon_abs;
-  if (sampler.image3d) {
-    c.total_image3d = c.measured_total + c.budget.arithmetic.value + sampler.image3d->value;
-    c.holds_image3d = certified && *c.total_image3d <= c.epsilon_abs;
-  }
+  if (c.total_image3d) c.holds_image3d = certified && *c.total_image3d <= c.epsilon_abs;
   c.rates = plan.rates;
   c.bounds = plan.bounds;
   c.field = plan.field;

@@ -173,15 +173,15 @@ void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
                         .largest = range.largest,
                         .tolerance_sigmas = multiple,
                         .rms_in_sigma = {},
+                        .worst_image3d = {},
                         .sha256 = sigma_sha256(sigma.of_brick)};
   c.brick_sigma = sigma.of_brick;
   if (!multiple || c.comparison) return;
-  c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, c.budget.sampler.buffer.value);
+  c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, false);
   if (c.total_image3d && c.holds_image3d)
-    c.holds_image3d =
-        *c.holds_image3d && within_tolerance(c, *c.total_image3d, c.budget.sampler.image3d->value);
+    c.holds_image3d = *c.holds_image3d && within_tolerance(c, *c.total_image3d, true);
   if (!c.holds_buffer) {
-    const double worst = worst_in_sigma(c, c.budget.sampler.buffer.value);
+    const double worst = worst_in_sigma(c, false);
     throw ToleranceError(
         fmt::format("a brick's bound is {:.4g} of its sigma, where {:.4g} is asked: allow "
                     "at least {:.3g}sigma",

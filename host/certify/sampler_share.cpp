@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "host/bounds/result_units.hpp"
 
@@ -11,11 +13,20 @@ namespace {
 
 // What is reserved may be short of what the volume takes that was brought within it.
 constexpr double reserve = 1.25;
-// How often a volume may be brought within a smaller tolerance, and how often begun anew for it.
-constexpr int most_times = 4, most_begun_anew = 3;
+// How often a volume may be brought within a smaller tolerance: of all bricks, and where each has its own, which
+// rises by a level at a time.
+constexpr int most_times = 4, most_times_by_brick = 16;
 
 double worse_of(const SamplerTerms& sampler) {
   return std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
+}
+
+// How far |V - gold| may lie from 0 on finer samples, so that there is room for the unit beside it. Steps, and
+// with them what the unit takes, fall with the spacing of samples, |V - gold| with its square: error x^2 + image
+// x = left.
+double beside_finer(double error, double image, double left) {
+  const double x = 2 * left / (image + std::sqrt(image * image + 4 * error * left));
+  return error * x * x;
 }
 
 }  // namespace
@@ -35,7 +46,7 @@ SamplerShare::SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& pla
     coarse_ = coarse_ || coarse;
     reserved_ = std::max(reserved_, reserve * worse_of(sampler));
   }
-  start_ = first_tolerance(epsilon_abs);
+  start_ = NodeTolerance(first_tolerance(epsilon_abs));
 }
 
 SamplerTerms SamplerShare::terms(const Crew::Kind& kind, const FieldSlopes& slopes,
@@ -50,11 +61,16 @@ SamplerTerms SamplerShare::of(const MixedVolume& volume) const {
     return terms(kind, slopes, atlas_length(kind.info, volume));
   };
   SamplerTerms worst = terms_of(kinds_.front());
-  for (std::size_t i = 1; i < kinds_.size(); ++i) {
-    const SamplerTerms other = terms_of(kinds_[i]);
+  for (std::size_t k = 1; k < kinds_.size(); ++k) {
+    SamplerTerms other = terms_of(kinds_[k]);
     if (other.buffer.value > worst.buffer.value) worst.buffer = other.buffer;
-    if (other.image3d && (!worst.image3d || other.image3d->value > worst.image3d->value))
+    if (!other.image3d) continue;
+    if (!worst.image3d || other.image3d->value > worst.image3d->value) {
       worst.image3d = other.image3d;
+      std::swap(worst.image3d_by_brick, other.image3d_by_brick);
+    }
+    for (std::size_t i = 0; i < other.image3d_by_brick.size(); ++i)
+      worst.image3d_by_brick[i] = std::max(worst.image3d_by_brick[i], other.image3d_by_brick[i]);
   }
   return worst;
 }
@@ -80,13 +96,15 @@ double SamplerShare::first_tolerance(double epsilon_abs) const {
   return left_or_throw(reserved_, epsilon_abs);
 }
 
-double SamplerShare::begin() {
+NodeTolerance SamplerShare::begin() {
   times_ = 0;
   anew_ = false;
-  return now_ = start_;
+  now_ = start_.of_all;
+  return start_;
 }
 
-std::optional<double> SamplerShare::smaller(const Certificate& measured) {
+std::optional<NodeTolerance> SamplerShare::smaller(const Certificate& measured,
+                                                   const std::vector<BrickMeasure>& bricks) {
   const SamplerTerms& sampler = measured.budget.sampler;
   const bool image3d = wants_image3d_ && !measured.holds_image3d.value_or(true);
   if ((measured.holds_buffer && !image3d) || measured.comparison) return std::nullopt;
@@ -95,30 +113,39 @@ std::optional<double> SamplerShare::smaller(const Certificate& measured) {
     return now_ = left_or_throw(reserve * sampler.buffer.value, epsilon_abs_);
   }
   raised_for_image3d_ = true;
-  if (coarse_) {
-    // Steps between samples shrink with what is refined, and the unit's share of them: where it seems to take
-    // all, half is tried.
-    const double beside = left(sampler.image3d->value, epsilon_abs_);
-    const bool anew = begun_anew_ == 0 || beside < now_ / 2;
-    now_ = std::max(beside, now_ / 2);
-    if (anew && begun_anew_++ < most_begun_anew) {
-      anew_ = true;
-      start_ = now_;
-      return std::nullopt;
-    }
-  } else {
-    now_ = left_or_throw(reserve * sampler.image3d->value, epsilon_abs_);
-  }
-  if (times_++ == most_times)
+  if (times_++ == (coarse_ ? most_times_by_brick : most_times))
     throw NoRoomForImage3d(fmt::format("the texture unit may err by {:.4g} of epsilon {:.4g}",
                                        to_world(sampler.image3d->value, units_),
                                        to_world(epsilon_abs_, units_)));
-  return now_;
+  if (coarse_) return smaller_for_coarse(measured, bricks);
+  return now_ = left_or_throw(reserve * sampler.image3d->value, epsilon_abs_);
+}
+
+// Bricks that the unit's own share takes beyond epsilon. Begun anew they are classified beside what it will take
+// of finer samples; what still is beyond rises.
+std::optional<NodeTolerance> SamplerShare::smaller_for_coarse(const Certificate& measured,
+                                                              const std::vector<BrickMeasure>& bricks) {
+  const std::vector<float>& images = measured.budget.sampler.image3d_by_brick;
+  const double all = left(0, epsilon_abs_);
+  NodeTolerance tolerance(now_, std::vector<float>(bricks.size(), std::numeric_limits<float>::infinity()));
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const auto total = static_cast<double>(measured.brick_totals[i]), image = static_cast<double>(images[i]);
+    if (total < 0 || total + image <= all) continue;
+    const auto slack = static_cast<double>(bricks[i].slack);
+    const double error = std::max(total - slack, 0.0), room = std::max(all - slack, 0.0);
+    // What is to rise errs by more than it may.
+    const double within = begun_anew_ ? std::max(room - image, error / 2) : beside_finer(error, image, room);
+    tolerance.by_brick[i] = static_cast<float>(slack + within);
+  }
+  if (begun_anew_) return tolerance;
+  begun_anew_ = anew_ = true;
+  start_ = std::move(tolerance);
+  return std::nullopt;
 }
 
 void SamplerShare::give_up_image3d() {
   wants_image3d_ = raised_for_image3d_ = false;
-  start_ = first_tolerance(epsilon_abs_);
+  start_ = NodeTolerance(first_tolerance(epsilon_abs_));
 }
 
 }  // namespace vdvr

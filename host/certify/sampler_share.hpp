@@ -1,6 +1,6 @@
 // What a build leaves of epsilon for the samplers of its devices (docs/error-bounds.md, section 8). What they
-// take is known only of a volume that is stored; the texture unit's part can be many times the buffer's, and
-// falls as bricks with steep samples are refined. Called by build.cpp.
+// take is known only of a volume that is stored; the texture unit's part can be many times the buffer's. It
+// is each brick's own, and falls as bricks with steep samples are refined. Called by build.cpp.
 #pragma once
 
 #include <limits>
@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "host/crew/crew.hpp"
+#include "host/gold/gold_batch.hpp"
+#include "host/gold/node_tolerance.hpp"
 #include "host/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/certificate.hpp"
@@ -37,7 +39,7 @@ class SamplerShare {
   /// buffer, where the texture unit would take more than an eighth of `tolerance`.
   [[nodiscard]] double beside_nodes(const SamplerTerms& sampler,
                                     double tolerance = std::numeric_limits<double>::infinity()) const;
-  /// What nodes are brought within now.
+  /// What nodes of all bricks are brought within now.
   [[nodiscard]] double now() const { return now_; }
 
   /// What |V - gold| + T + P may be at first, within this tolerance. Throws ToleranceError where nothing is
@@ -45,12 +47,12 @@ class SamplerShare {
   [[nodiscard]] double first_tolerance(double epsilon_abs) const;
 
   /// A volume is begun: what it is to be brought within at first.
-  double begin();
+  NodeTolerance begin();
   /// What to bring a measured volume within, so that the certificate holds for its samplers; nothing where it
-  /// does, where it is to be begun anew(), or where nothing smaller is to be tried. Throws NoRoomForImage3d,
-  /// and ToleranceError where the buffer has no room.
-  std::optional<double> smaller(const Certificate& measured);
-  /// The texture unit takes so much that its bricks had better be classified anew, beside what it took:
+  /// does, where it is to be begun anew(), or where nothing smaller is to be tried. `bricks`: as measured.
+  /// Throws NoRoomForImage3d, and ToleranceError where the buffer has no room.
+  std::optional<NodeTolerance> smaller(const Certificate& measured, const std::vector<BrickMeasure>& bricks);
+  /// The texture unit takes so much that its bricks had better be classified anew, beside what it will take:
   /// raised a level at a time they come to more samples than need be.
   [[nodiscard]] bool anew() const { return anew_; }
 
@@ -64,15 +66,19 @@ class SamplerShare {
                                    std::int64_t atlas) const;
   [[nodiscard]] double left(double taken, double epsilon_abs) const;
   [[nodiscard]] double left_or_throw(double taken, double epsilon_abs) const;
+  std::optional<NodeTolerance> smaller_for_coarse(const Certificate& measured,
+                                                  const std::vector<BrickMeasure>& bricks);
 
   const std::vector<Crew::Kind>& kinds_;
   const Plan& plan_;
   Units units_;
   double epsilon_abs_, arithmetic_, reserved_ = 0;
-  double start_ = 0, now_ = 0;  // what volumes are begun with, and brought within
+  NodeTolerance start_{0};  // what volumes are begun with
+  double now_ = 0;          // and brought within, all bricks
   bool charges_, wants_image3d_ = true, raised_for_image3d_ = false, anew_ = false,
                  coarse_ = false;  // some texture unit has weights of few bits
-  int times_ = 0, begun_anew_ = 0;
+  bool begun_anew_ = false;
+  int times_ = 0;
 };
 
 }  // namespace vdvr

@@ -141,10 +141,12 @@ SampleBlock get_block(ByteReader& in, const Room& room) {
 void put(ByteWriter& out, const FilterProbe& p) {
   out.put(static_cast<std::uint8_t>(p.image3d));
   for (const double v : {p.weight_error, p.delta, p.constant_error}) out.put(v);
+  for (const double v : p.by_steps) out.put(v);
 }
 void get(ByteReader& in, FilterProbe& p) {
   p.image3d = in.get<std::uint8_t>() != 0;
   for (double* v : {&p.weight_error, &p.delta, &p.constant_error}) *v = in.get<double>();
+  for (double& v : p.by_steps) v = in.get<double>();
 }
 
 }  // namespace

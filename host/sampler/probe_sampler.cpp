@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "host/opencl/kernel.hpp"
+#include "host/sampler/corner_weights.hpp"
 #include "vdvr/probe_sampler.hpp"
 
 namespace vdvr {
@@ -112,13 +113,17 @@ std::vector<ProbePoint> weight_points(std::size_t axis) {
   return points;
 }
 
+// Of each two the second has fractions next to the middle of two multiples of 2^-8, where units that round to
+// these err most.
 std::vector<ProbePoint> scattered_points() {
   std::mt19937 random(20060301);
-  std::vector<ProbePoint> points(1u << 15);
-  for (auto& p : points)
+  std::vector<ProbePoint> points(1u << 16);
+  for (std::size_t i = 0; i < points.size(); ++i)
     for (std::size_t a = 0; a < 3; ++a) {
-      p.cell[a] = static_cast<std::uint32_t>(random() % (kSide - 1));
-      p.fraction[a] = static_cast<double>(random() % (1u << 14)) * 0x1p-14;
+      points[i].cell[a] = static_cast<std::uint32_t>(random() % (kSide - 1));
+      std::uint32_t fraction = random() % (1u << 14);
+      if (i % 2 == 1) fraction = (fraction & ~63u) + 31 + 2 * (fraction & 1u);
+      points[i].fraction[a] = fraction * 0x1p-14;
     }
   return points;
 }
@@ -140,34 +145,26 @@ double measure_weights(opencl::State& state, std::size_t axis, SampleType type) 
   return worst;
 }
 
-// The exact trilinear value and the cell's largest neighbour difference per axis, summed.
-std::pair<double, double> trilinear(const std::vector<double>& tile, const ProbePoint& p) {
-  const auto at = [&](std::uint32_t dx, std::uint32_t dy, std::uint32_t dz) -> double {
-    return tile[((p.cell[2] + dz) * kSide + p.cell[1] + dy) * kSide + p.cell[0] + dx];
+// The exact trilinear value, and the cell's largest neighbour difference along each axis.
+std::pair<double, std::array<double, 3>> trilinear(const std::vector<double>& tile, const ProbePoint& p) {
+  const auto at = [&](std::size_t c) -> double {
+    return tile[((p.cell[2] + (c >> 2)) * kSide + p.cell[1] + (c >> 1 & 1U)) * kSide + p.cell[0] + (c & 1U)];
   };
-  double value = 0, difference = 0;
-  for (std::uint32_t c = 0; c < 8; ++c) {
-    double weight = 1;
-    for (std::size_t a = 0; a < 3; ++a) weight *= (c >> a) & 1u ? p.fraction[a] : 1 - p.fraction[a];
-    value += weight * at(c & 1u, (c >> 1) & 1u, c >> 2);
+  const Corners weights = trilinear_weights(p.fraction);
+  double value = 0;
+  std::array<double, 3> steps{};
+  for (std::size_t c = 0; c < 8; ++c) {
+    value += weights[c] * at(c);
+    for (std::size_t a = 0; a < 3; ++a)
+      steps[a] = std::max(steps[a], std::abs(at(c) - at(c ^ (std::size_t{1} << a))));
   }
-  for (std::uint32_t a = 0; a < 3; ++a) {
-    double largest = 0;
-    for (std::uint32_t c = 0; c < 8; ++c) {
-      if ((c >> a) & 1u) continue;
-      const std::uint32_t d = c | (1u << a);
-      largest =
-          std::max(largest, std::abs(at(d & 1u, (d >> 1) & 1u, d >> 2) - at(c & 1u, (c >> 1) & 1u, c >> 2)));
-    }
-    difference += largest;
-  }
-  return {value, difference};
+  return {value, steps};
 }
 
-// rho: the largest error beyond delta times the differences, relative to the tile's largest magnitude, or to
+// rho: the largest error beyond what steps are charged, relative to the tile's largest magnitude, or to
 // the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
 // weights err even where all samples are equal.
-double measure_constants(opencl::State& state, double delta, SampleType type) {
+double measure_constants(opencl::State& state, const FilterProbe& charged, SampleType type) {
   std::mt19937 random(7);
   const bool normalised = type != SampleType::f32;
   std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
@@ -188,66 +185,18 @@ double measure_constants(opencl::State& state, double delta, SampleType type) {
     double magnitude = normalised ? 1 : 0;
     for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto [truth, difference] = trilinear(tile.truth, points[i]);
-      const double beyond = (std::abs(static_cast<double>(read[i]) - truth) - delta * difference) / magnitude;
+      const auto [truth, steps] = trilinear(tile.truth, points[i]);
+      const double beyond =
+          (std::abs(static_cast<double>(read[i]) - truth) - charged.of_steps(steps)) / magnitude;
       if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
     }
   }
   return rho;
 }
 
-// Of one cell; bit a of a corner's number is its place on axis a.
-using Corners = std::array<double, 8>;
-
-Corners trilinear_weights(const std::array<double, 3>& fraction) {
-  Corners w{};
-  for (std::size_t c = 0; c < 8; ++c) {
-    w[c] = 1;
-    for (std::size_t a = 0; a < 3; ++a) w[c] *= (c >> a & 1u) != 0 ? fraction[a] : 1 - fraction[a];
-  }
-  return w;
-}
-
-// What is moved along each axis where `off` is brought to one corner, the axes in this order.
-std::array<double, 3> moved(Corners off, const std::array<std::size_t, 3>& order) {
-  std::array<double, 3> amount{};
-  for (const std::size_t axis : order) {
-    const std::size_t bit = std::size_t{1} << axis;
-    double up = 0, down = 0;
-    for (std::size_t c = 0; c < 8; ++c) ((c & bit) != 0 ? up : down) += std::abs(off[c]);
-    // The side where less is moves to the other.
-    const std::size_t kept = up <= down ? 0 : bit;
-    for (std::size_t c = 0; c < 8; ++c)
-      if ((c & bit) == kept) off[c] += std::exchange(off[c ^ bit], 0.0);
-    amount[axis] = std::min(up, down);
-  }
-  return amount;
-}
-
-// What weights err by on the axis where they err most: the fractions that they look like, and what they are
-// not of these.
-double weight_error_of(const Corners& read, const std::array<double, 3>& fraction) {
-  std::array<double, 3> seen{};
-  for (std::size_t c = 0; c < 8; ++c)
-    for (std::size_t a = 0; a < 3; ++a) seen[a] += (c >> a & 1u) != 0 ? read[c] : 0.0;
-  Corners off = read;
-  const Corners looks_like = trilinear_weights(seen);
-  for (std::size_t c = 0; c < 8; ++c) off[c] -= looks_like[c];
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& order :
-       {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
-    const std::array<double, 3> amount = moved(off, order);
-    double most = 0;
-    for (std::size_t a = 0; a < 3; ++a) most = std::max(most, amount[a] + std::abs(seen[a] - fraction[a]));
-    least = std::min(least, most);
-  }
-  return least;
-}
-
 // The weights of all corners of a cell, by tiles of which every second sample along each axis is 1, all
-// others 0, and what they err by for any samples. On combs two of three fractions are 0, and units err less
-// there.
-double measure_corners(opencl::State& state, SampleType type) {
+// others 0, and what they err by. On combs two of three fractions are 0, and units err less there.
+BySteps measure_corners(opencl::State& state, SampleType type) {
   const auto points = scattered_points();
   std::array<std::vector<float>, 8> read;
   for (std::uint32_t parity = 0; parity < 8; ++parity)
@@ -258,52 +207,64 @@ double measure_corners(opencl::State& state, SampleType type) {
                                          type)
                                    .image,
                                points);
-  double worst = 0;
+  BySteps largest{};
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ProbePoint& p = points[i];
-    Corners weights{};
+    Corners off = trilinear_weights(p.fraction);
     for (std::uint32_t c = 0; c < 8; ++c) {
       std::uint32_t parity = 0;
       for (std::uint32_t a = 0; a < 3; ++a) parity |= (p.cell[a] + (c >> a & 1u)) % 2 << a;
-      weights[c] = static_cast<double>(read[parity][i]);
-      if (std::isnan(weights[c])) return std::numeric_limits<double>::infinity();
+      off[c] = static_cast<double>(read[parity][i]) - off[c];
     }
-    worst = std::max(worst, weight_error_of(weights, p.fraction));
+    raise_to_error(largest, off);
   }
-  // Seven lerps in fp32 are charged for by themselves.
-  return std::max(0.0, worst - 16 * 0x1p-24);
+  // Seven lerps in fp32 are charged by themselves, 14 u of the largest sample, which is at least half of the
+  // largest step.
+  for (double& error : largest) error = std::max(0.0, error - 7 * 0x1p-24);
+  return largest;
 }
 
-// Charges delta; says for which class.
-std::string charge(FilterProbe& p) {
+// Charges what was measured; says for which class.
+std::string charge(FilterProbe& p, const BySteps& measured) {
+  for (std::size_t k = 1; k < measured.size(); ++k)
+    p.weight_error = std::max(p.weight_error, measured[k] / sum_of_steps(k));
   // A unit that rounds to 8 fraction bits may add a few ulp of its own; 2^-20 keeps it in its class.
   constexpr double slack = 0x1p-20;
-  double least = 0;
-  std::string note;
+  // Not all fractions were tried. Of a unit that rounds the weights of corners to 8 bits eight times as many
+  // places show .3 % more, and the places next to the middle are 3 % short of it.
+  constexpr double untried = 1.1;
+  const auto charge_each = [&](double least) {
+    p.delta = std::max(least, p.weight_error);
+    for (std::size_t k = 1; k < measured.size(); ++k) p.by_steps[k] = p.delta * sum_of_steps(k);
+  };
   if (p.weight_error <= 0x1p-22) {
-    least = 0x1p-22;
-    note = "weights in fp32";
-  } else if (p.weight_error <= 0x1p-9 + slack) {
-    least = 0x1p-9;
-    note = "weights rounded to 8 fraction bits or better";
-  } else if (p.weight_error <= 0x1p-8 + slack) {
-    least = 0x1p-8;
-    note = "weights truncated to 8 fraction bits";
-  } else {
-    least = 1.5 * p.weight_error;
-    note = fmt::format("weights err by {:.3g}, more than truncation to 8 bits; 1.5 times that is charged",
-                       p.weight_error);
+    charge_each(0x1p-22);
+    return "weights in fp32";
   }
-  p.delta = std::max(least, p.weight_error);
-  return note;
+  if (p.weight_error <= 0x1p-9 + slack) {
+    charge_each(0x1p-9);
+    return "weights rounded to 8 fraction bits or better";
+  }
+  if (p.weight_error <= 0x1p-8 + slack) {
+    charge_each(0x1p-8);
+    return "weights truncated to 8 fraction bits";
+  }
+  p.delta = untried * p.weight_error;
+  for (std::size_t k = 1; k < measured.size(); ++k) p.by_steps[k] = untried * measured[k];
+  return fmt::format("weights err by {:.3g}, more than truncation to 8 bits; {} times that is charged",
+                     p.weight_error, untried);
 }
 
 std::string measure_filter(opencl::State& state, FilterProbe& p, SampleType type) {
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    p.weight_error = std::max(p.weight_error, measure_weights(state, axis, type));
-  p.weight_error = std::max(p.weight_error, measure_corners(state, type));
-  std::string note = charge(p);
-  p.constant_error = measure_constants(state, p.delta, type);
+  BySteps measured = measure_corners(state, type);
+  BySteps along{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double error = measure_weights(state, axis, type);
+    for (std::size_t k = 1; k < along.size(); ++k) along[k] += (k >> axis & 1U) != 0 ? error : 0.5 * error;
+  }
+  for (std::size_t k = 1; k < measured.size(); ++k) measured[k] = std::max(measured[k], along[k]);
+  std::string note = charge(p, measured);
+  p.constant_error = measure_constants(state, p, type);
   return note;
 }
 

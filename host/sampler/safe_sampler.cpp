@@ -11,6 +11,7 @@ namespace {
 
 void forget_image3d(Certificate& c) {
   c.budget.sampler.image3d.reset();
+  c.budget.sampler.image3d_by_brick.clear();
   c.total_image3d.reset();
   c.holds_image3d.reset();
 }
@@ -25,7 +26,7 @@ std::string why_not(const Device& device, const Certificate& here) {
   if (*here.total_image3d <= here.epsilon_abs)
     return fmt::format(
         "the texture unit of '{}' may err by {:.3g}, with which a brick's bound is {:.4g} of its sigma",
-        device.info().name, share, worst_in_sigma(here, share));
+        device.info().name, share, worst_in_sigma(here, true));
   return fmt::format(
       "the texture unit of '{}' may err by {:.3g}, with which the total {:.4g} exceeds epsilon {:.4g}",
       device.info().name, share, *here.total_image3d, here.epsilon_abs);
@@ -35,23 +36,18 @@ std::string why_not(const Device& device, const Certificate& here) {
 
 Certificate certificate_on(Device& device, const MixedVolume& volume, const Certificate& stored) {
   const DeviceInfo& info = device.info();
-  const SamplerTerms here =
+  SamplerTerms here =
       sampler_terms(field_slopes(volume), volume.grid, probe_filters(device), atlas_length(info, volume),
                     stored.epsilon_abs, volume.rate, sampler_underflow(info));
   Certificate c = stored;
-  const double sum = c.measured_total + c.budget.arithmetic.value;
-  if (!info.subnormals && !(here.buffer.value <= c.budget.sampler.buffer.value)) {
-    c.budget.sampler.buffer = here.buffer;
-    c.total_buffer = sum + here.buffer.value;
-    c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, here.buffer.value);
-  }
   forget_image3d(c);
-  if (!here.image3d) return c;
-  c.budget.sampler.image3d = here.image3d;
-  c.total_image3d = sum + here.image3d->value;
+  const bool more_of_buffer = !info.subnormals && !(here.buffer.value <= c.budget.sampler.buffer.value);
+  if (!more_of_buffer) here.buffer = c.budget.sampler.buffer;
+  charge_samplers(c, std::move(here));
+  if (more_of_buffer) c.holds_buffer = c.holds_buffer && within_tolerance(c, c.total_buffer, false);
   // Where nothing is certified of the arithmetic that is the same everywhere, nothing is of this.
-  c.holds_image3d =
-      stored.holds_buffer && !c.comparison && within_tolerance(c, *c.total_image3d, here.image3d->value);
+  if (c.total_image3d)
+    c.holds_image3d = stored.holds_buffer && !c.comparison && within_tolerance(c, *c.total_image3d, true);
   return c;
 }
 

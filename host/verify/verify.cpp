@@ -150,19 +150,16 @@ bool promises_image3d(const Device& device, const Certificate& stored) {
   return stored.holds_image3d.value_or(false) && is_builder(device, stored);
 }
 
-// Which samplers must hold: those that this device has and that are promised of it.
-void judge(const Device& device, const Certificate& stored, const SamplerTerms& sampler, VerifyResult& r) {
-  r.total_buffer = r.measured_total + sampler.buffer.value;
-  if (sampler.image3d) r.total_image3d = r.measured_total + sampler.image3d->value;
+// Which samplers must hold: those that this device has and that are promised of it. `here`: the certificate
+// with what samplers take on this device. Bounds of bricks were measured against what the file says of each:
+// their promise in sigma is of those.
+void judge(const Device& device, const Certificate& stored, const Certificate& here, VerifyResult& r) {
+  r.total_buffer = r.measured_total + here.budget.sampler.buffer.value;
   r.total = r.total_buffer;
-  // Bounds of bricks were measured against what the file says of each: their promise in sigma is of those.
-  const auto holds = [&](double total, const ErrorTerm& term) {
-    return total <= stored.epsilon_abs && within_tolerance(stored, stored.epsilon_abs, term.value);
-  };
-  if (stored.holds_buffer) r.holds_buffer = holds(r.total_buffer, sampler.buffer);
+  if (stored.holds_buffer) r.holds_buffer = within_tolerance(here, r.total_buffer, false);
   r.image3d_promised = promises_image3d(device, stored);
   if (stored.holds_image3d.value_or(false) && r.total_image3d)
-    r.holds_image3d = holds(*r.total_image3d, *sampler.image3d);
+    r.holds_image3d = within_tolerance(here, *r.total_image3d, true);
   if (r.image3d_promised && r.total_image3d) r.total = std::max(r.total, *r.total_image3d);
   if (!r.holds_buffer && !(r.image3d_promised && r.holds_image3d))
     r.failure = "the certificate holds for no sampler of this device";
@@ -179,9 +176,11 @@ int finest_rate(const MixedVolume& v) {
   return rate;
 }
 
-// Up to where |V - F| is to be bounded: what samplers leave of epsilon, and what the certificate says.
+// Up to where |V - F| is to be bounded in each brick: what samplers leave of epsilon, and what the certificate
+// says.
 struct Limits {
-  double promised = 0, stated = 0;
+  std::vector<double> promised;
+  double stated = 0;
 };
 
 // What is known of bricks from all rates of gold at which they were tested: every rate bounds |V - F|, and a
@@ -198,12 +197,12 @@ class TestedBricks {
     int tried = 0;       // the finest rate at which it was tested
     bool again = false;  // whether one rate did not decide
   };
-  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, const Limits& limits,
+  TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, Limits limits,
                bool windowed, const Progress& progress)
       : field_(field),
         volume_(volume),
         attack_(attack),
-        limits_(limits),
+        limits_(std::move(limits)),
         windowed_(windowed),
         progress_(progress),
         bricks_(volume.level.size()),
@@ -223,7 +222,7 @@ class TestedBricks {
       take(i);
       const Brick& b = bricks_[i];
       if (b.tried == 0) return rate >= field_.least_rate(i) || rate == rates.back();
-      return undecided(b) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
+      return undecided(i) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
                               rate <= 2 * std::max(first, field_.least_rate(i)));
     };
     if (!field_.nodes_are_dear()) return run(selected, rates, wants, result);
@@ -244,13 +243,14 @@ class TestedBricks {
   /// early where one does so at a node, or still may at the finest rate.
   void settle(VerifyResult& result) {
     const int finest = finest_rate(volume_);
-    for (const double limit : {limits_.promised, limits_.stated})
+    for (const bool promised : {true, false})
       for (std::size_t most = 8;; most *= 2) {
+        const auto limit = [&](std::size_t i) { return promised ? limits_.promised[i] : limits_.stated; };
         std::vector<std::size_t> over;
         for (std::size_t i = 0; i < bricks_.size(); ++i)
-          if (bricks_[i].total > limit) over.push_back(i);
+          if (bricks_[i].total > limit(i)) over.push_back(i);
         const bool hopeless = std::any_of(over.begin(), over.end(), [&](std::size_t i) {
-          return !(bricks_[i].least <= limit) || bricks_[i].tried >= finest;
+          return !(bricks_[i].least <= limit(i)) || bricks_[i].tried >= finest;
         });
         if (over.empty() || hopeless) break;
         most = std::min(most, over.size());
@@ -270,9 +270,11 @@ class TestedBricks {
 
  private:
   // A brick that errs by more at a node is wrong at every rate, and all is then.
-  [[nodiscard]] bool undecided(const Brick& b) const {
-    if (hopeless_ || b.total <= std::min(limits_.promised, limits_.stated)) return false;
-    return b.total > limits_.promised || b.least <= limits_.stated;
+  [[nodiscard]] bool undecided(std::size_t brick) const {
+    const Brick& b = bricks_[brick];
+    const double promised = limits_.promised[brick];
+    if (hopeless_ || b.total <= std::min(promised, limits_.stated)) return false;
+    return b.total > promised || b.least <= limits_.stated;
   }
 
   void run(const std::vector<std::uint8_t>& selected, const std::vector<int>& rates,
@@ -308,12 +310,12 @@ class TestedBricks {
     if (now.tried == 0) return;
     // Cells that only the coarser gold tested hold no point of which the certificate speaks.
     if (known.total >= 0) now.total = std::max(0.0, now.total);
-    known.again = known.again || (known.tried > 0 && undecided(known));
+    known.again = known.again || (known.tried > 0 && undecided(i));
     known.tried = now.tried;
     known.error = std::max(known.error, now.error);
     double& least = now.tried > volume_.rate ? known.finer : known.least;
     least = std::max(least, now.least);
-    hopeless_ = hopeless_ || !(now.least <= limits_.promised);
+    hopeless_ = hopeless_ || !(now.least <= limits_.promised[i]);
     if (now.total < 0 || (known.total >= 0 && known.total <= now.total)) return;
     known.total = now.total;
     known.cell = now.cell;
@@ -330,11 +332,21 @@ class TestedBricks {
   bool hopeless_ = false;
 };
 
-// What the samplers that this device has and that are promised of it leave of epsilon for |V - F| itself.
-double left_by_samplers(const Device& device, const Certificate& stored, const SamplerTerms& sampler) {
-  double taken = stored.holds_buffer ? sampler.buffer.value : 0;
-  if (promises_image3d(device, stored) && sampler.image3d) taken = std::max(taken, sampler.image3d->value);
-  return stored.epsilon_abs - taken;
+// What the samplers that this device has and that are promised of it leave of epsilon for |V - F| itself, of
+// each brick.
+std::vector<double> left_by_samplers(const Device& device, const Certificate& stored,
+                                     const SamplerTerms& sampler, std::size_t bricks) {
+  const double taken = stored.holds_buffer ? sampler.buffer.value : 0;
+  std::vector<double> left(bricks, stored.epsilon_abs - taken);
+  if (promises_image3d(device, stored) && sampler.image3d)
+    for (std::size_t i = 0; i < bricks; ++i)
+      left[i] = stored.epsilon_abs - std::max(taken, static_cast<double>(sampler.image3d_by_brick[i]));
+  return left;
+}
+
+Certificate with_samplers(Certificate c, SamplerTerms samplers) {
+  charge_samplers(c, std::move(samplers));
+  return c;
 }
 
 // The sampler terms again, and the least that an image sampler can have.
@@ -343,7 +355,8 @@ Differences check_samplers(Device& device, const MixedVolume& volume, const Cert
   SamplerProbe ideal;
   ideal.image3d = ideal.u16.image3d = ideal.u8.image3d = true;
   const SamplerTerms least = sampler_terms(slopes, volume.grid, ideal, 1, stored.epsilon_abs, volume.rate);
-  return compare_samplers(found, least, is_builder(device, stored), stored);
+  return compare_samplers(found, with_samplers(stored, least).budget.sampler, is_builder(device, stored),
+                          stored);
 }
 
 // Adds what differs to the verdict.
@@ -373,9 +386,10 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   const HostMemory host(state, bytes, "cosine coefficients of the filtered projections");
   const ExactField exact(scan, stored.field, progress);
   const FieldSlopes slopes = field_slopes(volume);
-  const SamplerTerms sampler =
-      sampler_terms(slopes, volume.grid, probe_filters(device), atlas_length(device.info(), volume),
-                    stored.epsilon_abs, volume.rate, sampler_underflow(device.info()));
+  const Certificate here = with_samplers(
+      stored, sampler_terms(slopes, volume.grid, probe_filters(device), atlas_length(device.info(), volume),
+                            stored.epsilon_abs, volume.rate, sampler_underflow(device.info())));
+  const SamplerTerms& sampler = here.budget.sampler;
 
   VerifyResult result;
   result.differences = compare_scope(scan, used, volume, stored);
@@ -394,7 +408,8 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
   TestedBricks tested(
       field, volume, attack,
-      {left_by_samplers(device, stored, sampler), stored.measured_total + stored.budget.arithmetic.value},
+      {left_by_samplers(device, stored, sampler, volume.level.size()),
+       stored.measured_total + stored.budget.arithmetic.value},
       stored.window.has_value(), progress);
   tested.sweep(selected, points_of_field.flags(), result);
   tested.settle(result);
@@ -417,6 +432,9 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
       if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
         broken = static_cast<std::int64_t>(i);
     }
+    if (sampler.image3d)
+      result.total_image3d = std::max(result.total_image3d.value_or(0),
+                                      b.total + static_cast<double>(sampler.image3d_by_brick[i]));
     if (b.total <= result.measured_total && worst >= 0) continue;
     result.measured_total = b.total;
     worst = static_cast<std::int64_t>(i);
@@ -431,7 +449,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   };
   result.worst = place(worst);
   result.worst_at = result.worst.world;
-  judge(device, stored, sampler, result);
+  judge(device, stored, here, result);
   if (!result.holds && result.failure.empty())
     result.failure = fmt::format("|V - F| may reach {:.6g} > epsilon {:.6g} {}", result.total,
                                  stored.epsilon_abs, place_text(result.worst));

@@ -234,7 +234,8 @@ Differences compare_samplers(const SamplerTerms& found, const SamplerTerms& leas
     out.differs(fmt::format(
         "the sampler term of image3d is {}, below {}, which is that of a texture unit without error",
         c.image3d->value, least.image3d->value));
-  if (same_device && found.image3d)
+  // Earlier versions charged all bricks with the worst one's, which is more.
+  if (same_device && found.image3d && !(c.image3d->value >= found.image3d->value))
     number("the sampler term of image3d", c.image3d->value, found.image3d->value);
   return std::move(out.found);
 }

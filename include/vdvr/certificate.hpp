@@ -22,7 +22,12 @@ struct ErrorTerm {
 
 struct SamplerTerms {
   ErrorTerm buffer;
-  std::optional<ErrorTerm> image3d;  ///< absent where the device has no such sampler
+  /// Absent where the device has no such sampler. Of a volume: how far the largest bound of a brick lies
+  /// above measured_total and arithmetic.
+  std::optional<ErrorTerm> image3d;
+  /// [bz][by][bx] what the texture unit may err by in each brick. Not in the JSON: another device has its own
+  /// (certificate_on() of safe_sampler.hpp).
+  std::vector<float> image3d_by_brick;
 };
 
 struct ErrorBudget {
@@ -59,6 +64,8 @@ struct NoiseRecord {
   /// files of earlier versions.
   std::optional<double> rms_in_sigma;
   std::int64_t rms_points = 0;
+  /// worst_in_sigma() of image3d on the device that built the file.
+  std::optional<double> worst_image3d;
   std::string sha256;  ///< of Certificate::brick_sigma
 };
 
@@ -107,15 +114,18 @@ struct Certificate {
 
 /// What |V - F| can be at covered points of each brick, sampled by `buffer` or image3d: its total, rounding
 /// and the sampler; infinite where nothing was tested. Throws InputError where the certificate has no totals
-/// by brick, or says nothing of image3d.
+/// by brick, or says nothing of image3d on this device: what a file says is another's (certificate_on()).
 VDVR_API std::vector<float> brick_bounds(const Certificate& certificate, bool image3d);
 
-/// The largest of brick_bounds() over sigma, of a sampler whose share is `sampler`; 0 where nothing was
-/// tested or no sigma is known.
-VDVR_API double worst_in_sigma(const Certificate& certificate, double sampler);
-/// Whether a volume of this total, drawn by a sampler whose share of it is `sampler`, is within the
-/// tolerance: epsilon_abs, and the promise in sigma where there is one.
-VDVR_API bool within_tolerance(const Certificate& certificate, double total, double sampler);
+/// The largest of brick_bounds() over sigma; 0 where nothing was tested or no sigma is known. Of image3d in a
+/// file what was found when it was built.
+VDVR_API double worst_in_sigma(const Certificate& certificate, bool image3d);
+/// Whether a volume of this total, drawn by that sampler, is within the tolerance: epsilon_abs, and the
+/// promise in sigma where there is one.
+VDVR_API bool within_tolerance(const Certificate& certificate, double total, bool image3d);
+/// Puts what samplers take into the certificate of a volume: the budget, and both totals. That of image3d is
+/// the largest over the bricks of their totals and what the unit may err by there, with arithmetic.
+VDVR_API void charge_samplers(Certificate& certificate, SamplerTerms samplers);
 /// SHA-256 of sigma by brick, as NoiseRecord has it.
 VDVR_API std::string sigma_sha256(const std::vector<float>& brick_sigma);
 

@@ -30,8 +30,8 @@ struct NoiseOptions {
 /// What is known of a scan's noise, and from where.
 struct ScanNoise {
   LineIntegralNoise model;  ///< the one to use
-  /// Photons of a pixel in the open beam, as each source has them; what texture or blur does to the last two
-  /// makes them too few.
+  /// Photons of a pixel in the open beam, as each source has them. Texture makes the last two too few; pixels
+  /// that share signal, and counts of a few photons, make them too many (docs/noise.md).
   std::optional<double> by_flats, by_differences, by_wedge;
   /// Whether the model was stated, or two sources have the same photons within a factor of 1.5.
   bool agreed = false;
@@ -39,7 +39,7 @@ struct ScanNoise {
 };
 
 /// Of what is stated, else of flats (`by_flats`, as read_line_noise() has it), else of the projections alone:
-/// the larger number of photons of two estimates, since what is wrong with either makes them fewer. (1)
+/// the larger number of photons of two estimates, since texture, which is in most scans, makes them fewer. (1)
 /// Second differences along views and columns (Immerkaer 1996), median; (2) the empty wedge of a sinogram in
 /// frequency, parallel beam with even steps alone. Nothing where none can be had, where the projections were
 /// prepared by more than binning, or where more photons are found than detectors count (10^9): such data were

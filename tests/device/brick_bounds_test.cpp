@@ -175,11 +175,38 @@ BOOST_AUTO_TEST_CASE(a_bound_holds_rounding_and_the_sampler_beside_the_total) {
   c.budget.arithmetic.value = 0.125;
   c.budget.sampler.buffer.value = 0x1p-30;
   c.budget.sampler.image3d = ErrorTerm{0.25, "device probe"};
+  BOOST_CHECK_THROW(brick_bounds(c, true), InputError);  // of another device
+  c.budget.sampler.image3d_by_brick = {0.0625f, 1.0f, 0.25f};
   const auto buffer = brick_bounds(c, false), image = brick_bounds(c, true);
   BOOST_TEST(static_cast<double>(buffer[0]) >= 0.625 + 0x1p-30);
   BOOST_TEST(static_cast<double>(buffer[0]) <= 0.625 + 0x1p-22);
   BOOST_TEST(std::isinf(buffer[1]));
+  BOOST_TEST(static_cast<double>(image[0]) >= 0.6875);
+  BOOST_TEST(static_cast<double>(image[0]) <= 0.6875 + 0x1p-22);
+  BOOST_TEST(std::isinf(image[1]));
   BOOST_TEST(static_cast<double>(image[2]) >= 0.375);
+}
+
+BOOST_AUTO_TEST_CASE(the_total_is_the_largest_of_bricks_with_what_the_unit_takes_of_each) {
+  Certificate c;
+  c.measured_total = 0.5;
+  c.brick_totals = {0.5f, -1.0f, 0.125f};
+  c.budget.arithmetic.value = 0.0625;
+  SamplerTerms samplers{{0x1p-10, "rounding"}, ErrorTerm{4, "device probe"}, {0.03125f, 4.0f, 0.25f}};
+  charge_samplers(c, samplers);  // the second brick has no tested point
+  BOOST_TEST(c.total_buffer == 0.5625 + 0x1p-10);
+  BOOST_TEST(c.budget.sampler.image3d->value == 0.03125);
+  BOOST_TEST(*c.total_image3d == 0.59375);
+  samplers.image3d_by_brick[2] = 0.5f;  // steep, and yet small in error
+  charge_samplers(c, samplers);
+  BOOST_TEST(c.budget.sampler.image3d->value == 0.125);
+  BOOST_TEST(*c.total_image3d == 0.6875);
+  c.brick_sigma = {1.0f, 1.0f, 0.5f};
+  BOOST_TEST(worst_in_sigma(c, true) == 2 * 0.6875);
+  BOOST_TEST(worst_in_sigma(c, false) == 0.5625 + 0x1p-10);
+  samplers.image3d.reset();
+  charge_samplers(c, samplers);
+  BOOST_TEST(!c.total_image3d.has_value());
 }
 
 BOOST_AUTO_TEST_CASE(totals_come_back_from_the_file_and_larger_ones_than_promised_are_refused) {

@@ -15,6 +15,7 @@
 //   VDVR_SHIM_IMAGES=0            no images
 //   VDVR_SHIM_FILTER_BITS=N       read_imagef filters by weights of N bits, as texture units have (N = 8)
 //   VDVR_SHIM_FILTER_CUT=1        these are cut, not rounded, to so many bits
+//   VDVR_SHIM_FILTER_PRODUCTS=1   weights of corners are rounded to so many bits too, as those of NVIDIA's units
 //   VDVR_SHIM_FILTER_U8=1         of 8-bit images each lerp is rounded to 8 bits too
 //   VDVR_SHIM_BUILD_OPTIONS=TEXT  more options for every program
 // What is built:
@@ -45,7 +46,7 @@ namespace {
 constexpr const char* character[] = {
     "VDVR_SHIM_GPU",        "VDVR_SHIM_WORK_GROUP", "VDVR_SHIM_COMPUTE_UNITS", "VDVR_SHIM_LOCAL_MEM",
     "VDVR_SHIM_FP64",       "VDVR_SHIM_DENORMALS",  "VDVR_SHIM_IMAGES",        "VDVR_SHIM_FILTER_BITS",
-    "VDVR_SHIM_FILTER_CUT", "VDVR_SHIM_FILTER_U8",  "VDVR_SHIM_BUILD_OPTIONS"};
+    "VDVR_SHIM_FILTER_CUT", "VDVR_SHIM_FILTER_U8",  "VDVR_SHIM_FILTER_PRODUCTS",  "VDVR_SHIM_BUILD_OPTIONS"};
 
 // 0: not set.
 cl_ulong setting(const char* name) {
@@ -163,7 +164,8 @@ constexpr const char* without_fp64 = R"(
 #endif
 )";
 
-// A texture unit: coordinates in 2^-FILTER_BITS texels, then lerps by these exact weights.
+// A texture unit: coordinates in 2^-FILTER_BITS texels, then lerps by these weights, exact or with products that
+// have as many bits.
 constexpr const char* texture_unit = R"(
 #ifdef __IMAGE_SUPPORT__
 float shim_lerp(float a, float b, float t, bool rounds) {
@@ -174,10 +176,26 @@ float4 __attribute__((overloadable)) shim_read(__read_only image3d_t image, int4
   const sampler_t nearest = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_NEAREST;
   return read_imagef(image, nearest, at);
 }
+float shim_product(float a, float b) {
+  const float unit = (float)(1 << FILTER_BITS), p = a * b;
+  return rint(p * unit) / unit;
+}
+float shim_by_weights(__read_only image3d_t image, int4 first, float4 t) {
+  float sum = 0.0f;
+  for (int i = 0; i < 4; ++i) {
+    const float both = shim_product(t.x, t.y);
+    const float side = i == 3 ? both : i == 1 ? t.x - both : i == 2 ? t.y - both : 1.0f - t.x - t.y + both;
+    const float far = shim_product(side, t.z);
+    const int4 low = first + (int4)(i & 1, i >> 1, 0, 0);
+    sum += (side - far) * shim_read(image, low).x + far * shim_read(image, low + (int4)(0, 0, 1, 0)).x;
+  }
+  return sum;
+}
 float4 __attribute__((overloadable)) shim_read(__read_only image3d_t image, float4 at) {
   const float unit = (float)(1 << FILTER_BITS);
   const int4 place = convert_int4(FILTER_TO_BITS((at - 0.5f) * unit)), first = place >> FILTER_BITS;
   const float4 t = convert_float4(place & ((1 << FILTER_BITS) - 1)) / unit;
+  if (FILTER_PRODUCTS) return (float4)(shim_by_weights(image, first, t), 0.0f, 0.0f, 1.0f);
   const bool rounds = FILTER_U8 && get_image_channel_data_type(image) == CLK_UNORM_INT8;
   float along_x[4];
   for (int i = 0; i < 4; ++i) {
@@ -217,7 +235,8 @@ std::string as_the_device_compiles(std::string source) {
   if (bits != 0 && source.find("read_imagef") != std::string::npos)
     source = "#define FILTER_BITS " + std::to_string(bits) + "\n#define FILTER_TO_BITS " +
              (setting("VDVR_SHIM_FILTER_CUT") != 0 ? "floor" : "rint") + "\n#define FILTER_U8 " +
-             std::to_string(setting("VDVR_SHIM_FILTER_U8")) + texture_unit + source;
+             std::to_string(setting("VDVR_SHIM_FILTER_U8")) + "\n#define FILTER_PRODUCTS " +
+             std::to_string(setting("VDVR_SHIM_FILTER_PRODUCTS")) + texture_unit + source;
   return source;
 }
 
