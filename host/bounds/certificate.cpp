@@ -238,8 +238,7 @@ void read_noise(const Member& m, Certificate& c) {
     if (!(*n.rms_in_sigma >= 0 && n.rms_points > 0))
       throw FileError("certificate: member 'noise.rms' is no mean of any points");
   }
-  if (m.has("worst") && m.at("worst").has("image3d"))
-    n.worst_image3d = m.at("worst").at("image3d").number();
+  if (m.has("worst") && m.at("worst").has("image3d")) n.worst_image3d = m.at("worst").at("image3d").number();
   n.sha256 = m.at("brick_sigma_sha256").text();
 }
 
@@ -303,9 +302,8 @@ std::string contradiction(const Certificate& c) {
     return c.holds_buffer || c.holds_image3d.value_or(false)
                ? "it was built for comparison, and yet something 'holds'"
                : "";
-  const bool image_fits =
-      !c.total_image3d || !c.holds_image3d || !c.budget.sampler.image3d ||
-      *c.holds_image3d == within_tolerance(c, *c.total_image3d, true);
+  const bool image_fits = !c.total_image3d || !c.holds_image3d || !c.budget.sampler.image3d ||
+                          *c.holds_image3d == within_tolerance(c, *c.total_image3d, true);
   if (c.holds_buffer != within_tolerance(c, c.total_buffer, false) || !image_fits)
     return fmt::format(
         "'holds' does not follow from total and epsilon_abs {}{}", c.epsilon_abs,
@@ -365,7 +363,8 @@ void charge_samplers(Certificate& c, SamplerTerms samplers) {
   double largest = by_brick.empty() ? c.measured_total + c.budget.sampler.image3d->value : 0;
   for (std::size_t i = 0; i < by_brick.size(); ++i) {
     // Files of earlier versions have no totals by brick.
-    const double total = c.brick_totals.empty() ? c.measured_total : static_cast<double>(c.brick_totals.at(i));
+    const double total =
+        c.brick_totals.empty() ? c.measured_total : static_cast<double>(c.brick_totals.at(i));
     if (total >= 0) largest = std::max(largest, total + static_cast<double>(by_brick[i]));
   }
   const double above = std::max(0.0, largest - c.measured_total);

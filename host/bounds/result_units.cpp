@@ -50,8 +50,7 @@ Plan to_world(Plan plan, const Units& units) {
 Certificate to_world(Certificate c, const Units& units) {
   // `covered` was taken from the scan as it is, in world units.
   const int density = units.density();
-  for (double* value :
-       {&c.epsilon_abs, &c.reference_range, &c.measured_max, &c.measured_total})
+  for (double* value : {&c.epsilon_abs, &c.reference_range, &c.measured_max, &c.measured_total})
     *value = to_world(*value, units);
   scale(c.budget, density);
   scale(c.bounds, density);
@@ -63,8 +62,7 @@ Certificate to_world(Certificate c, const Units& units) {
   c.measured_total += more;
   charge_samplers(c, std::exchange(c.budget.sampler, {}));
   c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
-  if (c.total_image3d)
-    c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
+  if (c.total_image3d) c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
   c.worst_at = to_world(c.worst_at, units);
   if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
   if (c.roi) c.roi = to_world(*c.roi, units);

@@ -13,6 +13,12 @@ namespace vdvr {
 BrickRefinement::BrickRefinement(const Refinement& wanted, const Units& units)
     : wanted_(wanted), units_(units), everywhere_(from_world(wanted.everywhere_abs, units)) {}
 
+std::vector<double> BrickRefinement::bounds() const {
+  std::vector<double> bounds;
+  for (const float bound : wanted_.by_brick) bounds.push_back(from_world(static_cast<double>(bound), units_));
+  return bounds;
+}
+
 void BrickRefinement::begin(double rest, double least) {
   if (knows_bricks()) take(wanted_.by_brick, rest, least, {});
 }

@@ -18,6 +18,8 @@ class BrickRefinement {
   [[nodiscard]] double everywhere() const { return everywhere_; }
   /// Whether each brick's tolerance is known from the start.
   [[nodiscard]] bool knows_bricks() const { return !wanted_.by_brick.empty(); }
+  /// What |V - F| may be in each brick, where that is known; else empty.
+  [[nodiscard]] std::vector<double> bounds() const;
   /// Bricks begin at what is known of them. `rest` and `least` as below, before anything was measured.
   void begin(double rest, double least);
   /// Asks. `rest` is what a brick's bound holds beside what is measured at nodes, `least` the least tolerance

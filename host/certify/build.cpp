@@ -372,7 +372,8 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   if (options.refinement) refinement.emplace(*options.refinement, units);
   const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;
   const bool by_brick = refinement && refinement->knows_bricks();
-  SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes, by_brick);
+  SamplerShare samplers(kinds, plan, units, epsilon_abs, arithmetic, slopes,
+                        by_brick ? refinement->bounds() : std::vector<double>());
   if (refinement)
     refinement->begin(epsilon_abs - samplers.first_tolerance(epsilon_abs),
                       samplers.first_tolerance(plan.epsilon_abs));
@@ -383,8 +384,7 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     const SamplerTerms sampler = samplers.of(measured.volume);
     result.certificate =
         fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
-    const double rest =
-        by_brick ? samplers.beside_nodes(sampler, plan.epsilon_abs) : samplers.beside_nodes(sampler);
+    const double rest = samplers.beside_nodes(sampler);
     const bool asked =
         refinement && refinement->asks(measured.volume, result.certificate, rest,
                                        samplers.first_tolerance(plan.epsilon_abs) / (by_brick ? 2 : 1));

@@ -13,17 +13,17 @@ namespace {
 
 // What is reserved may be short of what the volume takes that was brought within it.
 constexpr double reserve = 1.25;
-// How often a volume may be brought within a smaller tolerance: of all bricks, and where each has its own, which
-// rises by a level at a time.
+// How often a volume may be brought within a smaller tolerance: of all bricks, and where each has its own,
+// which rises by a level at a time.
 constexpr int most_times = 4, most_times_by_brick = 16;
 
 double worse_of(const SamplerTerms& sampler) {
   return std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
 }
 
-// How far |V - gold| may lie from 0 on finer samples, so that there is room for the unit beside it. Steps, and
-// with them what the unit takes, fall with the spacing of samples, |V - gold| with its square: error x^2 + image
-// x = left.
+// How far |V - gold| may lie from 0 on finer samples, so that there is room for the unit beside it. Steps,
+// and with them what the unit takes, fall with the spacing of samples, |V - gold| with its square: error x^2
+// + image x = left.
 double beside_finer(double error, double image, double left) {
   const double x = 2 * left / (image + std::sqrt(image * image + 4 * error * left));
   return error * x * x;
@@ -32,17 +32,19 @@ double beside_finer(double error, double image, double left) {
 }  // namespace
 
 SamplerShare::SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& plan, const Units& units,
-                           double epsilon_abs, double arithmetic, const FieldSlopes& base, bool buffer_alone)
+                           double epsilon_abs, double arithmetic, const FieldSlopes& base,
+                           std::vector<double> bounds)
     : kinds_(kinds),
       plan_(plan),
       units_(units),
       epsilon_abs_(epsilon_abs),
       arithmetic_(arithmetic),
+      bounds_(std::move(bounds)),
       charges_(plan.settings.comparison.terms != Terms::grid) {
   for (const Crew::Kind& kind : kinds) {
     SamplerTerms sampler = terms(kind, base, longest_atlas(kind.info));
-    const bool coarse = sampler.image3d && (!kind.probe.weighs_in_fp32() || buffer_alone);
-    if (coarse) sampler.image3d.reset();
+    const bool coarse = sampler.image3d && !kind.probe.weighs_in_fp32();
+    if (coarse || !bounds_.empty()) sampler.image3d.reset();
     coarse_ = coarse_ || coarse;
     reserved_ = std::max(reserved_, reserve * worse_of(sampler));
   }
@@ -75,10 +77,22 @@ SamplerTerms SamplerShare::of(const MixedVolume& volume) const {
   return worst;
 }
 
-double SamplerShare::beside_nodes(const SamplerTerms& sampler, double tolerance) const {
+double SamplerShare::beside_nodes(const SamplerTerms& sampler) const {
   if (!charges_) return 0;
-  const double worse = arithmetic_ + worse_of(sampler);
-  return worse <= tolerance / 8 ? worse : arithmetic_ + sampler.buffer.value;
+  return arithmetic_ + (coarse_ && !bounds_.empty() ? sampler.buffer.value : worse_of(sampler));
+}
+
+double SamplerShare::room_of(std::size_t brick) const {
+  return left(0, bounds_.empty() ? epsilon_abs_ : std::min(epsilon_abs_, bounds_[brick]));
+}
+
+bool SamplerShare::has_room_for_image3d(const Certificate& measured) const {
+  if (!coarse_ || !measured.total_image3d) return measured.holds_image3d.value_or(true);
+  for (std::size_t i = 0; i < measured.brick_totals.size(); ++i)
+    if (const auto total = static_cast<double>(measured.brick_totals[i]);
+        total >= 0 && total + static_cast<double>(measured.budget.sampler.image3d_by_brick[i]) > room_of(i))
+      return false;
+  return true;
 }
 
 double SamplerShare::left(double taken, double epsilon_abs) const {
@@ -106,7 +120,7 @@ NodeTolerance SamplerShare::begin() {
 std::optional<NodeTolerance> SamplerShare::smaller(const Certificate& measured,
                                                    const std::vector<BrickMeasure>& bricks) {
   const SamplerTerms& sampler = measured.budget.sampler;
-  const bool image3d = wants_image3d_ && !measured.holds_image3d.value_or(true);
+  const bool image3d = wants_image3d_ && !has_room_for_image3d(measured);
   if ((measured.holds_buffer && !image3d) || measured.comparison) return std::nullopt;
   if (!image3d) {
     if (times_++ == most_times) return std::nullopt;
@@ -121,15 +135,15 @@ std::optional<NodeTolerance> SamplerShare::smaller(const Certificate& measured,
   return now_ = left_or_throw(reserve * sampler.image3d->value, epsilon_abs_);
 }
 
-// Bricks that the unit's own share takes beyond epsilon. Begun anew they are classified beside what it will take
-// of finer samples; what still is beyond rises.
+// Bricks that the unit's own share takes beyond epsilon. Begun anew they are classified beside what it will
+// take of finer samples; what still is beyond rises.
 std::optional<NodeTolerance> SamplerShare::smaller_for_coarse(const Certificate& measured,
                                                               const std::vector<BrickMeasure>& bricks) {
   const std::vector<float>& images = measured.budget.sampler.image3d_by_brick;
-  const double all = left(0, epsilon_abs_);
   NodeTolerance tolerance(now_, std::vector<float>(bricks.size(), std::numeric_limits<float>::infinity()));
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const auto total = static_cast<double>(measured.brick_totals[i]), image = static_cast<double>(images[i]);
+    const double all = room_of(i);
     if (total < 0 || total + image <= all) continue;
     const auto slack = static_cast<double>(bricks[i].slack);
     const double error = std::max(total - slack, 0.0), room = std::max(all - slack, 0.0);

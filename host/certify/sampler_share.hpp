@@ -3,7 +3,6 @@
 // is each brick's own, and falls as bricks with steep samples are refined. Called by build.cpp.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -28,17 +27,16 @@ class SamplerShare {
   /// `epsilon_abs` in `units`, as all values here; `arithmetic`: what rounding up to gold takes. Where
   /// nothing is charged (terms grid) all of epsilon is left. Refers to the plan and the devices. `base`:
   /// slopes of the base volume, by which a reserve is left for the buffer at first, and nothing beside it for
-  /// a coarse texture unit. For a fine one what the longest atlas would take is left, unless
-  /// `buffer_alone`. Throws ToleranceError where nothing is left for nodes.
+  /// a coarse texture unit. For a fine one what the longest atlas would take is left, unless bricks have
+  /// `bounds` of their own. Throws ToleranceError where nothing is left for nodes.
   SamplerShare(const std::vector<Crew::Kind>& kinds, const Plan& plan, const Units& units, double epsilon_abs,
-               double arithmetic, const FieldSlopes& base, bool buffer_alone = false);
+               double arithmetic, const FieldSlopes& base, std::vector<double> bounds = {});
 
   /// On the worst of the devices.
   [[nodiscard]] SamplerTerms of(const MixedVolume& volume) const;
   /// What a bound holds beside what is measured at nodes: arithmetic, and what the worse sampler takes; the
-  /// buffer, where the texture unit would take more than an eighth of `tolerance`.
-  [[nodiscard]] double beside_nodes(const SamplerTerms& sampler,
-                                    double tolerance = std::numeric_limits<double>::infinity()) const;
+  /// buffer, where bricks have bounds of their own and a coarse texture unit takes its part of each.
+  [[nodiscard]] double beside_nodes(const SamplerTerms& sampler) const;
   /// What nodes of all bricks are brought within now.
   [[nodiscard]] double now() const { return now_; }
 
@@ -66,6 +64,9 @@ class SamplerShare {
                                    std::int64_t atlas) const;
   [[nodiscard]] double left(double taken, double epsilon_abs) const;
   [[nodiscard]] double left_or_throw(double taken, double epsilon_abs) const;
+  // What nodes and the texture unit may err by in a brick together.
+  [[nodiscard]] double room_of(std::size_t brick) const;
+  [[nodiscard]] bool has_room_for_image3d(const Certificate& measured) const;
   std::optional<NodeTolerance> smaller_for_coarse(const Certificate& measured,
                                                   const std::vector<BrickMeasure>& bricks);
 
@@ -73,6 +74,7 @@ class SamplerShare {
   const Plan& plan_;
   Units units_;
   double epsilon_abs_, arithmetic_, reserved_ = 0;
+  std::vector<double> bounds_;
   NodeTolerance start_{0};  // what volumes are begun with
   double now_ = 0;          // and brought within, all bricks
   bool charges_, wants_image3d_ = true, raised_for_image3d_ = false, anew_ = false,

@@ -8,7 +8,8 @@ namespace vdvr {
 
 /// Of one cell; bit a of a corner's number is its place on axis a.
 using Corners = std::array<double, 8>;
-/// By the steps of samples along the axes: 1 on those whose bit is set in the index, 1/2 on the others. [0]: 0.
+/// By the steps of samples along the axes: 1 on those whose bit is set in the index, 1/2 on the others. [0]:
+/// 0.
 using BySteps = std::array<double, 8>;
 
 Corners trilinear_weights(const std::array<double, 3>& fraction);

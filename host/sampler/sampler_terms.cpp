@@ -120,7 +120,8 @@ SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const Sa
     double own = coordinates + weights + 14 * u * b.magnitude +
                  (b.type == SampleType::f32 ? filter.constant_error * b.magnitude
                                             : (filter.constant_error + 4 * u) * b.scale);
-    for (const double difference : b.per_sample) own += 2 * u * static_cast<double>(atlas_length) * difference;
+    for (const double difference : b.per_sample)
+      own += 2 * u * static_cast<double>(atlas_length) * difference;
     images.push_back(std::nextafter(static_cast<float>(own), std::numeric_limits<float>::infinity()));
     image = std::max(image, images.back());
   }

@@ -19,7 +19,7 @@ struct FieldSlopes {
     /// Of cells between its samples whose steps exceed half of their largest along the axes in the index
     /// (FilterProbe::above_half): the largest step.
     std::array<double, 8> of_cells{};
-    double magnitude = 0;                       ///< largest |sample|
+    double magnitude = 0;  ///< largest |sample|
     SampleType type = SampleType::f32;
     double scale = 0;  ///< integers: what the type's whole range decodes to
   };
@@ -32,8 +32,9 @@ FieldSlopes field_slopes(const MixedVolume& volume);
 
 /// buffer, the largest over the bricks: fp32 rounding of the coordinate and of seven interpolations. image3d,
 /// by brick and the largest of them (charge_samplers() puts it beside the bricks' totals): the texture unit's
-/// weights and products, as probed; absent where the device has no such sampler or `atlas_length` is 0. `node_error`: what |V - F| may be at the gold nodes, and `rate`: theirs; both are
-/// used where bricks meet with integer samples. `underflow`: sampler_underflow() in the units of the samples.
+/// weights and products, as probed; absent where the device has no such sampler or `atlas_length` is 0.
+/// `node_error`: what |V - F| may be at the gold nodes, and `rate`: theirs; both are used where bricks meet
+/// with integer samples. `underflow`: sampler_underflow() in the units of the samples.
 SamplerTerms sampler_terms(const FieldSlopes& slopes, const Grid& grid, const SamplerProbe& probe,
                            std::int64_t atlas_length, double node_error, int rate, double underflow = 0);
 

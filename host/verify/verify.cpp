@@ -176,8 +176,8 @@ int finest_rate(const MixedVolume& v) {
   return rate;
 }
 
-// Up to where |V - F| is to be bounded in each brick: what samplers leave of epsilon, and what the certificate
-// says.
+// Up to where |V - F| is to be bounded in each brick: what samplers leave of epsilon, and what the
+// certificate says.
 struct Limits {
   std::vector<double> promised;
   double stated = 0;
@@ -406,11 +406,10 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
   const FieldPoints points_of_field(exact, region, volume, selected, options.seed);
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
-  TestedBricks tested(
-      field, volume, attack,
-      {left_by_samplers(device, stored, sampler, volume.level.size()),
-       stored.measured_total + stored.budget.arithmetic.value},
-      stored.window.has_value(), progress);
+  TestedBricks tested(field, volume, attack,
+                      {left_by_samplers(device, stored, sampler, volume.level.size()),
+                       stored.measured_total + stored.budget.arithmetic.value},
+                      stored.window.has_value(), progress);
   tested.sweep(selected, points_of_field.flags(), result);
   tested.settle(result);
 

@@ -39,12 +39,12 @@ struct ScanNoise {
 };
 
 /// Of what is stated, else of flats (`by_flats`, as read_line_noise() has it), else of the projections alone:
-/// the larger number of photons of two estimates, since texture, which is in most scans, makes them fewer. (1)
-/// Second differences along views and columns (Immerkaer 1996), median; (2) the empty wedge of a sinogram in
-/// frequency, parallel beam with even steps alone. Nothing where none can be had, where the projections were
-/// prepared by more than binning, or where more photons are found than detectors count (10^9): such data were
-/// not measured. `why` then gets one line. Cost: a pass over at most a few million samples. Throws InputError
-/// for numbers that are not positive and finite.
+/// the larger number of photons of two estimates, since texture, which is in most scans, makes them fewer.
+/// (1) Second differences along views and columns (Immerkaer 1996), median; (2) the empty wedge of a sinogram
+/// in frequency, parallel beam with even steps alone. Nothing where none can be had, where the projections
+/// were prepared by more than binning, or where more photons are found than detectors count (10^9): such data
+/// were not measured. `why` then gets one line. Cost: a pass over at most a few million samples. Throws
+/// InputError for numbers that are not positive and finite.
 VDVR_API std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOptions& options = {},
                                              const std::optional<LineIntegralNoise>& by_flats = {},
                                              std::string* why = nullptr);

@@ -30,7 +30,8 @@ struct FilterProbe {
   template <class Real>
   [[nodiscard]] static std::size_t above_half(const std::array<Real, 3>& steps) {
     const Real half = std::max({steps[0], steps[1], steps[2]}) / 2;
-    return std::size_t{steps[0] > half} | std::size_t{steps[1] > half} << 1 | std::size_t{steps[2] > half} << 2;
+    return std::size_t{steps[0] > half} | std::size_t{steps[1] > half} << 1 |
+           std::size_t{steps[2] > half} << 2;
   }
   /// What a value is charged in a cell whose samples differ by at most `steps` along each axis.
   [[nodiscard]] double of_steps(const std::array<double, 3>& steps) const {

@@ -192,7 +192,10 @@ BOOST_AUTO_TEST_CASE(the_total_is_the_largest_of_bricks_with_what_the_unit_takes
   c.measured_total = 0.5;
   c.brick_totals = {0.5f, -1.0f, 0.125f};
   c.budget.arithmetic.value = 0.0625;
-  SamplerTerms samplers{{0x1p-10, "rounding"}, ErrorTerm{4, "device probe"}, {0.03125f, 4.0f, 0.25f}};
+  SamplerTerms samplers;
+  samplers.buffer.value = 0x1p-10;
+  samplers.image3d.emplace();
+  samplers.image3d_by_brick = {0.03125f, 4.0f, 0.25f};
   charge_samplers(c, samplers);  // the second brick has no tested point
   BOOST_TEST(c.total_buffer == 0.5625 + 0x1p-10);
   BOOST_TEST(c.budget.sampler.image3d->value == 0.03125);

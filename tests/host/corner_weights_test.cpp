@@ -18,7 +18,9 @@ std::mt19937& random_bits() {
   return bits;
 }
 
-double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random_bits()); }
+double uniform(double from, double to) {
+  return std::uniform_real_distribution<double>(from, to)(random_bits());
+}
 
 // Weights that err as those of a unit do: sums of 0.
 Corners random_off() {

@@ -132,7 +132,8 @@ BOOST_AUTO_TEST_CASE(a_texture_unit_of_8_bits_is_charged_for_them) {
   BOOST_TEST(c.holds_buffer);
   BOOST_TEST(c.holds_image3d.value_or(false));
   BOOST_REQUIRE(c.budget.sampler.image3d.has_value());
-  // A rounded weight errs by half of 2^-8, along each axis, which each brick is charged at least for its largest step.
+  // A rounded weight errs by half of 2^-8, along each axis, which each brick is charged at least for its
+  // largest step.
   const FieldSlopes slopes = field_slopes(file.volume);
   double largest = 0;
   for (std::size_t i = 0; i < slopes.bricks.size(); ++i) {
@@ -140,7 +141,7 @@ BOOST_AUTO_TEST_CASE(a_texture_unit_of_8_bits_is_charged_for_them) {
     if (const auto total = static_cast<double>(c.brick_totals[i]); total >= 0)
       largest = std::max(largest, total + 0x1p-9 * std::max({steps[0], steps[1], steps[2]}));
   }
-  BOOST_TEST(largest > 1.01 * c.measured_total);
+  BOOST_TEST(largest > 1.001 * c.measured_total);
   BOOST_TEST(*c.total_image3d >= largest + c.budget.arithmetic.value);
   files().verify(unit, scan, "8-bits.vdvr");
   for (const char* sampler : {"buffer", "image3d"})

@@ -15,8 +15,8 @@
 //   VDVR_SHIM_IMAGES=0            no images
 //   VDVR_SHIM_FILTER_BITS=N       read_imagef filters by weights of N bits, as texture units have (N = 8)
 //   VDVR_SHIM_FILTER_CUT=1        these are cut, not rounded, to so many bits
-//   VDVR_SHIM_FILTER_PRODUCTS=1   weights of corners are rounded to so many bits too, as those of NVIDIA's units
-//   VDVR_SHIM_FILTER_U8=1         of 8-bit images each lerp is rounded to 8 bits too
+//   VDVR_SHIM_FILTER_PRODUCTS=1   weights of corners are rounded to so many bits too, as those of NVIDIA's
+//   units VDVR_SHIM_FILTER_U8=1         of 8-bit images each lerp is rounded to 8 bits too
 //   VDVR_SHIM_BUILD_OPTIONS=TEXT  more options for every program
 // What is built:
 //   VDVR_SHIM_PROGRAMS=DIR        every program, as NAME.cl and its options as NAME.opt (scripts/offline-gpu)
@@ -44,9 +44,9 @@
 namespace {
 
 constexpr const char* character[] = {
-    "VDVR_SHIM_GPU",        "VDVR_SHIM_WORK_GROUP", "VDVR_SHIM_COMPUTE_UNITS", "VDVR_SHIM_LOCAL_MEM",
-    "VDVR_SHIM_FP64",       "VDVR_SHIM_DENORMALS",  "VDVR_SHIM_IMAGES",        "VDVR_SHIM_FILTER_BITS",
-    "VDVR_SHIM_FILTER_CUT", "VDVR_SHIM_FILTER_U8",  "VDVR_SHIM_FILTER_PRODUCTS",  "VDVR_SHIM_BUILD_OPTIONS"};
+    "VDVR_SHIM_GPU",        "VDVR_SHIM_WORK_GROUP", "VDVR_SHIM_COMPUTE_UNITS",   "VDVR_SHIM_LOCAL_MEM",
+    "VDVR_SHIM_FP64",       "VDVR_SHIM_DENORMALS",  "VDVR_SHIM_IMAGES",          "VDVR_SHIM_FILTER_BITS",
+    "VDVR_SHIM_FILTER_CUT", "VDVR_SHIM_FILTER_U8",  "VDVR_SHIM_FILTER_PRODUCTS", "VDVR_SHIM_BUILD_OPTIONS"};
 
 // 0: not set.
 cl_ulong setting(const char* name) {
@@ -164,8 +164,8 @@ constexpr const char* without_fp64 = R"(
 #endif
 )";
 
-// A texture unit: coordinates in 2^-FILTER_BITS texels, then lerps by these weights, exact or with products that
-// have as many bits.
+// A texture unit: coordinates in 2^-FILTER_BITS texels, then lerps by these weights, exact or with products
+// that have as many bits.
 constexpr const char* texture_unit = R"(
 #ifdef __IMAGE_SUPPORT__
 float shim_lerp(float a, float b, float t, bool rounds) {
