@@ -64,7 +64,7 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "5"},
+      {"record format", "6"},
       {"version", VDVR_VERSION},
       {"device", joined(devices, &DeviceInfo::name)},
       {"driver", joined(devices, &DeviceInfo::driver)},
