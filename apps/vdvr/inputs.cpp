@@ -98,9 +98,8 @@ ProjectionSet load_scan(const fs::path& path, const Arguments& args, const Field
   return checked(load(path, args, field, {}, {}, progress, understood ? *understood : own));
 }
 
-std::optional<LineIntegralNoise> load_line_noise(const fs::path& path, const Arguments& args,
-                                                 const FieldOptions& field) {
-  return read_line_noise(path, scan_options(args, field, {}, {}));
+ScanOptions scan_options(const Arguments& args, const FieldOptions& field) {
+  return scan_options(args, field, {}, {});
 }
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,

@@ -5,10 +5,10 @@
 #include <filesystem>
 
 #include "apps/vdvr/options.hpp"
-#include "vdvr/line_noise.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/read_scan.hpp"
 #include "vdvr/understood.hpp"
 #include "vdvr/vdvr_file.hpp"
 
@@ -24,9 +24,8 @@ InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
 ProjectionSet load_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress, Understood* understood = nullptr);
 
-/// What the scan's repeated flats say of its noise, if they do (vdvr::read_line_noise).
-std::optional<LineIntegralNoise> load_line_noise(const std::filesystem::path& path, const Arguments& args,
-                                                 const FieldOptions& field);
+/// How load_scan() reads.
+ScanOptions scan_options(const Arguments& args, const FieldOptions& field);
 
 /// The same without the check: of what reconstruction may refuse, too.
 ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& args,

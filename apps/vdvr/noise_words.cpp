@@ -38,7 +38,8 @@ Json noise_json(const NoiseFound& found) {
           {"by_flats", number_or_null(n.by_flats)},
           {"by_differences", number_or_null(n.by_differences)},
           {"by_wedge", number_or_null(n.by_wedge)},
-          {"agreed", n.agreed}};
+          {"agreed", n.agreed},
+          {"passed", n.passed}};
 }
 
 void print_noise(const NoiseFound& found) {

@@ -1,7 +1,6 @@
 #include "apps/vdvr/scan_noise.hpp"
 
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/read_scan.hpp"
 
 namespace vdvr::cli {
 
@@ -22,10 +21,7 @@ NoiseOptions noise_options(const Arguments& args) {
 NoiseFound noise_of_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
                          const ProjectionSet& scan) {
   NoiseFound found;
-  const NoiseOptions options = noise_options(args);
-  std::optional<LineIntegralNoise> by_flats;
-  if (!options.photons && !options.sigma_p) by_flats = load_line_noise(path, args, field);
-  found.noise = scan_noise(scan, options, by_flats, &found.why);
+  found.noise = read_scan_noise(path, scan_options(args, field), scan, noise_options(args), &found.why);
   return found;
 }
 

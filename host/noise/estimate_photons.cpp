@@ -1,4 +1,4 @@
-// Two estimates of photons (docs/noise.md). What is wrong with either makes photons too few.
+// Two estimates of photons (docs/noise.md).
 #include "host/noise/estimate_photons.hpp"
 
 #include <algorithm>
@@ -48,11 +48,17 @@ double even_step(const ProjectionSet& scan, const std::vector<std::int64_t>& ord
   return std::abs(step);
 }
 
+// One over the variance of p, over that of 0.
+double share_of_open(double p, Integrals integrals) {
+  return integrals == Integrals::logarithms ? std::exp(-p) : 1.0;
+}
+
 // Power in the wedge of one row's sinogram, and the mean of e^p under the same windows.
 class Wedge {
  public:
-  Wedge(const ProjectionSet& scan, std::vector<std::int64_t> order, double step)
+  Wedge(const ProjectionSet& scan, std::vector<std::int64_t> order, double step, Integrals integrals)
       : scan_(scan),
+        integrals_(integrals),
         order_(std::move(order)),
         views_(std::bit_floor(order_.size())),
         columns_(std::bit_floor(at(scan.geometry.columns))),
@@ -86,7 +92,7 @@ class Wedge {
             scan_.data[at((order_[first_view + k] * g.rows + row) * g.columns) + first_column + i]);
         const double w = window_views_[k] * window_columns_[i];
         x[k * columns_ + i] = w * p;
-        open += w * w * std::exp(p);
+        open += w * w / share_of_open(p, integrals_);
       }
     for (std::size_t k = 0; k < views_; ++k)
       along_columns_.forward(std::span(x).subspan(k * columns_, columns_));
@@ -105,6 +111,7 @@ class Wedge {
   }
 
   const ProjectionSet& scan_;
+  Integrals integrals_;
   std::vector<std::int64_t> order_;
   std::size_t views_, columns_;
   fft::HostFft along_views_, along_columns_;
@@ -131,7 +138,7 @@ std::vector<std::int64_t> views_by_angle(const ProjectionSet& scan) {
   return order;
 }
 
-std::optional<double> photons_by_differences(const ProjectionSet& scan) {
+std::optional<double> photons_by_differences(const ProjectionSet& scan, Integrals integrals) {
   const ParallelGeometry& g = scan.geometry;
   if (g.views() < 3 || g.columns < 3) return std::nullopt;
   const std::vector<std::int64_t> order = views_by_angle(scan);
@@ -150,19 +157,19 @@ std::optional<double> photons_by_differences(const ProjectionSet& scan) {
         difference += second[at(a)] * second[at(b)] * p;
         mean += p / 9;
       }
-    shares.push_back(difference * difference * std::exp(-mean) / 36);
+    shares.push_back(difference * difference * share_of_open(mean, integrals) / 36);
   }
   const double share = median_of(shares) / median_of_chi2;
   return share > 0 && std::isfinite(share) ? std::optional(1 / share) : std::nullopt;
 }
 
-std::optional<double> photons_by_wedge(const ProjectionSet& scan) {
+std::optional<double> photons_by_wedge(const ProjectionSet& scan, Integrals integrals) {
   const ParallelGeometry& g = scan.geometry;
   if (scan.cone || g.views() < 16 || g.columns < 16) return std::nullopt;
   const std::vector<std::int64_t> order = views_by_angle(scan);
   const double step = even_step(scan, order);
   if (!(step > 0)) return std::nullopt;
-  const Wedge wedge(scan, order, step);
+  const Wedge wedge(scan, order, step, integrals);
   if (!wedge.is_wide_enough()) return std::nullopt;
   std::vector<double> powers;
   const std::int64_t looked_at = std::min<std::int64_t>(8, g.rows);

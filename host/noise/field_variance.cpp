@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "host/fbp/back_project.hpp"
 #include "host/fbp/cosine_series.hpp"
@@ -91,7 +92,7 @@ FieldVariance of_parallel(opencl::State& state, const ProjectionSet& scan, const
     const std::int64_t heights = std::min(rows_together, n[2] - z);
     std::vector<std::vector<RowShare>> shares;
     for (std::int64_t h = 0; h < heights; ++h)
-      shares.push_back(squared_row_shares(places[at(z + h)], g.rows));
+      shares.push_back(squared_row_shares(places[at(z + h)], g.rows, noise.row_correlation));
     UpsampledSlab slab{{}, columns, 0, g.views(), heights, rows_together};
     slab.values = opencl::DeviceArray<float>(state, count(g.views() * columns.count * rows_together),
                                              "variances of filtered rows");
@@ -218,19 +219,43 @@ double SquaredFilter::operator()(std::span<const double> row, std::span<const do
   return sum;
 }
 
-std::vector<RowShare> squared_row_shares(double place, std::int64_t rows) {
+double passed_share(const FieldOptions& field, std::span<const float> spectrum) {
+  if (spectrum.empty()) return 1;
+  // Beyond, the ramp's kernel has 1e-6 of its middle.
+  constexpr std::int64_t taps = 256;
+  const std::vector<double> kernel = ramp_kernel(field, 1.0, taps);
+  double passed = 0, all = 0;
+  for (std::size_t m = 0; m < spectrum.size(); ++m) {
+    const double omega =
+        std::numbers::pi * (static_cast<double>(m) + 0.5) / static_cast<double>(spectrum.size());
+    double response = kernel[0];
+    for (std::int64_t i = 1; i < taps; ++i)
+      response += 2 * kernel[at(i)] * std::cos(omega * static_cast<double>(i));
+    passed += response * response * static_cast<double>(spectrum[m]);
+    all += response * response;
+  }
+  return passed / all;
+}
+
+std::vector<RowShare> squared_row_shares(double place, std::int64_t rows,
+                                         std::span<const float> correlation) {
   const double nearest = std::round(place);
   // As far as 1e-6 of a row S_v is 1 there and 0 elsewhere to 1e-6.
   if (std::abs(place - nearest) < 1e-6 && nearest >= 0 && nearest < static_cast<double>(rows))
     return {{static_cast<std::int64_t>(nearest), 1.0}};
   const std::vector<double> matrix = resampling_matrix(rows, std::span(&place, 1), 0, 1.0, 0);
-  double all = 0;
+  double all = 0, with_products = 0;
   for (const double s : matrix) all += s * s;
+  for (std::int64_t lag = 1; lag <= std::min(std::ssize(correlation), rows - 1); ++lag)
+    for (std::int64_t r = lag; r < rows; ++r)
+      with_products +=
+          2 * static_cast<double>(correlation[at(lag - 1)]) * matrix[at(r)] * matrix[at(r - lag)];
+  const double factor = std::max(0.0, 1 + with_products / all);
   std::vector<RowShare> shares;
   for (std::int64_t r = 0; r < rows; ++r)
     // A thousandth of the whole, spread over all rows, is left out at most.
     if (const double weight = matrix[at(r)] * matrix[at(r)]; weight * static_cast<double>(rows) > 1e-3 * all)
-      shares.push_back({r, weight});
+      shares.push_back({r, factor * weight});
   return shares;
 }
 
@@ -248,8 +273,10 @@ double PixelVariance::operator()(std::size_t pixel, double p) const {
 
 FieldVariance field_variance(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                              const LineIntegralNoise& noise, const Grid& grid, const Progress& progress) {
-  return scan.cone ? of_cone(state, scan, field, noise, grid, progress)
-                   : of_parallel(state, scan, field, noise, grid, progress);
+  FieldVariance out = scan.cone ? of_cone(state, scan, field, noise, grid, progress)
+                                : of_parallel(state, scan, field, noise, grid, progress);
+  out.scale *= passed_share(field, noise.spectrum);
+  return out;
 }
 
 }  // namespace vdvr

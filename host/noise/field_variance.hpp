@@ -34,12 +34,17 @@ class SquaredFilter {
   double rest_ = 0;  // g(t)^2 t^2 far from 0 between columns
 };
 
-/// Weights S_v(z, r)^2 of detector rows for a height between them, those that matter: (row, weight).
+/// Weights S_v(z, r)^2 of detector rows for a height between them, those that matter: (row, weight). Of rows
+/// that are correlated (LineIntegralNoise) all by what their products add.
 struct RowShare {
   std::int64_t row;
   double weight;
 };
-std::vector<RowShare> squared_row_shares(double place, std::int64_t rows);
+std::vector<RowShare> squared_row_shares(double place, std::int64_t rows,
+                                         std::span<const float> correlation = {});
+
+/// The share of white noise's variance that a noise of this spectrum (LineIntegralNoise) has after the ramp.
+double passed_share(const FieldOptions& field, std::span<const float> spectrum);
 
 /// v of one pixel's line integral.
 class PixelVariance {

@@ -14,6 +14,11 @@ struct LineIntegralNoise {
   std::vector<float> photon{}, read{};  ///< [row v][column u], or one for all pixels, or none: 0
   double photons = 0;                   ///< in the open beam, median of the pixels; 0: of no such model
   std::string source{};                 ///< "stated", "flats", "second differences", "empty wedge"
+  /// What a preparation made of white noise: its power over frequency along columns, the white noise's being
+  /// 1, at (m + 1/2) / 2n cycles a column for 0 <= m < n. None: it is white.
+  std::vector<float> spectrum{};
+  /// Correlation of rows 1, 2, ... apart after the ramp. None: 0.
+  std::vector<float> row_correlation{};
 };
 
 }  // namespace vdvr

@@ -8,6 +8,7 @@
 // bound: nothing that is certified rests on it.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,7 @@
 #include "vdvr/line_noise.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
+#include "vdvr/read_scan.hpp"
 
 namespace vdvr {
 
@@ -35,6 +37,8 @@ struct ScanNoise {
   std::optional<double> by_flats, by_differences, by_wedge;
   /// Whether the model was stated, or two sources have the same photons within a factor of 1.5.
   bool agreed = false;
+  /// The share of the pixels' variance that passed the preparation, and Ram-Lak's ramp after it.
+  double passed = 1;
   std::string words;  ///< one line: the source, what it found, what the others say
 };
 
@@ -43,11 +47,21 @@ struct ScanNoise {
 /// (1) Second differences along views and columns (Immerkaer 1996), median; (2) the empty wedge of a sinogram
 /// in frequency, parallel beam with even steps alone. Nothing where none can be had, where the projections
 /// were prepared by more than binning, or where more photons are found than detectors count (10^9): such data
-/// were not measured. `why` then gets one line. Cost: a pass over at most a few million samples. Throws
+/// were not measured. Line integrals beyond 30, or below 0.01, are no logarithms of counts: they get one
+/// variance for all. `why` gets one line where there is nothing. Cost: a pass over at most a few million samples. Throws
 /// InputError for numbers that are not positive and finite.
 VDVR_API std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOptions& options = {},
                                              const std::optional<LineIntegralNoise>& by_flats = {},
                                              std::string* why = nullptr);
+
+/// The same of a scan that was read from `path` as `how` says, with what its flats tell. Where projections
+/// were prepared by more than binning, noise is that of the unprepared ones, which are read once more, times
+/// what passed: white noise of that variance is pushed through the same steps (docs/noise.md). Memory: of
+/// prepared ones a second scan, held as `how` has it, and 200 MiB. Throws what read_scan() throws; FileError
+/// where the scan was changed since.
+VDVR_API std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
+                                                  const ProjectionSet& scan, const NoiseOptions& options = {},
+                                                  std::string* why = nullptr, const Progress& progress = {});
 
 /// float sigma[z][y][x] of F on the samples of a grid, density units: coarser than the scan's, since it is
 /// smooth. Samples that views do not see hold anything finite; of cone beam 0. Cost: a back-projection of

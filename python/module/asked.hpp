@@ -1,24 +1,41 @@
 // A tolerance as Python states it, and what it is held to.
 #pragma once
 
+#include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
 
+#include "long_work.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/noise_forecast.hpp"
 
 namespace vdvr::python {
 
+/// Where a scan was read from, and how.
+struct ScanSource {
+  std::filesystem::path path;
+  ScanOptions how;
+};
+
 struct Asked {
   Tolerance tolerance;
   std::optional<double> sigmas;  ///< of the scan's own noise, brick by brick; then `tolerance` says nothing
   NoiseOptions noise;            ///< in place of what the scan tells
+  std::optional<ScanSource> source;  ///< none of arrays: their projections alone tell their noise
 };
+
+inline std::optional<ScanNoise> find_noise(const ProjectionSet& scan, const NoiseOptions& options,
+                                           const std::optional<ScanSource>& source, std::string& why) {
+  if (!source) return scan_noise(scan, options, {}, &why);
+  const std::lock_guard turn(hdf5_turn());
+  return read_scan_noise(source->path, source->how, scan, options, &why);
+}
 
 /// Of a tolerance in sigma; throws InputError where the noise is neither stated nor found.
 inline ScanNoise known_noise(const ProjectionSet& scan, const Asked& asked) {
   std::string why;
-  if (auto noise = scan_noise(scan, asked.noise, {}, &why)) return std::move(*noise);
+  if (auto noise = find_noise(scan, asked.noise, asked.source, why)) return std::move(*noise);
   throw InputError("epsilon in sigma needs the scan's noise, and none is known: " + why +
                    "; state it by photons= or sigma_p=, or give a tolerance such as '3%'");
 }

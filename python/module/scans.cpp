@@ -11,6 +11,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -241,6 +242,46 @@ void add_projections(nb::module_& m) {
         });
       },
       "path"_a, "scan"_a);
+  nb::class_<ScanSource>(m, "ScanSource")
+      .def(
+          "__init__",
+          [](ScanSource* self, const std::filesystem::path& path, const ScanOptions& how) {
+            new (self) ScanSource{path, how};
+          },
+          "path"_a, "how"_a);
+  nb::class_<ScanNoise>(m, "ScanNoise", "What is known of a scan's noise, and from where (docs/noise.md).")
+      .def_prop_ro(
+          "source", [](const ScanNoise& n) { return n.model.source; },
+          "\"stated\", \"flats\", \"second differences\" or \"empty wedge\".")
+      .def_prop_ro(
+          "photons",
+          [](const ScanNoise& n) {
+            return n.model.photons > 0 ? std::optional(n.model.photons) : std::nullopt;
+          },
+          "Of a pixel in the open beam; None where all line integrals have one standard deviation.")
+      .def_prop_ro(
+          "sigma_p",
+          [](const ScanNoise& n) {
+            return n.model.constant > 0 ? std::optional(std::sqrt(n.model.constant)) : std::nullopt;
+          },
+          "The standard deviation of line integrals, where all have one.")
+      .def_ro("by_flats", &ScanNoise::by_flats)
+      .def_ro("by_differences", &ScanNoise::by_differences)
+      .def_ro("by_wedge", &ScanNoise::by_wedge)
+      .def_ro("agreed", &ScanNoise::agreed, "Whether it was stated, or two sources agree within 1.5.")
+      .def_ro("passed", &ScanNoise::passed, "Share of the variance that passed the preparation.")
+      .def("__str__", [](const ScanNoise& n) { return n.words; });
+  m.def(
+      "noise_of",
+      [](const ProjectionSet& scan, const std::optional<ScanSource>& source, std::optional<double> photons,
+         std::optional<double> sigma_p) {
+        std::optional<ScanNoise> noise;
+        std::string why;
+        run_long(nb::none(), [&](const Progress&) { noise = find_noise(scan, {photons, sigma_p}, source, why); });
+        if (!noise) throw InputError("noise: none is known: " + why);
+        return *noise;
+      },
+      "scan"_a, "source"_a.none(), "photons"_a.none(), "sigma_p"_a.none());
   m.def(
       "degrees_of", [](const std::vector<double>& radians) { return degrees_of(radians); }, "radians"_a);
   nb::class_<CenterWitness>(m, "CenterWitness", "What one method says of the axis' column.")
@@ -308,7 +349,8 @@ void add_plans(nb::module_& m) {
           [](Asked& a, std::optional<double> value) { a.noise.photons = value; }, nb::arg().none())
       .def_prop_rw(
           "sigma_p", [](const Asked& a) { return a.noise.sigma_p; },
-          [](Asked& a, std::optional<double> value) { a.noise.sigma_p = value; }, nb::arg().none());
+          [](Asked& a, std::optional<double> value) { a.noise.sigma_p = value; }, nb::arg().none())
+      .def_rw("source", &Asked::source, nb::arg().none());
   nb::class_<CertifyOptions>(m, "CertifyOptions")
       .def(nb::init<>())
       .def_rw("field", &CertifyOptions::field)

@@ -139,8 +139,9 @@ def plan(
     """
     wanted = _options(**options)
     wanted.input = _stated(scan)
-    asked = tolerance(epsilon, epsilon_abs, photons, sigma_p)
-    return _core.make_plan(open_device(device), _checked(scan), asked, wanted, progress)
+    projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs, photons, sigma_p)
+    asked.source = scan._source
+    return _core.make_plan(open_device(device), projections, asked, wanted, progress)
 
 
 @_takes_options
@@ -183,6 +184,7 @@ def build(
     wanted.input = _stated(scan)
     wanted.foresee = False
     projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs, photons, sigma_p)
+    asked.source = scan._source
     if save is None:
         if resume:
             raise _core.InputError("resume: give save=, beside which the journal lies")

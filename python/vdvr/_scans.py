@@ -59,6 +59,7 @@ class Scan:
 
     _core: "_core.ProjectionSet"
     _understood: "_core.Understood"
+    _source: Optional["_core.ScanSource"]
 
     def __init__(
         self,
@@ -79,13 +80,17 @@ class Scan:
         described.unit = unit
         described.name = name
         self._understood = _core.Understood()
+        self._source = None
         self._core = _core.scan_of(_projections(projections, line_integrals), described)
 
     @classmethod
-    def _of(cls, core: "_core.ProjectionSet", understood: "_core.Understood") -> "Scan":
+    def _of(
+        cls, core: "_core.ProjectionSet", understood: "_core.Understood", source: "_core.ScanSource"
+    ) -> "Scan":
         scan = cls.__new__(cls)
         scan._core = core
         scan._understood = understood
+        scan._source = source
         return scan
 
     @property
@@ -142,6 +147,16 @@ class Scan:
     def warnings(self) -> List[str]:
         """What makes it doubtful, a line each; among the notes too."""
         return self._understood.warnings
+
+    def noise(self, *, photons: Optional[float] = None, sigma_p: Optional[float] = None) -> "_core.ScanNoise":
+        """What is known of the noise, as `epsilon="1sigma"` takes it: of what is stated, else of the file's repeated
+        flats, else of the projections alone. A prepared scan's file is read once more.
+
+        Raises
+        ------
+        InputError : none is known; the message says why.
+        """
+        return _core.noise_of(self._core, self._source, photons, sigma_p)
 
     def save(self, path: Path) -> None:
         """Writes a Data Exchange file (HDF5) that `vdvr build` and `read_scan` read."""
@@ -220,7 +235,7 @@ def read_scan(
         members = ("distance_mm", "energy_kev", "delta_beta")
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     options.preparation = preparation
-    scan = Scan._of(*_core.read_scan(path, options, progress))
+    scan = Scan._of(*_core.read_scan(path, options, progress), _core.ScanSource(path, options))
     for text in scan.warnings:
         warnings.warn(text, stacklevel=2)
     return scan

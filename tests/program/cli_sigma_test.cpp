@@ -147,6 +147,34 @@ BOOST_AUTO_TEST_CASE(run_goes_by_the_noise_where_nothing_is_asked) {
   BOOST_TEST(std::abs(json.at("certificate").at("epsilon").get<double>() - 0.03) < 1e-12);
 }
 
+BOOST_AUTO_TEST_CASE(noise_goes_through_the_preparation) {
+  const auto plain = json_of({"info", noisy(), "--json"}).at("noise");
+  BOOST_TEST(plain.at("passed") == 1);
+  const auto blurred = json_of({"plan", noisy(), "--epsilon", "3%", "--gaussian", "1,0", "--json"}).at("noise");
+  BOOST_TEST(blurred.at("source") == "flats");
+  BOOST_TEST(blurred.at("photons") == plain.at("photons"));
+  // Of a Gaussian of one column some 7 % pass it and the ramp; of seven pixels' median less than a third.
+  BOOST_TEST(blurred.at("passed").get<double>() > 0.05);
+  BOOST_TEST(blurred.at("passed").get<double>() < 0.1);
+  // What is stated is of the unprepared ones.
+  const auto stated = json_of({"plan", noisy(), "--epsilon", "3%", "--median", "3", "--photons", "300", "--json"});
+  BOOST_TEST(stated.at("noise").at("passed").get<double>() < 0.15);
+  const std::string file = at("blurred.vdvr");
+  const auto result =
+      json_of({"build", noisy(), "--epsilon", "2sigma", "--gaussian", "1,0", "-o", file, "--json"});
+  BOOST_TEST(result.at("certificate").at("noise").at("sigma").at("median").get<double>() <
+             0.5 * built().at("certificate").at("noise").at("sigma").at("median").get<double>());
+  BOOST_TEST(run({"verify", file, "--projections", noisy()}).code == 0);
+}
+
+BOOST_AUTO_TEST_CASE(counts_of_single_photons_have_no_variance_to_go_by) {
+  const std::string scan = at("dark.h5");
+  BOOST_TEST_REQUIRE(run({"simulate", "--phantom", "sphere", "--detector", "65x9", "--angles", "90",
+                          "--photons", "5", "-o", scan})
+                         .code == 0);
+  check_refused({"build", scan, "--epsilon", "1sigma", "-o", at("none.vdvr")}, "sigma-p");
+}
+
 BOOST_AUTO_TEST_CASE(what_sigma_cannot_mean_is_refused) {
   check_refused({"build", small_scan(), "--epsilon", "1sigma", "-o", at("none.vdvr")}, "--photons");
   check_refused({"build", noisy(), "--epsilon", "0sigma", "-o", at("none.vdvr")}, "above 0");

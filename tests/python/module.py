@@ -154,6 +154,15 @@ assert np.array_equal(window, greys)
 raises(vdvr.InputError, "box", lambda: volume.to_numpy(box=(90, 90, 90, 99, 99, 99)))
 raises(vdvr.InputError, "[..., 3]", lambda: volume([1.0, 2.0]))
 # Sigma: a build that is held to it, at points, in pictures.
+subprocess.run([sys.argv[1], "simulate", "--phantom", "sphere", "--detector", "33x5", "--angles", "40", "--photons", "2000",
+                "-o", "counts.h5", "--quiet"], check=True)
+counts = vdvr.read_scan("counts.h5")
+told = counts.noise()
+assert told.source == "flats" and abs(told.photons / 2000 - 1) < 0.1 and told.passed == 1 and "flats" in str(told)
+assert 0.04 < vdvr.read_scan("counts.h5", gaussian=(1, 0)).noise().passed < 0.1
+assert counts.noise(sigma_p=0.5).sigma_p == 0.5 and counts.noise(sigma_p=0.5).photons is None
+assert vdvr.build(counts, "8sigma").certificate["noise"]["source"] == "flats"
+raises(vdvr.InputError, "noise", lambda: vdvr.Scan(np.zeros((12, 3, 13), np.float32), angles, center=6.0).noise())
 noisy = vdvr.build(scan, "4sigma", sigma_p=0.05)
 middle = noisy.sigma([[0.0, 0.0, 0.0]])
 assert middle.shape == (1,) and middle[0] > 0 and noisy.certificate["noise"]["tolerance_sigmas"] == 4

@@ -1,0 +1,21 @@
+// What the steps of a preparation leave of white noise. Called by read_noise.cpp.
+#pragma once
+
+#include <cstdint>
+
+#include "vdvr/line_noise.hpp"
+#include "vdvr/projections.hpp"
+
+namespace vdvr {
+
+/// Whether it does more than binning, which leaves white noise white.
+bool changes_noise(Preparation preparation);
+
+/// The noise of prepared projections, of that of the unprepared ones (`rows` x `columns` pixels): white noise
+/// of its variance is pushed through the steps, on top of the prepared projections, blurred by a pixel, since
+/// medians pass more of it on slopes. Some four million samples of it, from the middle rows; of stripes, which need all views, at
+/// least 16 rows. Cost: the steps on those, and 128 multiply-adds for each. The same on every machine.
+LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows, std::int64_t columns,
+                               const ProjectionSet& prepared);
+
+}  // namespace vdvr

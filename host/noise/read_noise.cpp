@@ -1,0 +1,53 @@
+// The noise of a scan in files; see vdvr/noise.hpp.
+#include <fmt/format.h>
+
+#include "host/noise/field_variance.hpp"
+#include "host/noise/passed_noise.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/noise.hpp"
+
+namespace vdvr {
+namespace {
+
+// As the files have it, but for the centre, which says nothing of the noise: it need not be found.
+ProjectionSet read_unprepared(const std::filesystem::path& path, ScanOptions how, const ProjectionSet& scan,
+                              const Progress& progress) {
+  if (!scan.cone || how.center)
+    how.center = unbinned_center(how.center.value_or(scan.geometry.center), how.preparation.binning);
+  how.preparation = {};
+  ProjectionSet unprepared = read_scan(path, how, progress);
+  if (unprepared.report.sha256 != scan.report.sha256)
+    throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
+  return unprepared;
+}
+
+}  // namespace
+
+std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
+                                         const ProjectionSet& scan, const NoiseOptions& options,
+                                         std::string* why, const Progress& progress) {
+  const bool stated = options.photons || options.sigma_p;
+  if (!changes_noise(scan.report.preparation))
+    return scan_noise(scan, options, stated ? std::nullopt : read_line_noise(path, how), why);
+  const int b = scan.report.preparation.binning;
+  std::int64_t rows = scan.geometry.rows * b, columns = scan.geometry.columns * b;
+  std::optional<ScanNoise> found;
+  if (stated) {
+    found = scan_noise({scan.geometry, {}, {}, {}}, options);
+  } else {
+    ScanOptions as_measured = how;
+    as_measured.preparation = {};
+    const ProjectionSet unprepared = read_unprepared(path, how, scan, progress);
+    rows = unprepared.geometry.rows;
+    columns = unprepared.geometry.columns;
+    found = scan_noise(unprepared, options, read_line_noise(path, as_measured), why);
+  }
+  if (!found) return found;
+  found->model = passed_noise(found->model, rows, columns, scan);
+  found->passed = passed_share({}, found->model.spectrum);
+  found->words += fmt::format("; {:.3g} of their variance is left after {}", found->passed,
+                              text_of(scan.report.preparation));
+  return found;
+}
+
+}  // namespace vdvr
