@@ -12,17 +12,6 @@ namespace vdvr::cli {
 namespace {
 
 constexpr std::array<double, 2> multiples{1, 2};
-// A split that is this much more, or less, than what was predicted says something (docs/noise.md).
-constexpr double much_more = 1.5, much_less = 0.8;
-
-std::string judgement(const SplitOfViews& split) {
-  if (!split.resolved) return ", with what so few views alias beside noise";
-  if (split.ratio() > much_more)
-    return ": more than noise differs between neighbouring views (motion, beam, drift)";
-  if (split.ratio() < much_less)
-    return ": less than predicted (texture taken for noise, or pixels that share theirs)";
-  return "";
-}
 
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
@@ -93,8 +82,7 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
   fmt::print("noise of F     sigma {:.4g} ({:.4g} to {:.4g}), {:.3g} % of the range; an estimate\n", median,
              noise.sigma.least, noise.sigma.largest, 100 * median / plan.reference_range);
   if (noise.split)
-    fmt::print("  split        halves of the views differ by {:.2f} of that{}\n", noise.split->ratio(),
-               judgement(*noise.split));
+    fmt::print("  split        {}\n", split_words(noise.split->ratio(), noise.split->resolved));
   else fmt::print("  split        too few views to be split for comparison\n");
   if (noise.rings && noise.rings->radius() > 1)
     fmt::print(

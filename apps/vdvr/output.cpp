@@ -157,6 +157,9 @@ void print_budget(const ErrorBudget& budget, double epsilon_abs) {
   if (budget.sampler.image3d) line("sampler image3d", *budget.sampler.image3d);
 }
 
+// A split that is this much more, or less, than what was predicted says something (docs/noise.md).
+constexpr double much_more = 1.5, much_less = 0.8;
+
 void print_noise_record(const Certificate& c) {
   const NoiseRecord& n = *c.noise;
   const double worst = worst_in_sigma(c, false);
@@ -166,6 +169,17 @@ void print_noise_record(const Certificate& c) {
     fmt::print("  in sigma     interpolation errs by at most {:.3g} sigma of its brick{}{}\n", worst,
                n.tolerance_sigmas ? fmt::format("; {:g} was asked for", *n.tolerance_sigmas) : "",
                n.rms_in_sigma ? fmt::format("; {:.2g} in the mean, estimated", *n.rms_in_sigma) : "");
+  if (n.split_ratio) fmt::print("  split        {}\n", split_words(*n.split_ratio, n.split_resolved));
+}
+
+std::string split_words(double ratio, bool resolved) {
+  const char* judgement = "";
+  if (!resolved) judgement = ", with what so few views alias beside noise";
+  else if (ratio > much_more)
+    judgement = ": more than noise differs between neighbouring views (motion, beam, drift)";
+  else if (ratio < much_less)
+    judgement = ": less than predicted (texture taken for noise, or pixels that share theirs)";
+  return fmt::format("halves of the views differ by {:.2f} of sigma{}", ratio, judgement);
 }
 
 void print_certificate(const Certificate& c) {

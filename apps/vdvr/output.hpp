@@ -45,6 +45,8 @@ std::string bytes_text(std::uint64_t bytes);
 void print_grid(const Grid& grid);
 void print_bounds(const std::vector<Bound>& bounds, double epsilon_abs);
 void print_budget(const ErrorBudget& budget, double epsilon_abs);
+/// What a split of the views says of sigma.
+std::string split_words(double ratio, bool resolved);
 void print_certificate(const Certificate& certificate);
 void print_storage(const MixedVolume& volume, std::uint64_t file_bytes);
 void print_seconds(const std::map<std::string, double>& seconds);

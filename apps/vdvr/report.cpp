@@ -184,7 +184,7 @@ std::string in_sigma(const Certificate& c) {
   return fmt::format(
       "<li>In units of the scan's own noise: interpolation errs by at most {} sigma of the brick{}{}. Sigma, "
       "the "
-      "standard deviation of F, runs from {} to {}, {} in the middle: an estimate, from {}.</li>\n",
+      "standard deviation of F, runs from {} to {}, {} in the middle: an estimate, from {}{}.</li>\n",
       number_html(worst_in_sigma(c, false), "noise.worst.buffer"),
       n.tolerance_sigmas ? fmt::format(", where {} was asked for", number_text(*n.tolerance_sigmas)) : "",
       n.rms_in_sigma
@@ -194,7 +194,8 @@ std::string in_sigma(const Certificate& c) {
                         number_html(*n.rms_in_sigma, "noise.rms.sigmas"), n.rms_points, 1 + *n.rms_in_sigma)
           : "",
       number_html(n.least, "noise.sigma.least"), number_html(n.largest, "noise.sigma.largest"),
-      number_html(n.median, "noise.sigma.median"), escaped(n.source));
+      number_html(n.median, "noise.sigma.median"), escaped(n.source),
+      n.split_ratio ? "; " + escaped(split_words(*n.split_ratio, n.split_resolved)) : "");
 }
 
 std::string promised(const RunReport& run) {

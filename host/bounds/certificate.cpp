@@ -75,6 +75,8 @@ Json noise(const Certificate& c) {
   }
   if (n.rms_in_sigma)
     j["rms"] = {{"sigmas", finite("noise.rms.sigmas", *n.rms_in_sigma)}, {"points", n.rms_points}};
+  if (n.split_ratio)
+    j["split"] = {{"ratio", finite("noise.split.ratio", *n.split_ratio)}, {"resolved", n.split_resolved}};
   j["brick_sigma_sha256"] = n.sha256;
   return j;
 }
@@ -237,6 +239,13 @@ void read_noise(const Member& m, Certificate& c) {
     n.rms_points = m.at("rms").at("points").integer();
     if (!(*n.rms_in_sigma >= 0 && n.rms_points > 0))
       throw FileError("certificate: member 'noise.rms' is no mean of any points");
+  }
+  if (m.has("split")) {
+    n.split_ratio = m.at("split").at("ratio").number();
+    n.split_resolved = m.at("split").at("resolved").flag();
+    if (!(*n.split_ratio > 0))
+      throw FileError(
+          fmt::format("certificate: member 'noise.split.ratio' is {}; it must be positive", *n.split_ratio));
   }
   if (m.has("worst") && m.at("worst").has("image3d")) n.worst_image3d = m.at("worst").at("image3d").number();
   n.sha256 = m.at("brick_sigma_sha256").text();

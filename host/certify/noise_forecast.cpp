@@ -173,6 +173,7 @@ void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
                         .largest = range.largest,
                         .tolerance_sigmas = multiple,
                         .rms_in_sigma = {},
+                        .split_ratio = {},
                         .worst_image3d = {},
                         .sha256 = sigma_sha256(sigma.of_brick)};
   c.brick_sigma = sigma.of_brick;
@@ -196,6 +197,10 @@ void note_noise(Device& device, const ProjectionSet& scan, BuildResult& built, c
     if (const auto mean = mean_error(device, scan, built.volume, built.certificate, progress)) {
       built.certificate.noise->rms_in_sigma = mean->in_sigma;
       built.certificate.noise->rms_points = mean->points;
+    }
+    if (const auto split = split_of_views(device, scan, built.certificate.field, noise.model, progress)) {
+      built.certificate.noise->split_ratio = split->ratio();
+      built.certificate.noise->split_resolved = split->resolved;
     }
   } catch (const ResourceError&) {
     // The volume and all that is promised of it stand without.

@@ -107,8 +107,9 @@ std::optional<ScanNoise> of_other_integrals(const ProjectionSet& scan, const Non
   if (!best.photons) return none(too_little);
   const double sigma = 1 / std::sqrt(*best.photons), largest = largest_of(scan);
   if (sigma * std::sqrt(most_photons) < largest)
-    return none(fmt::format("line integrals differ by {:.2g} between neighbouring views, of {:.3g} at most: {}",
-                            sigma, largest, no_noise));
+    return none(
+        fmt::format("line integrals differ by {:.2g} between neighbouring views, of {:.3g} at most: {}",
+                    sigma, largest, no_noise));
   ScanNoise out;
   out.model.constant = sigma * sigma;
   out.model.source = best.source;
@@ -170,7 +171,8 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
   if (const double dead =
           static_cast<double>(scan.report.dead_pixels) / static_cast<double>(scan.data.size());
       dead > share_of_few)
-    return none(fmt::format("{:.0f} % of the pixels counted nothing; state the noise by `sigma_p`", 100 * dead));
+    return none(
+        fmt::format("{:.0f} % of the pixels counted nothing; state the noise by `sigma_p`", 100 * dead));
   if (const double few = share_of_few_counts(scan, out.model.photons); few > share_of_few)
     return none(
         fmt::format("{:.0f} % of the pixels counted fewer than {} of {:.3g} photons, too few for their "

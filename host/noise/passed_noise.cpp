@@ -124,12 +124,11 @@ class RowSpectrum {
 
   explicit RowSpectrum(std::int64_t columns) : columns_(columns), table_(at(columns * frequencies)) {
     for (std::int64_t i = 0; i < columns; ++i) {
-      const double window = 0.5 - 0.5 * std::cos(2 * pi * (static_cast<double>(i) + 0.5) /
-                                                 static_cast<double>(columns));
+      const double window =
+          0.5 - 0.5 * std::cos(2 * pi * (static_cast<double>(i) + 0.5) / static_cast<double>(columns));
       energy_.push_back(window * window);
       for (std::int64_t m = 0; m < frequencies; ++m)
-        table_[at(i * frequencies + m)] =
-            std::polar(window, 2 * pi * frequency(m) * static_cast<double>(i));
+        table_[at(i * frequencies + m)] = std::polar(window, 2 * pi * frequency(m) * static_cast<double>(i));
     }
   }
   static double frequency(std::int64_t m) { return (static_cast<double>(m) + 0.5) / (2 * frequencies); }
@@ -180,8 +179,8 @@ Powers powers_of(const RowSpectrum& spectrum, const float* one, const float* oth
     for (std::size_t l = 0; l < std::min(rows.size(), out.lag.size()); ++l) {
       const RowSpectrum::Row& before = rows[rows.size() - 1 - l];
       for (std::int64_t m = 0; m < frequencies; ++m)
-        out.lag[l] += std::pow(RowSpectrum::frequency(m), 2) *
-                      (rows.back()[at(m)] * std::conj(before[at(m)])).real();
+        out.lag[l] +=
+            std::pow(RowSpectrum::frequency(m), 2) * (rows.back()[at(m)] * std::conj(before[at(m)])).real();
       ++out.pairs[l];
     }
   }
@@ -230,8 +229,7 @@ LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows
   for (const double power : sum.of) out.spectrum.push_back(static_cast<float>(power / sum.white));
   const double own = sum.lag[0] / static_cast<double>(sum.pairs[0]);
   for (std::size_t l = 1; l < sum.lag.size() && sum.pairs[l] > 0 && own > 0; ++l)
-    out.row_correlation.push_back(
-        static_cast<float>(sum.lag[l] / static_cast<double>(sum.pairs[l]) / own));
+    out.row_correlation.push_back(static_cast<float>(sum.lag[l] / static_cast<double>(sum.pairs[l]) / own));
   return out;
 }
 

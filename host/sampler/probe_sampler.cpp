@@ -27,7 +27,7 @@ constexpr std::uint32_t kSide = 64;
 // A unit that rounds to 8 fraction bits may add a few ulp of its own; 2^-20 keeps it in its class.
 constexpr double slack = 0x1p-20;
 // Not all fractions are tried (docs/error-bounds.md, section 8).
-constexpr double untried = 1.5;
+constexpr double untried = 1.1;
 const opencl::Defines kDefines{{"VDVR_SAMPLE_TYPES", "1"}};  // the rates are those of float32
 
 struct ProbePoint {
@@ -117,6 +117,12 @@ std::vector<ProbePoint> weight_points(std::size_t axis) {
   return points;
 }
 
+double over_steps(const BySteps& errors) {
+  double largest = 0;
+  for (std::size_t k = 1; k < errors.size(); ++k) largest = std::max(largest, errors[k] / sum_of_steps(k));
+  return largest;
+}
+
 // Of each two the second has fractions next to the middle of two multiples of 2^-8, where units that round to
 // these err most.
 std::vector<ProbePoint> scattered_points() {
@@ -200,38 +206,102 @@ double measure_constants(opencl::State& state, const FilterProbe& charged, Sampl
 
 // The weights of all corners of a cell, by tiles of which every second sample along each axis is 1, all
 // others 0, and what they err by. On combs two of three fractions are 0, and units err less there.
-BySteps measure_corners(opencl::State& state, SampleType type) {
-  const auto points = scattered_points();
-  std::array<std::vector<float>, 8> read;
-  for (std::uint32_t parity = 0; parity < 8; ++parity)
-    read[parity] = read_points(state,
-                               make_tile(state, cube([&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-                                           return (x % 2 | y % 2 << 1 | z % 2 << 2) == parity ? 1.0 : 0.0;
-                                         }),
-                                         type)
-                                   .image,
-                               points);
-  BySteps largest{};
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ProbePoint& p = points[i];
-    Corners off = trilinear_weights(p.fraction);
-    for (std::uint32_t c = 0; c < 8; ++c) {
-      std::uint32_t parity = 0;
-      for (std::uint32_t a = 0; a < 3; ++a) parity |= (p.cell[a] + (c >> a & 1u)) % 2 << a;
-      off[c] = static_cast<double>(read[parity][i]) - off[c];
+class CornerTiles {
+ public:
+  CornerTiles(opencl::State& state, SampleType type) : state_(state) {
+    for (std::uint32_t parity = 0; parity < 8; ++parity)
+      images_[parity] = make_tile(state, cube([&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+                                    return (x % 2 | y % 2 << 1 | z % 2 << 2) == parity ? 1.0 : 0.0;
+                                  }),
+                                  type)
+                            .image;
+  }
+  // What the eight weights err by at each point.
+  [[nodiscard]] std::vector<Corners> errors_at(const std::vector<ProbePoint>& points) const {
+    std::array<std::vector<float>, 8> read;
+    for (std::size_t parity = 0; parity < 8; ++parity)
+      read[parity] = read_points(state_, images_[parity], points);
+    std::vector<Corners> errors;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const ProbePoint& p = points[i];
+      Corners off = trilinear_weights(p.fraction);
+      for (std::uint32_t c = 0; c < 8; ++c) {
+        std::uint32_t parity = 0;
+        for (std::uint32_t a = 0; a < 3; ++a) parity |= (p.cell[a] + (c >> a & 1u)) % 2 << a;
+        off[c] = static_cast<double>(read[parity][i]) - off[c];
+      }
+      errors.push_back(off);
     }
-    raise_to_error(largest, off);
+    return errors;
+  }
+
+ private:
+  opencl::State& state_;
+  std::array<cl::Image3D, 8> images_;
+};
+
+// The largest error found for each kind of steps, and where.
+struct Worst {
+  BySteps error{};
+  std::array<ProbePoint, 8> at{};
+
+  // Returns whether any rose.
+  bool raise(const CornerTiles& tiles, const std::vector<ProbePoint>& points) {
+    const std::vector<Corners> errors = tiles.errors_at(points);
+    const BySteps before = error;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const BySteps last = error;
+      raise_to_error(error, errors[i]);
+      for (std::size_t k = 1; k < error.size(); ++k)
+        if (error[k] > last[k]) at[k] = points[i];
+    }
+    return error != before;
+  }
+};
+
+// From the worst points on, one fraction at a time: the multiples of 2^-8, the middles between them and what
+// lies next to these.
+void climb(Worst& worst, const CornerTiles& tiles) {
+  constexpr int most_rounds = 8;
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<ProbePoint> points;
+    for (std::size_t k = 1; k < worst.at.size(); ++k)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (std::uint32_t step = 0; step < 256; ++step)
+          for (const std::uint32_t within : {0u, 31u, 32u, 33u}) {
+            points.push_back(worst.at[k]);
+            points.back().fraction[axis] = (64 * step + within) * 0x1p-14;
+          }
+    if (!worst.raise(tiles, points)) return;
+  }
+}
+
+BySteps measure_corners(opencl::State& state, SampleType type) {
+  const CornerTiles tiles(state, type);
+  const std::vector<ProbePoint> points = scattered_points();
+  Worst worst;
+  worst.raise(tiles, points);
+  // What is of a class is charged for all places. Else from several beginnings.
+  if (over_steps(worst.error) > 0x1p-8 + slack) {
+    constexpr std::ptrdiff_t parts = 4;
+    for (std::ptrdiff_t part = 0; part < parts; ++part) {
+      const auto first = points.begin() + part * std::ssize(points) / parts;
+      Worst of_part;
+      of_part.raise(tiles, {first, first + std::ssize(points) / parts});
+      climb(of_part, tiles);
+      for (std::size_t k = 1; k < worst.error.size(); ++k)
+        worst.error[k] = std::max(worst.error[k], of_part.error[k]);
+    }
   }
   // Seven lerps in fp32 are charged by themselves, 14 u of the largest sample, which is at least half of the
   // largest step.
-  for (double& error : largest) error = std::max(0.0, error - 7 * 0x1p-24);
-  return largest;
+  for (double& error : worst.error) error = std::max(0.0, error - 7 * 0x1p-24);
+  return worst.error;
 }
 
 // Charges what was measured; says for which class.
 std::string charge(FilterProbe& p, const BySteps& measured) {
-  for (std::size_t k = 1; k < measured.size(); ++k)
-    p.weight_error = std::max(p.weight_error, measured[k] / sum_of_steps(k));
+  p.weight_error = over_steps(measured);
   const auto charge_each = [&](double least) {
     p.delta = std::max(least, p.weight_error);
     for (std::size_t k = 1; k < measured.size(); ++k) p.by_steps[k] = p.delta * sum_of_steps(k);

@@ -64,6 +64,10 @@ struct NoiseRecord {
   /// files of earlier versions.
   std::optional<double> rms_in_sigma;
   std::int64_t rms_points = 0;
+  /// SplitOfViews::ratio() and `resolved`: what halves of the views differ by over what sigma says, a check
+  /// without a model. Nothing where views are too few, and in files of earlier versions.
+  std::optional<double> split_ratio;
+  bool split_resolved = false;
   /// worst_in_sigma() of image3d on the device that built the file.
   std::optional<double> worst_image3d;
   std::string sha256;  ///< of Certificate::brick_sigma

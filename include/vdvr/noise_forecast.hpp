@@ -94,7 +94,7 @@ VDVR_API std::optional<MeanError> mean_error(Device& device, const ProjectionSet
 /// which is then promised. Throws ToleranceError where a brick's bound is more.
 VDVR_API void note_noise(Certificate& certificate, const ScanNoise& noise, const BrickSigma& sigma,
                          std::optional<double> multiple = {});
-/// The same, and the mean error, where memory is left to find it.
+/// The same, and the mean error and the split of the views, where memory is left to find them.
 VDVR_API void note_noise(Device& device, const ProjectionSet& scan, BuildResult& built,
                          const ScanNoise& noise, const BrickSigma& sigma, std::optional<double> multiple = {},
                          const Progress& progress = {});

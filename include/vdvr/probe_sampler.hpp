@@ -21,7 +21,7 @@ struct FilterProbe {
   bool image3d = false;  ///< the device has a linear CL_R 3D image sampler of this format
   /// What a value was found to err by, over the sum of the cell's steps along the three axes: the largest.
   double weight_error = 0;
-  double delta = 0;  ///< charged: 2^-22 fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, else 1.5 measured;
+  double delta = 0;  ///< charged: 2^-22 fp32, 2^-9 rounding to 8 bits, 2^-8 truncation, else 1.1 measured;
                      ///< never below weight_error
   /// What a value is charged, by the steps of samples along the axes: 1 on those whose bit is set in the
   /// index, 1/2 on the others. [0]: 0.

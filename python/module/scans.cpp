@@ -277,7 +277,9 @@ void add_projections(nb::module_& m) {
          std::optional<double> sigma_p) {
         std::optional<ScanNoise> noise;
         std::string why;
-        run_long(nb::none(), [&](const Progress&) { noise = find_noise(scan, {photons, sigma_p}, source, why); });
+        run_long(nb::none(), [&](const Progress&) {
+          noise = find_noise(scan, {photons, sigma_p}, source, why);
+        });
         if (!noise) throw InputError("noise: none is known: " + why);
         return *noise;
       },

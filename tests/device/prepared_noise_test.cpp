@@ -81,17 +81,17 @@ BOOST_AUTO_TEST_CASE(a_blur_passes_what_its_transfer_function_says) {
       return sum;
     };
     BOOST_TEST_REQUIRE(noise.spectrum.size() == 64u);
-    // Of 6,000 rows each power is good to its own size over the square root of that; leaks of Hann's window are
-    // below 1e-6. Five times that: 200 are looked at.
+    // Of 6,000 rows each power is good to its own size over the square root of that; leaks of Hann's window
+    // are below 1e-6. Five times that: 200 are looked at.
     const double error = 5 / std::sqrt(6000.0);
     for (std::size_t m = 0; m < 64; ++m) {
       const double omega = pi * (static_cast<double>(m) + 0.5) / 64;
       double transfer = u[0];
-      for (std::size_t i = 1; i < u.size(); ++i) transfer += 2 * u[i] * std::cos(omega * static_cast<double>(i));
+      for (std::size_t i = 1; i < u.size(); ++i)
+        transfer += 2 * u[i] * std::cos(omega * static_cast<double>(i));
       const double expected = transfer * transfer * product(0);
       BOOST_TEST_INFO(across << "," << along << " bin " << m);
-      BOOST_TEST(std::abs(static_cast<double>(noise.spectrum[m]) - expected) <=
-                 error * expected + 1e-6);
+      BOOST_TEST(std::abs(static_cast<double>(noise.spectrum[m]) - expected) <= error * expected + 1e-6);
     }
     BOOST_TEST_REQUIRE(noise.row_correlation.size() == 4u);
     for (std::size_t l = 0; l < 4; ++l)
@@ -111,11 +111,13 @@ BOOST_AUTO_TEST_CASE(bins_of_white_noise_are_white) {
   p.binning = 2;
   const LineIntegralNoise noise = passed_by(p);
   BOOST_TEST(noise.constant == 1e-4 / 4);
-  for (const float power : noise.spectrum) BOOST_TEST(std::abs(static_cast<double>(power) - 1) <= 4 / std::sqrt(3000.0));
+  for (const float power : noise.spectrum)
+    BOOST_TEST(std::abs(static_cast<double>(power) - 1) <= 4 / std::sqrt(3000.0));
 }
 
 BOOST_AUTO_TEST_CASE(sigma_of_prepared_scans_is_that_of_repeated_ones) {
-  constexpr int scans = 100;
+  // `prepared_noise_test -- long`: as docs/noise.md has it.
+  const int scans = boost::unit_test::framework::master_test_suite().argc > 1 ? 600 : 100;
   constexpr double photons = 5000;
   struct Case {
     const char* name;
@@ -128,9 +130,9 @@ BOOST_AUTO_TEST_CASE(sigma_of_prepared_scans_is_that_of_repeated_ones) {
   bins.binning = 2;
   phase.phase = {50, 20, 1000};
   zingers.outliers.emplace();
-  for (const Case& c : {Case{"median", median(3), 0.2}, Case{"blur", gaussian(1, 0.8), 0.05},
-                        Case{"stripes", stripes, 0.4}, Case{"median, bins", bins, 0.2},
-                        Case{"phase", phase, 0.1}, Case{"zingers", zingers, 0.05}}) {
+  for (const Case& c :
+       {Case{"median", median(3), 0.2}, Case{"blur", gaussian(1, 0.8), 0.05}, Case{"stripes", stripes, 0.4},
+        Case{"median, bins", bins, 0.2}, Case{"phase", phase, 0.1}, Case{"zingers", zingers, 0.05}}) {
     ProjectionSet ideal = ideal_scan({c.name, 40, 24, 41});
     ideal.geometry.unit = "mm";
     ideal.geometry.pitch_u = ideal.geometry.pitch_v = 0.005;
@@ -140,10 +142,11 @@ BOOST_AUTO_TEST_CASE(sigma_of_prepared_scans_is_that_of_repeated_ones) {
     noise = passed_noise(noise, 24, 41, one);
     // Away from the outermost rows, where steps see mirrored ones.
     const double pitch = one.geometry.pitch_u, height = 0.25 * static_cast<double>(one.geometry.rows) * pitch;
-    check(repeated([&](unsigned seed) { return prepared(counted(ideal, photons, seed), c.preparation); },
-                   prepared(ideal, c.preparation), noise, {},
-                   some_places(0.4 * static_cast<double>(one.geometry.columns) * pitch, -height, 0.9 * height),
-                   scans),
-          scans, c.name, in_the_mean, c.anywhere);
+    check(
+        repeated([&](unsigned seed) { return prepared(counted(ideal, photons, seed), c.preparation); },
+                 prepared(ideal, c.preparation), noise, {},
+                 some_places(0.4 * static_cast<double>(one.geometry.columns) * pitch, -height, 0.9 * height),
+                 scans),
+        scans, c.name, in_the_mean, c.anywhere);
   }
 }

@@ -123,6 +123,8 @@ BOOST_AUTO_TEST_CASE(the_mean_error_is_that_of_points_drawn_by_chance) {
     const Certificate read = certificate_from_json(to_json(result.certificate));
     BOOST_TEST(read.noise->rms_in_sigma.value() == rms);
     BOOST_TEST(read.noise->rms_points == noise.rms_points);
+    BOOST_TEST(read.noise->split_ratio.has_value() == noise.split_ratio.has_value());
+    if (noise.split_ratio) BOOST_TEST(*read.noise->split_ratio == *noise.split_ratio);
   }
 }
 

@@ -88,6 +88,9 @@ int verify_command(Arguments& args) {
     fmt::print("{}: {}, {}input matches its hash\n", path.string(), text_of(file.seal),
                result.content_matches ? "content matches its hash, " : "");
     print_verification(result.measured, certificate);
+    if (certificate.noise && certificate.noise->split_ratio)
+      fmt::print("  split        {}, as the certificate has it\n",
+                 split_words(*certificate.noise->split_ratio, certificate.noise->split_resolved));
   });
   if (!result.holds) throw MismatchError(fmt::format("{}: {}", path.string(), result.failure));
   return 0;
