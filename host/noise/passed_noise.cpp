@@ -13,13 +13,14 @@
 #include "host/prepare/prepare.hpp"
 #include "host/scan/photon_transfer.hpp"
 #include "host/system/casts.hpp"
+#include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr std::int64_t most_samples = std::int64_t{1} << 22, most_rows = 64, fewest_rows = 16;
+constexpr std::int64_t most_samples = std::int64_t{1} << 22, most_rows = 64, fewest_rows = 4;
 constexpr std::int64_t frequencies = 64, most_lags = 4;
 
 // Which of the prepared rows and views are looked at.
@@ -195,10 +196,14 @@ bool changes_noise(Preparation preparation) {
 }
 
 LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows, std::int64_t columns,
-                               const ProjectionSet& prepared) {
+                               const ProjectionSet& prepared, std::uint64_t max_memory_bytes) {
   const Preparation& p = prepared.report.preparation;
   const Window window = window_of(prepared);
   const auto views = std::ssize(window.views);
+  // Two scans in float, their noise in double.
+  io::require_memory(prepared.data.resident_bytes() +
+                         16 * count(views * window.rows * prepared.geometry.columns * p.binning * p.binning),
+                     max_memory_bytes, "the noise of prepared projections");
   ProjectionSet one = like(prepared, window), other = one;
   const ViewPreparation steps(p, one.geometry, false);
   const PixelVariance variance(noise);
@@ -213,7 +218,7 @@ LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows
       put(*view, *scan, k);
     }
   });
-  for (ProjectionSet* scan : {&one, &other}) prepare_scan(*scan, p, 0, {});
+  for (ProjectionSet* scan : {&one, &other}) prepare_scan(*scan, p, max_memory_bytes, {});
   // Near edges steps see mirrored rows, which leaves more.
   const std::int64_t edge = window.rows / 4;
   const RowSpectrum spectrum(prepared.geometry.columns);

@@ -10,15 +10,36 @@ namespace vdvr {
 namespace {
 
 // As the files have it, but for the centre, which says nothing of the noise: it need not be found.
-ProjectionSet read_unprepared(const std::filesystem::path& path, ScanOptions how, const ProjectionSet& scan,
-                              const Progress& progress) {
+ScanOptions as_measured(ScanOptions how, const ProjectionSet& scan) {
   if (!scan.cone || how.center)
     how.center = unbinned_center(how.center.value_or(scan.geometry.center), how.preparation.binning);
   how.preparation = {};
-  ProjectionSet unprepared = read_scan(path, how, progress);
-  if (unprepared.report.sha256 != scan.report.sha256)
-    throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
-  return unprepared;
+  return how;
+}
+
+std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const ScanOptions& how,
+                                     const ProjectionSet& scan, const NoiseOptions& options, std::string* why,
+                                     const Progress& progress) {
+  const int b = scan.report.preparation.binning;
+  std::int64_t rows = scan.geometry.rows * b, columns = scan.geometry.columns * b;
+  std::optional<ScanNoise> found;
+  if (options.photons || options.sigma_p) {
+    found = scan_noise({scan.geometry, {}, {}, {}}, options);
+  } else {
+    const ScanOptions measured = as_measured(how, scan);
+    const ProjectionSet unprepared = read_scan(path, measured, progress);
+    if (unprepared.report.sha256 != scan.report.sha256)
+      throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
+    rows = unprepared.geometry.rows;
+    columns = unprepared.geometry.columns;
+    found = scan_noise(unprepared, options, read_line_noise(path, measured), why);
+  }
+  if (!found) return found;
+  found->model = passed_noise(found->model, rows, columns, scan, how.max_memory_bytes);
+  found->passed = passed_share({}, found->model.spectrum);
+  found->words += fmt::format("; {:.3g} of their variance is left after {}", found->passed,
+                              text_of(scan.report.preparation));
+  return found;
 }
 
 }  // namespace
@@ -26,28 +47,17 @@ ProjectionSet read_unprepared(const std::filesystem::path& path, ScanOptions how
 std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                          const ProjectionSet& scan, const NoiseOptions& options,
                                          std::string* why, const Progress& progress) {
-  const bool stated = options.photons || options.sigma_p;
-  if (!changes_noise(scan.report.preparation))
+  if (!changes_noise(scan.report.preparation)) {
+    const bool stated = options.photons || options.sigma_p;
     return scan_noise(scan, options, stated ? std::nullopt : read_line_noise(path, how), why);
-  const int b = scan.report.preparation.binning;
-  std::int64_t rows = scan.geometry.rows * b, columns = scan.geometry.columns * b;
-  std::optional<ScanNoise> found;
-  if (stated) {
-    found = scan_noise({scan.geometry, {}, {}, {}}, options);
-  } else {
-    ScanOptions as_measured = how;
-    as_measured.preparation = {};
-    const ProjectionSet unprepared = read_unprepared(path, how, scan, progress);
-    rows = unprepared.geometry.rows;
-    columns = unprepared.geometry.columns;
-    found = scan_noise(unprepared, options, read_line_noise(path, as_measured), why);
   }
-  if (!found) return found;
-  found->model = passed_noise(found->model, rows, columns, scan);
-  found->passed = passed_share({}, found->model.spectrum);
-  found->words += fmt::format("; {:.3g} of their variance is left after {}", found->passed,
-                              text_of(scan.report.preparation));
-  return found;
+  try {
+    return of_prepared(path, how, scan, options, why, progress);
+  } catch (const ResourceError& e) {
+    // No build fails for want of it.
+    if (why) *why = e.what();
+    return std::nullopt;
+  }
 }
 
 }  // namespace vdvr

@@ -12,6 +12,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <set>
 #include <utility>
 
 #include "host/opencl/kernel.hpp"
@@ -243,36 +244,45 @@ class CornerTiles {
 // The largest error found for each kind of steps, and where.
 struct Worst {
   BySteps error{};
-  std::array<ProbePoint, 8> at{};
+  std::array<std::size_t, 8> at{};  // of `places`
+  std::vector<ProbePoint> places;
 
-  // Returns whether any rose.
-  bool raise(const CornerTiles& tiles, const std::vector<ProbePoint>& points) {
+  void raise(const CornerTiles& tiles, const std::vector<ProbePoint>& points) {
     const std::vector<Corners> errors = tiles.errors_at(points);
-    const BySteps before = error;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const BySteps last = error;
       raise_to_error(error, errors[i]);
+      if (error == last) continue;
       for (std::size_t k = 1; k < error.size(); ++k)
-        if (error[k] > last[k]) at[k] = points[i];
+        if (error[k] > last[k]) at[k] = places.size();
+      places.push_back(points[i]);
     }
-    return error != before;
+  }
+  // The places of the largest errors from number `first` on, each once.
+  [[nodiscard]] std::vector<ProbePoint> from(std::size_t first) const {
+    const std::set<std::size_t> numbers(at.begin() + 1, at.end());
+    std::vector<ProbePoint> out;
+    for (const std::size_t n : numbers)
+      if (n >= first) out.push_back(places[n]);
+    return out;
   }
 };
 
 // From the worst points on, one fraction at a time: the multiples of 2^-8, the middles between them and what
 // lies next to these.
 void climb(Worst& worst, const CornerTiles& tiles) {
-  constexpr int most_rounds = 8;
-  for (int round = 0; round < most_rounds; ++round) {
+  std::size_t tried = 0;
+  for (auto begin = worst.from(0); !begin.empty(); begin = worst.from(tried)) {
+    tried = worst.places.size();
     std::vector<ProbePoint> points;
-    for (std::size_t k = 1; k < worst.at.size(); ++k)
+    for (const ProbePoint& place : begin)
       for (std::size_t axis = 0; axis < 3; ++axis)
         for (std::uint32_t step = 0; step < 256; ++step)
           for (const std::uint32_t within : {0u, 31u, 32u, 33u}) {
-            points.push_back(worst.at[k]);
+            points.push_back(place);
             points.back().fraction[axis] = (64 * step + within) * 0x1p-14;
           }
-    if (!worst.raise(tiles, points)) return;
+    worst.raise(tiles, points);
   }
 }
 

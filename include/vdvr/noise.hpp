@@ -57,8 +57,8 @@ VDVR_API std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const No
 /// The same of a scan that was read from `path` as `how` says, with what its flats tell. Where projections
 /// were prepared by more than binning, noise is that of the unprepared ones, which are read once more, times
 /// what passed: white noise of that variance is pushed through the same steps (docs/noise.md). Memory: of
-/// prepared ones a second scan, held as `how` has it, and 200 MiB. Throws what read_scan() throws; FileError
-/// where the scan was changed since.
+/// prepared ones a second scan, held as `how` has it, and some 100 MiB; nothing where that is too much.
+/// Throws what read_scan() throws; FileError where the scan was changed since.
 VDVR_API std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                                   const ProjectionSet& scan, const NoiseOptions& options = {},
                                                   std::string* why = nullptr, const Progress& progress = {});

@@ -39,7 +39,7 @@ ProjectionSet prepared(ProjectionSet scan, const Preparation& p) {
 // Of a still scan.
 LineIntegralNoise passed_by(const Preparation& p, std::int64_t views = 200, std::int64_t rows = 60,
                             std::int64_t columns = 180) {
-  return passed_noise(white(1e-4), rows, columns, prepared(empty_scan(views, rows, columns), p));
+  return passed_noise(white(1e-4), rows, columns, prepared(empty_scan(views, rows, columns), p), 0);
 }
 
 Preparation gaussian(double across, double along) {
@@ -139,7 +139,7 @@ BOOST_AUTO_TEST_CASE(sigma_of_prepared_scans_is_that_of_repeated_ones) {
     LineIntegralNoise noise;
     noise.photon = {static_cast<float>(1 / photons)};
     const ProjectionSet one = prepared(counted(ideal, photons, 77), c.preparation);
-    noise = passed_noise(noise, 24, 41, one);
+    noise = passed_noise(noise, 24, 41, one, 0);
     // Away from the outermost rows, where steps see mirrored ones.
     const double pitch = one.geometry.pitch_u, height = 0.25 * static_cast<double>(one.geometry.rows) * pitch;
     check(
