@@ -7,12 +7,11 @@
 #include <vector>
 
 #include "apps/vdvr/pictures.hpp"
-#include "vdvr/certify_picture.hpp"
 #include "vdvr/d2vr.hpp"
+#include "vdvr/drawn_volume.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/paged_volume.hpp"
 #include "vdvr/progress.hpp"
-#include "vdvr/render_crew.hpp"
 #include "vdvr/safe_sampler.hpp"
 
 namespace vdvr::cli {
@@ -39,7 +38,7 @@ class Source {
 
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
-  [[nodiscard]] Device& device() { return *device_; }
+  [[nodiscard]] Device& device() { return *devices_.front(); }
   /// Of all devices that draw: they passed their test when they were opened.
   [[nodiscard]] bool trusted();
   /// As of vdvr/trust.hpp, of each of them.
@@ -54,9 +53,8 @@ class Source {
   [[nodiscard]] const BrickValues& shown() const { return shown_; }
   /// `progress` hears of pictures by several devices, or by bricks.
   [[nodiscard]] RenderResult draw(const RenderOptions& options, const Progress& progress = {});
-  /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
-  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
-                                    const Progress& progress);
+  /// What certified pictures are drawn of; not of projections.
+  [[nodiscard]] DrawnVolume& volume() { return *drawn_; }
   /// Of a volume's samples.
   [[nodiscard]] std::pair<float, float> value_range() const;
   /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most
@@ -68,20 +66,9 @@ class Source {
  private:
   void open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress);
 
-  /// A further device of --device, with the volume on it.
-  struct Other {
-    Device device;
-    std::optional<ResidentVolume> resident;  ///< or
-    std::optional<PagedVolume> paged;
-  };
-  void open_others(const std::vector<std::string>& selectors, std::uint64_t memory, const Progress& progress);
-
   std::optional<Scene> scene_;
-  std::optional<Device> device_;
-  std::optional<ResidentVolume> resident_;  ///< or
-  std::optional<PagedVolume> paged_;        ///< or
-  std::vector<std::unique_ptr<Other>> others_;
-  std::optional<RenderCrew> crew_;  ///< of all devices, where there are several, or of one by bricks
+  std::vector<std::unique_ptr<Device>> devices_;  ///< all that draw
+  std::optional<DrawnVolume> drawn_;              ///< or, of projections:
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;

@@ -59,7 +59,7 @@ int verify_command(Arguments& args) {
   const CommonOptions common = common_options(args);
   if (args.has("picture")) {
     refuse(args, {"exhaustive"}, "does not apply to --picture");
-    return verify_picture(args, common);
+    return verify_picture_command(args, common);
   }
   refuse(args, {"rays"}, "goes with --picture");
   const auto path = args.path("FILE"), projections = args.path("projections");

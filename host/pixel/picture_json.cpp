@@ -1,4 +1,4 @@
-#include "apps/vdvr/picture_certificate.hpp"
+#include "host/pixel/picture_json.hpp"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,17 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/surface_picture.hpp"
 
-namespace vdvr::cli {
+namespace vdvr {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "vdvr picture certificate 1";
 
@@ -70,6 +73,10 @@ constexpr std::array<std::pair<const char*, RenderMode>, 5> kModes{{{"dvr", Rend
                                                                     {"slice", RenderMode::slice},
                                                                     {"integral", RenderMode::integral}}};
 
+const char* mode_name(RenderMode mode) {
+  return std::find_if(kModes.begin(), kModes.end(), [&](const auto& m) { return m.second == mode; })->first;
+}
+
 /// A real number of any size is no count: to convert it is undefined.
 std::int64_t count_of(const Json& j, const char* name, const std::filesystem::path& path) {
   const Json& member = j.at(name);
@@ -123,13 +130,14 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
   read_window(slice, o);
 }
 
-Json picture_json(const CertifiedPicture& picture) {
-  const RenderOptions& o = picture.options;
+Json picture_json(const PictureRecord& record, const std::string& name, const std::string& sha256,
+                  const PictureFile& file) {
+  const RenderOptions& o = record.options;
   Json overlays = Json::array();
-  for (const std::string& name : picture.overlays) overlays.push_back(name);
-  Json json = {{"file", picture.file},
-               {"sha256", picture.pixels_sha256},
-               {"file_sha256", picture.file_sha256},
+  for (const std::string& overlay : file.overlays) overlays.push_back(overlay);
+  Json json = {{"file", name},
+               {"sha256", record.pixels_sha256},
+               {"file_sha256", sha256},
                {"width", o.width},
                {"height", o.height},
                {"camera", camera_json(o.camera)},
@@ -149,16 +157,14 @@ Json picture_json(const CertifiedPicture& picture) {
                {"clip", clip_json(o.clip.value_or(Clip{}))},
                {"overlays", overlays}};
   json.update(mode_json(o));
+  if (file.band_at_white) json["band_at_white"] = *file.band_at_white;
   return json;
 }
 
-void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPicture& picture) {
-  RenderOptions& o = picture.options;
+void read_picture(const Json& j, const std::filesystem::path& path, PictureRecord& record) {
+  RenderOptions& o = record.options;
   read_mode(j, path, o);
-  picture.file = j.at("file").get<std::string>();
-  picture.pixels_sha256 = j.at("sha256").get<std::string>();
-  picture.file_sha256 = j.at("file_sha256").get<std::string>();
-  picture.overlays = j.at("overlays").get<std::vector<std::string>>();
+  record.pixels_sha256 = j.at("sha256").get<std::string>();
   o.width = count_of(j, "width", path);
   o.height = count_of(j, "height", path);
   const Json& c = j.at("camera");
@@ -191,8 +197,8 @@ void read_picture(const Json& j, const std::filesystem::path& path, CertifiedPic
 }
 
 /// Light of F has box steps alone, and the one pass has them too.
-const char* text_of_step(const CertifiedPicture& picture) {
-  return picture.certify.box || picture.certify.fast || picture.lit ? "box" : "joint";
+const char* text_of_step(const PictureRecord& record) {
+  return record.certify.box || record.certify.fast || record.lit ? "box" : "joint";
 }
 /// Files without the member are older than joint steps.
 bool is_box(const std::string& step, const std::filesystem::path& path) {
@@ -202,16 +208,136 @@ bool is_box(const std::string& step, const std::filesystem::path& path) {
   return step == "box";
 }
 
+/// How well values are known, in their own units, over the rays that have one: not those of NaN, nor those of
+/// 0 in `met`, where it is not empty.
+Json half_widths_json(const FloatImage& low, const FloatImage& high,
+                      const std::vector<std::uint8_t>& met = {}) {
+  double sum = 0, most = 0;
+  std::int64_t count = 0, untested = 0;
+  for (std::size_t i = 0; i < low.values.size(); ++i) {
+    const double half = 0.5 * (static_cast<double>(high.values[i]) - static_cast<double>(low.values[i]));
+    if (std::isnan(half) || (!met.empty() && met[i] == 0)) continue;
+    if (!std::isfinite(half)) {
+      ++untested;
+      continue;
+    }
+    sum += half;
+    most = std::max(most, half);
+    ++count;
+  }
+  return {{"half_width_mean", count > 0 ? sum / static_cast<double>(count) : 0},
+          {"half_width_max", most},
+          {"pixels", count},
+          {"untested", untested}};
+}
+
+Json json_of(const PictureBound& b) {
+  Json within = Json::object();
+  for (const auto& [levels, share] : b.within) within[std::to_string(levels)] = share;
+  return {
+      {"levels", {{"mean", b.mean}, {"p99", b.p99}, {"max", b.max}, {"half_width_mean", b.half_width_mean}}},
+      {"worst_pixel", b.worst},
+      {"within", within},
+      {"pixels",
+       {{"certified", b.pixels - b.untested},
+        {"certainly_background", b.background},
+        {"untested", b.untested}}}};
+}
+
+Json json_of(const SurfaceShares& s, const std::string& unit) {
+  return {{"sure", s.sure},
+          {"possible", s.possible},
+          {"none", s.none},
+          {"band_mean", s.band_mean},
+          {"band_median", s.band_median},
+          {"band_p99", s.band_p99},
+          {"unit", unit}};
+}
+
+SurfaceShares read_shares(const Json& j) {
+  return {j.at("sure").get<double>(),      j.value("possible", 0.0),          j.at("none").get<double>(),
+          j.at("band_mean").get<double>(), j.at("band_median").get<double>(), j.at("band_p99").get<double>()};
+}
+
+Json sampler_json(const std::optional<ChargedSampler>& s) {
+  if (!s) return nullptr;
+  return {{"sampler", s->sampler}, {"value", s->value}, {"method", s->method}};
+}
+
+std::optional<ChargedSampler> read_sampler(const Json& j) {
+  if (j.is_null()) return std::nullopt;
+  return ChargedSampler{j.at("sampler").get<std::string>(), j.at("value").get<double>(),
+                        j.value("method", std::string())};
+}
+
+/// What certificates of all modes have.
+Json certificate_head(const CertifiedPicture& picture, const Json& described) {
+  const PictureRecord& r = picture.record;
+  return {{"format", kFormat},
+          {"statement", statement_of(r.options.mode, picture.bounds.light)},
+          {"volume",
+           {{"content_sha256", r.content_sha256},
+            {"epsilon", picture.epsilon},
+            {"epsilon_abs", picture.epsilon_abs}}},
+          {"picture", described},
+          {"covered",
+           {{"radius", r.covered.radius}, {"z", Json::array({r.covered.z.first, r.covered.z.second})}}},
+          {"sampler", r.options.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
+          {"sampler_term", sampler_json(r.sampler)},
+          {"kappa", r.certify.kappa},
+          {"theta", r.certify.theta},
+          {"fast", r.certify.fast},
+          {"step", text_of_step(r)},
+          {"device", r.device},
+          {"driver", r.driver},
+          {"device_test", r.device_test},
+          {"window", r.certify.window ? Json(*r.certify.window) : Json()}};
+}
+
+PictureClaims read_claims(const Json& j, const std::filesystem::path& path, RenderMode mode) {
+  PictureClaims claims;
+  claims.file = j.at("picture").at("file").get<std::string>();
+  claims.file_sha256 = j.at("picture").at("file_sha256").get<std::string>();
+  claims.statement = j.at("statement").get<std::string>();
+  if (mode == RenderMode::iso) {
+    claims.iso = read_shares(j.at("iso"));
+    return claims;
+  }
+  claims.light = j.at("light").get<std::string>();
+  claims.mean = j.at("levels").at("mean").get<double>();
+  claims.max = j.at("levels").at("max").get<double>();
+  claims.within = j.at("within").get<std::map<std::string, double>>();
+  claims.certified = count_of(j.at("pixels"), "certified", path);
+  return claims;
+}
+
+PictureRecord read_record(const Json& j, const std::filesystem::path& path) {
+  PictureRecord record;
+  RenderOptions& o = record.options;
+  read_picture(j.at("picture"), path, record);
+  record.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
+  record.device = j.at("device").get<std::string>();
+  record.driver = j.at("driver").get<std::string>();
+  record.sampler = read_sampler(j.value("sampler_term", Json()));
+  record.certify.kappa = j.at("kappa").get<double>();
+  record.certify.theta = j.at("theta").get<double>();
+  record.certify.fast = j.at("fast").get<bool>();
+  record.certify.box = is_box(j.value("step", "box"), path);
+  record.covered.radius = j.at("covered").at("radius").get<double>();
+  const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
+  record.covered.z = {z[0], z[1]};
+  o.sampler = j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
+  record.lit = o.mode == RenderMode::dvr && o.shading &&
+               j.at("light").get<std::string>() == text_of(CertifiedLight::lit);
+  return record;
+}
+
 }  // namespace
 
 std::string sha256_of_pixels(const Image& image) {
   Sha256 hash;
   hash.update(image.rgb.data(), image.rgb.size());
   return hash.hex();
-}
-
-const char* mode_name(RenderMode mode) {
-  return std::find_if(kModes.begin(), kModes.end(), [&](const auto& m) { return m.second == mode; })->first;
 }
 
 std::array<double, 6> box_of(const std::optional<Clip>& clip) {
@@ -250,20 +376,9 @@ std::string statement_of(RenderMode mode, CertifiedLight light) {
                                      : ", under the light that V was drawn with, step by step");
 }
 
-Json bound_json(const PictureBound& b) {
-  Json within = Json::object();
-  for (const auto& [levels, share] : b.within) within[std::to_string(levels)] = share;
-  return {
-      {"levels", {{"mean", b.mean}, {"p99", b.p99}, {"max", b.max}, {"half_width_mean", b.half_width_mean}}},
-      {"worst_pixel", b.worst},
-      {"within", within},
-      {"pixels",
-       {{"certified", b.pixels - b.untested},
-        {"certainly_background", b.background},
-        {"untested", b.untested}}}};
-}
+std::string bound_json(const PictureBound& bound) { return json_of(bound).dump(); }
 
-Json surface_json(const SurfaceBounds& bounds, const std::string& unit) {
+SurfaceShares shares_of(const SurfaceBounds& bounds) {
   double sum = 0;
   std::int64_t count = 0;
   for (const float band : band_of(bounds).values)
@@ -271,70 +386,37 @@ Json surface_json(const SurfaceBounds& bounds, const std::string& unit) {
       sum += static_cast<double>(band);
       ++count;
     }
-  return {{"sure", bounds.share(2)},
-          {"possible", bounds.share(1)},
-          {"none", bounds.share(0)},
-          {"band_mean", count > 0 ? sum / static_cast<double>(count) : 0},
-          {"band_median", band_quantile(bounds, 0.5)},
-          {"band_p99", band_quantile(bounds, 0.99)},
-          {"unit", unit}};
+  return {bounds.share(2),
+          bounds.share(1),
+          bounds.share(0),
+          count > 0 ? sum / static_cast<double>(count) : 0,
+          band_quantile(bounds, 0.5),
+          band_quantile(bounds, 0.99)};
 }
 
-Json half_widths_json(const FloatImage& low, const FloatImage& high, const std::vector<std::uint8_t>& met) {
-  double sum = 0, most = 0;
-  std::int64_t count = 0, untested = 0;
-  for (std::size_t i = 0; i < low.values.size(); ++i) {
-    const double half = 0.5 * (static_cast<double>(high.values[i]) - static_cast<double>(low.values[i]));
-    if (std::isnan(half) || (!met.empty() && met[i] == 0)) continue;
-    if (!std::isfinite(half)) {
-      ++untested;
-      continue;
-    }
-    sum += half;
-    most = std::max(most, half);
-    ++count;
+std::string surface_json(const SurfaceBounds& bounds, const std::string& unit) {
+  return json_of(shares_of(bounds), unit).dump();
+}
+
+std::string picture_certificate_json(const CertifiedPicture& picture, const std::string& name,
+                                     const std::string& sha256, const PictureFile& file) {
+  const RenderMode mode = picture.record.options.mode;
+  Json json = certificate_head(picture, picture_json(picture.record, name, sha256, file));
+  if (mode == RenderMode::iso) {
+    json["iso"] = json_of(shares_of(picture.surface), picture.unit);
+    return json.dump(2);
   }
-  return {{"half_width_mean", count > 0 ? sum / static_cast<double>(count) : 0},
-          {"half_width_max", most},
-          {"pixels", count},
-          {"untested", untested}};
+  json["light"] = text_of(picture.bounds.light);
+  json["ray_offset_pixels"] = picture.bounds.ray_offset_pixels;
+  json["parts"] = picture.bound.parts_mean;
+  json.update(json_of(picture.bound));
+  if (mode == RenderMode::mip) json["mip"] = half_widths_json(picture.maxima.low, picture.maxima.high);
+  if (mode == RenderMode::integral)
+    json["integral"] = half_widths_json(picture.integrals.low, picture.integrals.high, picture.integrals.met);
+  return json.dump(2);
 }
 
-Json certificate_head(const CertifiedPicture& picture, const Certificate& certificate,
-                      const std::string& statement) {
-  return {{"format", kFormat},
-          {"statement", statement},
-          {"volume",
-           {{"content_sha256", picture.content_sha256},
-            {"epsilon", certificate.epsilon},
-            {"epsilon_abs", certificate.epsilon_abs}}},
-          {"picture", picture_json(picture)},
-          {"covered",
-           {{"radius", picture.covered.radius},
-            {"z", Json::array({picture.covered.z.first, picture.covered.z.second})}}},
-          {"sampler", picture.options.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
-          {"sampler_term", picture.sampler_term},
-          {"kappa", picture.certify.kappa},
-          {"theta", picture.certify.theta},
-          {"fast", picture.certify.fast},
-          {"step", text_of_step(picture)},
-          {"device", picture.device},
-          {"driver", picture.driver},
-          {"device_test", picture.device_test},
-          {"window", picture.certify.window ? Json(*picture.certify.window) : Json()}};
-}
-
-Json picture_certificate_json(const CertifiedPicture& picture, const PixelBounds& bounds,
-                              const PictureBound& bound, const Certificate& certificate) {
-  Json json = certificate_head(picture, certificate, statement_of(picture.options.mode, bounds.light));
-  json["light"] = text_of(bounds.light);
-  json["ray_offset_pixels"] = bounds.ray_offset_pixels;
-  json["parts"] = bound.parts_mean;
-  json.update(bound_json(bound));
-  return json;
-}
-
-std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::filesystem::path& path) {
+std::pair<PictureRecord, PictureClaims> read_picture_certificate(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw FileError(fmt::format("{}: cannot be read", path.string()));
   std::ostringstream text;
@@ -346,51 +428,23 @@ std::pair<CertifiedPicture, PictureClaims> read_picture_certificate(const std::f
           fmt::format("{}: is no certificate of a picture that this program reads: its format is "
                       "'{}', not '{}'",
                       path.string(), j.at("format").get<std::string>(), kFormat));
-    CertifiedPicture picture;
-    read_picture(j.at("picture"), path, picture);
-    picture.content_sha256 = j.at("volume").at("content_sha256").get<std::string>();
-    picture.device = j.at("device").get<std::string>();
-    picture.driver = j.at("driver").get<std::string>();
-    picture.sampler_term = j.value("sampler_term", Json());
-    if (!picture.sampler_term.is_null()) {  // for the errors of what lacks a member
-      static_cast<void>(picture.sampler_term.at("value").get<double>());
-      static_cast<void>(picture.sampler_term.at("sampler").get<std::string>());
-    }
-    picture.certify.kappa = j.at("kappa").get<double>();
-    picture.certify.theta = j.at("theta").get<double>();
-    picture.certify.fast = j.at("fast").get<bool>();
-    picture.certify.box = is_box(j.value("step", "box"), path);
-    picture.covered.radius = j.at("covered").at("radius").get<double>();
-    const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
-    picture.covered.z = {z[0], z[1]};
-    picture.options.sampler =
-        j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
-    picture.lit = picture.options.mode == RenderMode::dvr && picture.options.shading &&
-                  j.at("light").get<std::string>() == text_of(CertifiedLight::lit);
-    if (picture.options.mode == RenderMode::iso)
-      return {std::move(picture),
-              PictureClaims{j.at("statement").get<std::string>(), "", 0, 0, {}, 0, j.at("iso")}};
-    return {std::move(picture), PictureClaims{j.at("statement").get<std::string>(),
-                                              j.at("light").get<std::string>(),
-                                              j.at("levels").at("mean").get<double>(),
-                                              j.at("levels").at("max").get<double>(),
-                                              j.at("within").get<std::map<std::string, double>>(),
-                                              count_of(j.at("pixels"), "certified", path),
-                                              {}}};
+    PictureRecord record = read_record(j, path);
+    PictureClaims claims = read_claims(j, path, record.options.mode);
+    return {std::move(record), std::move(claims)};
   } catch (const Json::exception& e) {
     throw FileError(fmt::format("{}: is no certificate of a picture: {}", path.string(), e.what()));
   }
 }
 
-std::string bound_line(const PictureBound& b, const Certificate& certificate, CertifiedLight light) {
+std::string bound_line(const PictureBound& b, double epsilon, CertifiedLight light) {
   std::string line = fmt::format(
       "certain: {:.0f} % of the pixels to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst {:.1f}",
       100 * b.within[2].second, 100 * b.within[3].second, b.mean, b.max);
   // The bound is linear in epsilon (docs/pixel-bounds.md); under F's own light it is not, where any may fall.
   if (b.mean > 1 && light != CertifiedLight::lit)
-    line += fmt::format("; certain to 1 level in the mean near epsilon {:.2g}", certificate.epsilon / b.mean);
+    line += fmt::format("; certain to 1 level in the mean near epsilon {:.2g}", epsilon / b.mean);
   if (b.untested > 0) line += fmt::format("; {} pixels see bricks that were not tested", b.untested);
   return line;
 }
 
-}  // namespace vdvr::cli
+}  // namespace vdvr
