@@ -39,8 +39,9 @@ PictureRequest request_of(RenderMode mode) {
   request.options = automatic_view(file().volume, file().certificate);
   request.options.mode = mode;
   request.options.width = request.options.height = 40;
-  // Another mode frames something else.
-  const OrbitFrame frame = frame_view(file().volume, request.options, 30, 20);
+  // Another mode frames something else, and a slice, which has no camera, nothing of its own.
+  const OrbitFrame frame = mode == RenderMode::slice ? frame_grid(file().volume.grid)
+                                                     : frame_view(file().volume, request.options, 30, 20);
   request.options.camera = orbit_camera(frame, 30, 20, 1);
   if (mode != RenderMode::dvr) request.options.step_mode = StepMode::fixed;
   if (mode == RenderMode::integral) request.options.slice_range.reset();
