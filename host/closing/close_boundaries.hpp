@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "host/closing/open_bricks.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/comparison.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/scratch.hpp"
 
 namespace vdvr {
 

@@ -15,7 +15,7 @@
 
 #include "host/export/hdf5_sink.hpp"
 #include "host/export/ome_zarr.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/export/tiff_sink.hpp"
 #include "host/export/volume_sink.hpp"
 #include "host/system/casts.hpp"

@@ -15,7 +15,7 @@
 
 #include "host/export/export_note.hpp"
 #include "host/export/pack.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/export/vtk_partition.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"

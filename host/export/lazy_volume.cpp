@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/hdf5/hdf5_chunks.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/crew.hpp"
+#include "vdvr/common_memory.hpp"
 #include "vdvr/progress.hpp"
 
 namespace vdvr {

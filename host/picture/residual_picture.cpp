@@ -1,5 +1,7 @@
 // A row's residuals as a sinogram between a scale, the rms of each view and that of each column. Called by
 // the command residual.
+#include "vdvr/residual_picture.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +12,6 @@
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/residual.hpp"
 
 namespace vdvr {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "host/opencl/host_fft.hpp"
 #include "host/prepare/view_filters.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 
 #include "host/prepare/phase_retrieval.hpp"
 #include "host/prepare/view_filters.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 

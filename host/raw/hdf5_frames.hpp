@@ -8,7 +8,7 @@
 
 #include "host/hdf5/hdf5_reader.hpp"
 #include "host/raw/raw_scan.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/scan_options.hpp"
 
 namespace vdvr::io {
 

@@ -11,7 +11,7 @@
 
 #include "host/io/number_text.hpp"
 #include "host/io/raster_file.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

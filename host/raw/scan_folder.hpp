@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "host/raw/raw_scan.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/scan_options.hpp"
 
 namespace vdvr::io {
 

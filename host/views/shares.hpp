@@ -19,6 +19,9 @@ struct PixelShares {
   std::vector<std::pair<std::uint32_t, float>> bricks;
 };
 
+/// Of a row of a picture.
+std::array<double, 3> background_of(const PictureViews& views, std::int64_t y);
+
 /// [y][x]. Cost: `parts` values of V a cell of each ray, and some 20 of the transfer function each.
 std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews& views, std::size_t view,
                                       int parts, const Progress& progress = {});

@@ -22,7 +22,6 @@
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
-#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {

@@ -14,7 +14,7 @@ import tempfile
 
 # A room includes the public headers and rooms above it.
 ROOMS = ["system", "opencl", "hdf5", "io", "geometry", "center", "prepare", "raw", "scan", "simulate", "fbp", "fdk", "noise", "volume", "sampler", "bounds", "kept", "gold", "crew",
-         "closing", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
+         "closing", "claims", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
 MOST_FILES = 25
 # What kernels include: `shared` is compiled by the host too, `device` is not.
 KERNEL_HEADERS = {"shared", "device"}

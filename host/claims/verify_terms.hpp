@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/verify/verify_scope.hpp"
+#include "host/claims/verify_scope.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/progress.hpp"

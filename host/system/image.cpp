@@ -6,7 +6,7 @@
 #include <bit>
 #include <string>
 
-#include "host/picture/png.hpp"
+#include "host/system/png.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 

@@ -12,6 +12,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/find_center.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

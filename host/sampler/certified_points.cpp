@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <limits>
 
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/noted_scan.hpp"
 #include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {
