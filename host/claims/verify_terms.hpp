@@ -1,5 +1,5 @@
 // What a certificate says of its terms, computed again by build's own code: this finds edits, the measure of
-// |V - F| is another (docs/error-bounds.md, "What verify compares"). Called by verify.cpp.
+// |V - F| is another (docs/error-bounds.md, "What verify compares").
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Paganin's phase retrieval of one view (Journal of Microscopy 206, 2002, 33). Called by prepare.cpp.
+// Paganin's phase retrieval of one view (Journal of Microscopy 206, 2002, 33).
 #pragma once
 
 #include "host/opencl/host_fft.hpp"

@@ -1,4 +1,4 @@
-// A Preparation as it stands in the certificate's `field` (docs/file-format.md). Called by certificate.cpp.
+// A Preparation as it stands in the certificate's `field` (docs/file-format.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

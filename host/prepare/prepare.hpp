@@ -1,4 +1,4 @@
-// The steps of a Preparation: on each view before it is rounded, then on the scan. Called by read_scan.cpp.
+// The steps of a Preparation: on each view before it is rounded, then on the scan.
 #pragma once
 
 #include <cstdint>

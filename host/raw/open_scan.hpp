@@ -1,4 +1,4 @@
-// Which reader a scan is for. Called by read_scan.cpp.
+// Which reader a scan is for.
 #pragma once
 
 #include <filesystem>

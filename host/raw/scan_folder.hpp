@@ -1,4 +1,4 @@
-// A folder with a scan.json. Called by read_scan.cpp.
+// A folder with a scan.json.
 #pragma once
 
 #include <filesystem>

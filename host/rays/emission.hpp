@@ -1,6 +1,6 @@
 // The interval that holds an ideal pixel's colour: box steps from the back to the front
 // (docs/pixel-bounds.md, theorem 3), with exact ranges of the transfer function. Double precision on the
-// host. Called by certified_rays.cpp, lit_emission.cpp.
+// host.
 #pragma once
 
 #include <array>

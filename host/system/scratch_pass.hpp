@@ -1,6 +1,6 @@
 // A pass over arrays in scratch that reads or writes faster than the keeper of scratch looks
 // (vdvr/scratch.hpp): it lets go of them by itself, so that what is resident does not depend on who gets a
-// core. Called by close_boundaries.cpp, sampler_terms.cpp, device_field.cpp and content_hash.cpp.
+// core.
 #pragma once
 
 #include <sys/mman.h>

@@ -1,5 +1,5 @@
 // What bricks add to the uncertainty of pixels, to first order in the bounds (docs/pixel-bounds.md): where to
-// refine. It is no bound. Called by picture_refinement.cpp.
+// refine. It is no bound.
 #pragma once
 
 #include <array>

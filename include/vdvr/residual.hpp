@@ -1,6 +1,6 @@
 // Re-projection residuals: what was measured less the integral of F along the measured ray, as an interval
 // that is proved (docs/residual.md). What no interpolation explains lies in views, truncation, noise or
-// physics. Called by the command residual.
+// physics.
 #pragma once
 
 #include <array>
