@@ -1,5 +1,4 @@
-// What a program over the library needs to certify: plan, build and the certificate completed. Called by
-// programs; calls plan.cpp and build.cpp.
+// What a program over the library needs to certify: plan, build and the certificate completed.
 #include "vdvr/certify.hpp"
 
 #include <fmt/format.h>

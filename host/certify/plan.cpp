@@ -1,5 +1,4 @@
-// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md). Called by
-// the command line.
+// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md).
 #include "vdvr/plan.hpp"
 
 #include <fmt/format.h>

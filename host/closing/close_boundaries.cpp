@@ -1,5 +1,5 @@
 // Closes the bricks and packs them: finds the type and the step of every tile with which the closed samples
-// fit, then stores them. Called by build.cpp. Calls close_coarse.cpp and close_paper.cpp.
+// fit, then stores them. Calls close_coarse.cpp and close_paper.cpp.
 #include "host/closing/close_boundaries.hpp"
 
 #include <algorithm>

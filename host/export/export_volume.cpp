@@ -1,5 +1,5 @@
 // Slab by slab: V is sampled on all cores, turned into the file's type, and handed to the format's sink. What
-// was exported is never whole in memory. Called by `vdvr export` and `vdvr reconstruct`.
+// was exported is never whole in memory.
 #include "vdvr/export_volume.hpp"
 
 #include <fmt/format.h>

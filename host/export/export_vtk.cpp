@@ -1,5 +1,4 @@
-// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them. Called by
-// export_volume.cpp, and by whoever wants blocks in memory.
+// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them.
 #include "vdvr/export_vtk.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // Bricks that a lattice touches, the chunks of the file that hold their samples, and these in memory that
-// takes room only where it is written. Called by the Python module.
+// takes room only where it is written.
 #include "vdvr/lazy_volume.hpp"
 
 #include <fmt/format.h>

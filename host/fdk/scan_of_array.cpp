@@ -1,4 +1,3 @@
-// Called by programs that have a scan in memory.
 #include "vdvr/scan_of_array.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
-// A row's residuals as a sinogram between a scale, the rms of each view and that of each column. Called by
-// the command residual.
+// A row's residuals as a sinogram between a scale, the rms of each view and that of each column.
 #include "vdvr/residual_picture.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
-// A stack of line integrals [angle][v][u] in MetaImage or NRRD, its angles in a text file. Called by
-// read_scan.
+// A stack of line integrals [angle][v][u] in MetaImage or NRRD, its angles in a text file.
 #include "host/raw/raster_scan.hpp"
 
 #include <fmt/format.h>

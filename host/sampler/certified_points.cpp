@@ -1,4 +1,3 @@
-// Called by `vdvr probe` and by the Python module.
 #include "vdvr/certified_points.hpp"
 
 #include <fmt/format.h>

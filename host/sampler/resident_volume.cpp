@@ -1,4 +1,4 @@
-// Uploads a mixed volume once for many frames; packs and builds the image atlas. Called by the renderer.
+// Uploads a mixed volume once for many frames; packs and builds the image atlas.
 #include "host/sampler/resident_volume.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,5 @@
 // A scan from whatever file holds it: told apart by content, read block by block, pre-processed in double,
-// rounded to float once; then the centre. Layout float data[view][v][u]. Called by every command that takes a
-// scan; calls host/io readers, host/scan/preprocess.cpp and host/center/find_center.cpp.
+// rounded to float once; then the centre. Layout float data[view][v][u].
 #include "vdvr/read_scan.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Pictures as PNG and values as NumPy files. Called by the render and run commands.
+// Pictures as PNG and values as NumPy files.
 #include "vdvr/image.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// The one unit that holds stb_image_write. Called by image.cpp and animation.cpp.
+// The one unit that holds stb_image_write.
 #include "host/system/png.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Files held to their projections. Called by programs; calls vdvr_file.cpp and verify.cpp.
+// Files held to their projections.
 #include "vdvr/verify_file.hpp"
 
 #include <fmt/format.h>

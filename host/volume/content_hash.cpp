@@ -1,4 +1,4 @@
-// The hash of a volume's content (docs/file-format.md). Called by build, verify, render.
+// The hash of a volume's content (docs/file-format.md).
 #include <array>
 #include <bit>
 #include <cstddef>
