@@ -7,7 +7,6 @@
 #include "apps/vdvr/crew.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/reconstruct.hpp"
 #include "vdvr/verify_file.hpp"

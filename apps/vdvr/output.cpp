@@ -11,6 +11,7 @@
 #include "apps/common/messages.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace fs = std::filesystem;
 

@@ -1,6 +1,5 @@
 // The filtered projections on a lattice denser than the detector both ways: columns first, then rows by
-// transforms as well, so that each value errs by some u of the largest. Called by projection_bounds.cpp and
-// cone_tiles.cpp.
+// transforms as well, so that each value errs by some u of the largest.
 #pragma once
 
 #include "host/bounds/projection_bounds.hpp"

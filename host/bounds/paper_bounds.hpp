@@ -1,6 +1,5 @@
 // The paper's curvature bounds as the paper computes them: derivatives in frequency space, their maxima taken
 // at the samples. They can lie below the truth (docs/error-bounds.md), so they are printed and never decide.
-// Called by plan.cpp.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // Global bounds that rest on the filtered projections: sups, the errors of the chain to gold, amplitude
-// bounds (docs/error-bounds.md). Called by plan.cpp, kept_gold.cpp, brick_remainder.cpp and verify_terms.cpp.
+// bounds (docs/error-bounds.md).
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The centre from the views' centroids. Called by find_center.cpp.
+// The centre from the views' centroids.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,4 @@
-// The centre by every method that applies, and how sure they make it. Called by host/scan/read_scan.cpp, the
-// command `center` and host/picture/center_sheet.cpp.
+// The centre by every method that applies, and how sure they make it.
 #include "vdvr/find_center.hpp"
 
 #include <fmt/format.h>

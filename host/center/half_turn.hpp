@@ -1,4 +1,4 @@
-// The centre from half a turn without its end, which has no opposite views. Called by find_center.cpp.
+// The centre from half a turn without its end, which has no opposite views.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,4 @@
-// The place about which one row is the mirror image of another, for many pairs of rows at once. Called by
-// opposite_views.cpp, half_turn.cpp and opposite_rays.cpp.
+// The place about which one row is the mirror image of another, for many pairs of rows at once.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The centre of a cone-beam scan of a full turn. Called by find_center.cpp.
+// The centre of a cone-beam scan of a full turn.
 #pragma once
 
 #include <optional>

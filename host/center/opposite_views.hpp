@@ -1,4 +1,4 @@
-// The centre from views that look along the same rays from either side. Called by find_center.cpp.
+// The centre from views that look along the same rays from either side.
 #pragma once
 
 #include <optional>

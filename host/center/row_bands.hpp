@@ -1,5 +1,4 @@
-// Views averaged over bands of rows: the centre is the same in all, and the mean has less noise. Called by
-// the methods of find_center.
+// Views averaged over bands of rows: the centre is the same in all, and the mean has less noise.
 #pragma once
 
 #include <cstdint>

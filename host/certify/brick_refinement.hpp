@@ -1,5 +1,4 @@
 // Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of vdvr/build.hpp).
-// Called by build.cpp.
 #pragma once
 
 #include <vector>

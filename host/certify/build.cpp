@@ -8,12 +8,12 @@
 #include <cmath>
 #include <utility>
 
-#include "host/bounds/result_units.hpp"
 #include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/closing/close_boundaries.hpp"
 #include "host/certify/fill_certificate.hpp"
+#include "host/certify/plan_units.hpp"
 #include "host/certify/sampler_share.hpp"
 #include "host/closing/raise_levels.hpp"
 #include "host/crew/crew.hpp"
@@ -23,6 +23,7 @@
 #include "host/opencl/host_memory.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "host/volume/result_units.hpp"
 #include "vdvr/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/region_of_interest.hpp"

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "vdvr/hash.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-// What a build depends on, as its journal says it. Called by build.cpp.
+// What a build depends on, as its journal says it.
 #pragma once
 
 #include <string>

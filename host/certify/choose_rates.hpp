@@ -1,5 +1,5 @@
 // The rates of a plan: what a trial of some blocks of gold shows of each, and which of them leave room for
-// the grid. All numbers in units of computation. Called by plan.cpp.
+// the grid. All numbers in units of computation.
 #pragma once
 
 #include <cstdint>

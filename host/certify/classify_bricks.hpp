@@ -1,5 +1,5 @@
 // Levels of bricks by the node test, and the measure of stored fields, at two rates of gold
-// (docs/error-bounds.md, section 14). Called by build.cpp, foresee.cpp and verify_terms.cpp.
+// (docs/error-bounds.md, section 14).
 #pragma once
 
 #include <algorithm>

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <optional>
 
-#include "host/bounds/covered_range.hpp"
 #include "host/gold/worst_node.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "host/volume/covered_range.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/trust.hpp"
 

@@ -1,4 +1,4 @@
-// What the steps of a build share, and the certificate of what they made. Called by build.cpp.
+// What the steps of a build share, and the certificate of what they made.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,4 @@
-// What a build will store and how long it will take, from a sample of its bricks. Called by plan.cpp and
-// foresee_pictures.cpp.
+// What a build will store and how long it will take, from a sample of its bricks.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md). Called by
-// the command line.
+// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md).
 #include "vdvr/plan.hpp"
 
 #include <fmt/format.h>
@@ -13,14 +12,13 @@
 #include <numbers>
 #include <utility>
 
-#include "host/bounds/covered_range.hpp"
 #include "host/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/gold/base_of_gold.hpp"
 #include "host/gold/prepared_scan.hpp"
-#include "host/bounds/result_units.hpp"
+#include "host/certify/plan_units.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
@@ -28,6 +26,7 @@
 #include "host/scan/row_window.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "host/volume/covered_range.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 

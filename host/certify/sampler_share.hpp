@@ -1,6 +1,6 @@
 // What a build leaves of epsilon for the samplers of its devices (docs/error-bounds.md, section 8). What they
 // take is known only of a volume that is stored; the texture unit's part can be many times the buffer's. It
-// is each brick's own, and falls as bricks with steep samples are refined. Called by build.cpp.
+// is each brick's own, and falls as bricks with steep samples are refined.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // Closes the bricks and packs them: finds the type and the step of every tile with which the closed samples
-// fit, then stores them. Called by build.cpp. Calls close_coarse.cpp and close_paper.cpp.
+// fit, then stores them. Calls close_coarse.cpp and close_paper.cpp.
 #include "host/closing/close_boundaries.hpp"
 
 #include <algorithm>
@@ -100,8 +100,8 @@ MixedVolume CloseBoundaries::volume(const MixedVolume* before) {
   number_tiles(v);
   ScratchPass pass;
   open_.samples.add_to(pass);
-  pass.add(v);
-  if (before) pass.add(*before);
+  pass.add_all(v);
+  if (before) pass.add_all(*before);
   for_each_tile([&](std::int64_t i) {
     pass.touched(3 * sizeof(float) * count(v.tile_size(v.level[at(i)])));
     const StoredTile to = stored_tile(v, at(i));
@@ -272,8 +272,8 @@ std::vector<std::uint8_t> changed_bricks(const MixedVolume& before, const MixedV
   std::vector<std::uint8_t> changed(after.level.size(), 0);
   const Bricks bricks(after.grid, after.granularity);
   ScratchPass pass;
-  pass.add(before);
-  pass.add(after);
+  pass.add_all(before);
+  pass.add_all(after);
   for_each_brick(changed.size(), [&](std::int64_t i) {
     if (!among.empty() && !among[at(i)]) return;
     pass.touched(2 * sizeof(float) * count(after.tile_size(after.level[at(i)])));

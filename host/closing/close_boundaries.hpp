@@ -1,5 +1,5 @@
 // Boundary closing: makes the field continuous across bricks of different levels, and packs the result into
-// the stored types (docs/error-bounds.md, sections on closing). Called by build.cpp.
+// the stored types (docs/error-bounds.md, sections on closing).
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "host/closing/open_bricks.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/comparison.hpp"
+#include "vdvr/mixed_volume.hpp"
+#include "vdvr/scratch.hpp"
 
 namespace vdvr {
 
@@ -76,7 +78,7 @@ class CloseBoundaries {
 std::vector<std::uint8_t> changed_bricks(const MixedVolume& before, const MixedVolume& after,
                                          const std::vector<std::uint8_t>& among = {});
 
-/// The tile of a brick as stored, before rounding inside it to its own step. Called by close_boundaries.
+/// The tile of a brick as stored, before rounding inside it to its own step.
 std::vector<float> tile_by_coarse(const StoredAs& stored, std::int64_t brick);
 std::vector<float> tile_by_paper(const StoredAs& stored, std::int64_t brick);
 /// The levels that bricks rise to under the paper's closing.

@@ -1,6 +1,5 @@
-// Closing `coarse`: the fine side follows the coarse one. Called by close_boundaries.cpp. Interpolates with
-// the sampler's own lerp, so that the stored samples of a fine brick lie on what its coarse neighbour
-// interpolates.
+// Closing `coarse`: the fine side follows the coarse one. Interpolates with the sampler's own lerp, so that
+// the stored samples of a fine brick lie on what its coarse neighbour interpolates.
 #include <algorithm>
 #include <utility>
 

@@ -1,6 +1,6 @@
 // The paper's closing (its section 4.3): the low side of a border is upgraded and fed with the gold of the
 // high side there; what else is new is interpolated. A brick between three levels is fed at the first,
-// interpolated again, then fed at the second. Called by close_boundaries.cpp.
+// interpolated again, then fed at the second.
 #include <algorithm>
 #include <bit>
 

@@ -1,6 +1,5 @@
 // The bricks before closing, and their geometry: neighbours, shared parts, indices of one brick's samples in
-// another's tile. x, y, z order for everything but level triples. Called by classify_bricks.cpp, build.cpp,
-// raise_levels.cpp and the closings.
+// another's tile. x, y, z order for everything but level triples.
 #pragma once
 
 #include <algorithm>

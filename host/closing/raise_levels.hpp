@@ -1,5 +1,4 @@
 // Which levels rise where a closed brick violates the node test (docs/error-bounds.md, sections on closing).
-// Called by build.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The bricks' own samples before closing: one array after the other, in memory or, where they take more than
-// the room there, in scratch. Called by classify_bricks.cpp and the closings, through OpenBricks.
+// the room there, in scratch.
 #pragma once
 
 #include <algorithm>

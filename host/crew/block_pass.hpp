@@ -1,6 +1,5 @@
 // What a pass over gold asks of every block, in full, and the record that answers: whoever has the scan and
-// the field can compute any block, here or elsewhere, and gives the same bytes. Called by journalled_gold.cpp
-// and crew_member.cpp; read by classify_bricks.cpp.
+// the field can compute any block, here or elsewhere, and gives the same bytes.
 #pragma once
 
 #include <array>

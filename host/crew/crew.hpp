@@ -1,6 +1,5 @@
 // Who computes the blocks of a build's passes: one device, several of this process, those of other processes.
-// Blocks are independent, and a block has the same record whoever computes it. Called by journalled_gold.cpp
-// and build.cpp; calls crew_member.cpp and remote_worker.cpp.
+// Blocks are independent, and a block has the same record whoever computes it.
 #pragma once
 
 #include <chrono>

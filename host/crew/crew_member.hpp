@@ -1,5 +1,4 @@
-// One device's part in a crew: its own kept gold, and the blocks that it is given. Called by crew.cpp and
-// serve.cpp.
+// One device's part in a crew: its own kept gold, and the blocks that it is given.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,4 @@
 // What processes of a crew say to one another, as bytes and back: the scan, passes, fields, pieces of work.
-// Called by remote_worker.cpp and serve.cpp.
 #pragma once
 
 #include <cstdint>

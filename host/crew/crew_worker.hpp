@@ -1,5 +1,4 @@
-// Workers of a crew: a device of this process with a thread of its own, and another process. Called by
-// crew.cpp.
+// Workers of a crew: a device of this process with a thread of its own, and another process.
 #pragma once
 
 #include <atomic>

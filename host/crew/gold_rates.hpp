@@ -1,5 +1,4 @@
-// Gold at the rate that certifies, and at half of it (docs/error-bounds.md, section 14). Called by build.cpp,
-// foresee.cpp and crew_member.cpp.
+// Gold at the rate that certifies, and at half of it (docs/error-bounds.md, section 14).
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Passes over gold, spread over a crew, that a journal remembers: what somebody computed before is applied
-// and not computed again. Called by classify_bricks.cpp and build.cpp.
+// and not computed again.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Sigma of F beside an exported volume. Declared in vdvr/export_volume.hpp; called by `vdvr export --sigma`.
+// Sigma of F beside an exported volume. Declared in vdvr/export_volume.hpp.
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"

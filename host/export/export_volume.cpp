@@ -1,5 +1,5 @@
 // Slab by slab: V is sampled on all cores, turned into the file's type, and handed to the format's sink. What
-// was exported is never whole in memory. Called by `vdvr export` and `vdvr reconstruct`.
+// was exported is never whole in memory.
 #include "vdvr/export_volume.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +15,7 @@
 
 #include "host/export/hdf5_sink.hpp"
 #include "host/export/ome_zarr.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/export/tiff_sink.hpp"
 #include "host/export/volume_sink.hpp"
 #include "host/system/casts.hpp"

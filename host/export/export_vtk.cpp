@@ -1,5 +1,4 @@
-// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them. Called by
-// export_volume.cpp, and by whoever wants blocks in memory.
+// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them.
 #include "vdvr/export_vtk.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +14,7 @@
 
 #include "host/export/export_note.hpp"
 #include "host/export/pack.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/export/vtk_partition.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"

@@ -1,5 +1,5 @@
 // Bricks that a lattice touches, the chunks of the file that hold their samples, and these in memory that
-// takes room only where it is written. Called by the Python module.
+// takes room only where it is written.
 #include "vdvr/lazy_volume.hpp"
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/hdf5/hdf5_chunks.hpp"
 #include "host/system/casts.hpp"
 #include "host/volume/bricks.hpp"

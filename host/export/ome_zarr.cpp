@@ -12,7 +12,7 @@
 #include <map>
 
 #include "host/export/pack.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"

@@ -1,4 +1,4 @@
-// Which bricks share a vtkImageData. Called by export_vtk.cpp.
+// Which bricks share a vtkImageData.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,4 @@
-// A block of samples times a matrix along one of its axes: cosine analysis, derivatives. Called by
-// cosine_spectrum.cpp and paper_bounds.cpp.
+// A block of samples times a matrix along one of its axes: cosine analysis, derivatives.
 #pragma once
 
 #include <cstdint>

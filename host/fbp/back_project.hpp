@@ -1,5 +1,4 @@
-// Back-projection of an upsampled slab onto blocks of sample columns. Called by reconstruct.cpp and
-// gold_stream.cpp.
+// Back-projection of an upsampled slab onto blocks of sample columns.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Dense products of many rows with one matrix, or of one matrix with many. Called by filter_projections.cpp.
+// Dense products of many rows with one matrix, or of one matrix with many.
 #pragma once
 
 #include "host/opencl/array.hpp"

@@ -2,8 +2,7 @@
 // double precision.
 //
 // A row q_0 .. q_{n-1} defines q(x) = sum_i q_i [ g(x - i) + g(x + i + 1) ] with g(d) = (1/n) [1/2 +
-// sum_{m=1}^{n-1} cos(pi m d / n)]. Called by filter_projections.cpp (upsampling in u, rows at the grid's z)
-// and projection_bounds.cpp (derivatives).
+// sum_{m=1}^{n-1} cos(pi m d / n)].
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The covered region of a scan: points all of whose projections fall on the detector; of cone beam a cylinder
-// within it. Called by reconstruct.cpp, plan.cpp, gold_stream.cpp, build.cpp.
+// within it.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
 // Ramp filter on the device, and upsampling of slabs of rows (docs/geometry.md: ramp first, then upsample).
-// Called by reconstruct.cpp, plan.cpp, gold_stream.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // The ramp filter of detector rows, in ways that agree to rounding: zero-padded FFTs (clFFT), or the product
 // with the kernel's Toeplitz matrix, which is faster for short rows on CPUs. In fp32, or in double precision
 // and then rounded once, to the sample that is stored. FFTs on the host stand in where the device has no
-// double precision. Called by filter_projections.cpp.
+// double precision.
 #pragma once
 
 #include <memory>

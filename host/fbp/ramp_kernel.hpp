@@ -1,5 +1,5 @@
 // The sampled band-limited ramp kernel, windowed (Kak and Slaney, Principles of Computerized Tomographic
-// Imaging, eq. 3.61, times the pitch). Called by filter_projections.cpp and exact_field.cpp.
+// Imaging, eq. 3.61, times the pitch).
 #pragma once
 
 #include <cstdint>

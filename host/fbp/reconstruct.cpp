@@ -1,5 +1,4 @@
-// Uniform FBP in slabs of rows and blocks of columns. Called by the command line and by plan.cpp (the 1x base
-// volume).
+// Uniform FBP in slabs of rows and blocks of columns.
 #include "vdvr/reconstruct.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
-// Uniform reconstruction from filtered projections, and what gold shares with it. Called by plan.cpp,
-// gold_stream.cpp and fdk/reconstruct_scan.cpp.
+// Uniform reconstruction from filtered projections, and what gold shares with it.
 #pragma once
 
 #include <string>

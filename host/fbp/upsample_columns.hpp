@@ -1,5 +1,5 @@
 // Finer columns of detector rows in double precision, at a cost that grows with the columns times their
-// logarithm (docs/geometry.md). Called by filter_projections.cpp; projection_bounds.cpp bounds its errors.
+// logarithm (docs/geometry.md). Its errors are bounded by projection_bounds.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Angular weights w_k of filtered back-projection (docs/geometry.md, "Weights of views"). Called by
-// filter_projections.cpp, fdk_weights.cpp and exact_field.cpp.
+// Angular weights w_k of filtered back-projection (docs/geometry.md, "Weights of views").
 #pragma once
 
 #include <numbers>

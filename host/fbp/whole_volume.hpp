@@ -1,4 +1,4 @@
-// What a reconstruction fills, and what times it. Called by reconstruct.cpp and fdk/reconstruct_scan.cpp.
+// What a reconstruction fills, and what times it.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Back-projection of cone-beam views onto a band of sample columns. Called by reconstruct_cone.cpp.
+// Back-projection of cone-beam views onto a band of sample columns.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The covered region of a cone-beam scan. Called by reconstruct_cone.cpp and exact_field.cpp.
+// The covered region of a cone-beam scan.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // What cone-beam samples weigh before the ramp filter, and views in their sum (docs/geometry.md, "Cone
-// beam"). Called by filter_cone.cpp, exact_field.cpp and reconstruct_scan.cpp.
+// beam").
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam"). Called by reconstruct_cone.cpp
-// and exact_field.cpp.
+// The ramp filter of cone-beam projections (docs/geometry.md, "Cone beam").
 #pragma once
 
 #include "host/fbp/coverage.hpp"

@@ -1,4 +1,4 @@
-// Uniform FDK on the device. Called by reconstruct_scan.cpp.
+// Uniform FDK on the device.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Reconstruction of scans of either beam, in their users' units. Called by the command line.
+// Reconstruction of scans of either beam, in their users' units.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Convex parts that cover what is certified of a cone-beam scan, for bounds that hold part by part. Called by
-// projection_bounds.cpp, kept_gold.cpp, cone_tiles.cpp and brick_remainder.cpp.
+// Convex parts that cover what is certified of a cone-beam scan, for bounds that hold part by part.
 #pragma once
 
 #include <array>

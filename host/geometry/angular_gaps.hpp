@@ -1,6 +1,5 @@
 // Which directions a scan sees: views that nearly coincide as one direction, the gaps between directions, and
-// which of these are wedges that nothing saw (docs/geometry.md, "Weights of views"). Called by
-// host/fbp/view_weights.cpp and host/geometry/cone_geometry.cpp.
+// which of these are wedges that nothing saw (docs/geometry.md, "Weights of views").
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// ASTRA's projection geometries `cone` and `cone_vec`, saved as JSON. Called by host/raw/scan_members.cpp.
+// ASTRA's projection geometries `cone` and `cone_vec`, saved as JSON.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,4 @@
-// CIL's AcquisitionGeometry.create_Cone3D with its panel and angles, the arguments saved as JSON. Called by
-// host/raw/scan_members.cpp.
+// CIL's AcquisitionGeometry.create_Cone3D with its panel and angles, the arguments saved as JSON.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// `geometry` of scan.json: a circular scan in a few numbers. Called by host/raw/scan_members.cpp.
+// `geometry` of scan.json: a circular scan in a few numbers.
 #pragma once
 
 #include "host/geometry/cone_views.hpp"

@@ -1,5 +1,5 @@
 // What a geometry file says of a cone-beam scan, and what every such file is held to. Filled by the readers
-// of this room; called by host/raw/scan_members.cpp.
+// of this room.
 #pragma once
 
 #include <array>

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "host/io/natural_order.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

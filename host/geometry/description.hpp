@@ -1,5 +1,5 @@
 // A JSON object with typed access, such as scan.json or a member of it. Every complaint names file, member
-// and value. Called by scan_folder.cpp, scan_members.cpp and the readers of geometry in JSON.
+// and value.
 #pragma once
 
 #include <cstdint>

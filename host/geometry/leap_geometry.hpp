@@ -1,5 +1,4 @@
-// LEAP's geometries `set_conebeam` and `set_modularbeam`, their arguments saved as JSON. Called by
-// host/raw/scan_members.cpp.
+// LEAP's geometries `set_conebeam` and `set_modularbeam`, their arguments saved as JSON.
 #pragma once
 
 #include <filesystem>

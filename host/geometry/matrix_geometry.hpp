@@ -1,5 +1,4 @@
-// `matrices` of scan.json: a 3x4 matrix for each view in NumPy's format. Called by
-// host/raw/scan_members.cpp.
+// `matrices` of scan.json: a 3x4 matrix for each view in NumPy's format.
 #pragma once
 
 #include <filesystem>

@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "host/io/number_text.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

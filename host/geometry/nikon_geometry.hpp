@@ -1,5 +1,4 @@
-// Nikon's .xtekct files: a scan's geometry, its white level, and where its projections lie. Called by
-// host/raw/scan_folder.cpp and scan_members.cpp.
+// Nikon's .xtekct files: a scan's geometry, its white level, and where its projections lie.
 #pragma once
 
 #include <filesystem>

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "host/io/number_text.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "host/io/xml_file.hpp"
 #include "vdvr/error.hpp"
 

@@ -1,4 +1,4 @@
-// RTK's XML files of geometry. Called by host/raw/scan_members.cpp.
+// RTK's XML files of geometry.
 #pragma once
 
 #include <filesystem>

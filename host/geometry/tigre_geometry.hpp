@@ -1,4 +1,4 @@
-// TIGRE's geometry, saved as JSON. Called by host/raw/scan_members.cpp.
+// TIGRE's geometry, saved as JSON.
 #pragma once
 
 #include <filesystem>

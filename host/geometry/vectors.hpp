@@ -1,5 +1,4 @@
-// Vectors of world space in double precision. Called by cone_geometry.cpp and
-// fdk_weights.cpp.
+// Vectors of world space in double precision.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Base samples taken from kept gold, where a reconstruction of their own would make the same again: of cone
-// beam. Called by plan.cpp.
+// beam.
 #pragma once
 
 #include "host/kept/kept_gold.hpp"

@@ -1,4 +1,4 @@
-// Launcher of kernels/gold/cell_test.cl: a stored field against F, brick by brick. Called by gold_batch.cpp.
+// Launcher of kernels/gold/cell_test.cl: a stored field against F, brick by brick.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Samples of a level, fitted to the trilinear filter: what a brick of that level stores need not lie on F
-// (docs/error-bounds.md, section on coefficients). Called by host/gold/gold_batch.cpp.
+// (docs/error-bounds.md, section on coefficients).
 #pragma once
 
 #include <cstdint>

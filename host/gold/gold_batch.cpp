@@ -1,5 +1,5 @@
-// What is done to a batch of gold blocks: fit, classify, extract, measure. Called by classify_bricks.cpp,
-// plan.cpp and measure_tightness.cpp. Launches kernels/gold/classify.cl and kernels/gold/cell_test.cl.
+// What is done to a batch of gold blocks: fit, classify, extract, measure. Launches kernels/gold/classify.cl
+// and kernels/gold/cell_test.cl.
 #include "host/gold/gold_batch.hpp"
 
 #include <algorithm>

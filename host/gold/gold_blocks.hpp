@@ -1,4 +1,4 @@
-// Which boxes of bricks are computed together. Called by gold_stream.cpp.
+// Which boxes of bricks are computed together.
 #pragma once
 
 #include <cstdint>

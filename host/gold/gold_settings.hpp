@@ -1,4 +1,4 @@
-// What gold is streamed for. Called by gold_stream.hpp and node_slack.hpp.
+// What gold is streamed for.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // What streams of gold of one scan and grid share: the kept nodes and what T leaves out, brick by brick.
-// Called by gold_stream.cpp.
 #pragma once
 
 #include "host/kept/brick_remainder.hpp"

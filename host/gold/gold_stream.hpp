@@ -1,6 +1,5 @@
 // Gold, block by block: F on the grid refined by the gold rate, with the node slack T + P beside it, never
-// whole in memory (docs/error-bounds.md). Called by plan.cpp, foresee.cpp, classify_bricks.cpp, build.cpp and
-// measure_tightness.cpp.
+// whole in memory (docs/error-bounds.md).
 //
 // A slab is a run of base cells in z whose filtered rows are on the device; blocks are columns of base cells
 // inside it. A full pass uses large blocks, a repair or a sampled verification blocks of one brick; the code

@@ -1,6 +1,5 @@
 // The slack T + P of every gold node of a batch of blocks, to either side: P a constant, the remainder of T
-// by brick, second differences by gold cell (docs/error-bounds.md). Called by gold_stream.cpp and
-// gold_batch.cpp.
+// by brick, second differences by gold cell (docs/error-bounds.md).
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// What |V - F| may be at the nodes of bricks: one value, or less of some. Called by gold_batch.cpp and
-// whoever measures by brick.
+// What |V - F| may be at the nodes of bricks: one value, or less of some.
 #pragma once
 
 #include <algorithm>

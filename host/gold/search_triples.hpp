@@ -1,4 +1,4 @@
-// Which level triples of a brick to try, cheapest first, so that few are tried. Called by gold_batch.cpp.
+// Which level triples of a brick to try, cheapest first, so that few are tried.
 #pragma once
 
 #include <array>

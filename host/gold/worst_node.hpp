@@ -1,5 +1,5 @@
 // Where in a brick the stored field is farthest from gold, slack included: on the host, through the shared
-// sampler. Called by build.cpp.
+// sampler.
 #pragma once
 
 #include <optional>

@@ -1,7 +1,7 @@
 // The base of the HDF5 layer: handles that close themselves, HDF5's messages silenced and quoted, attributes
 // and datasets as their headers declare them. hdf5_reader.hpp opens and reads, hdf5_writer.hpp writes,
 // hdf5_chunks.hpp and hdf5_filters.hpp judge what is stored, hdf5_links.hpp and hdf5_virtual.hpp find it in
-// other files. Called by those, their callers and seal.cpp.
+// other files.
 //
 // The HDF5 library is not thread-safe: one thread at a time.
 #pragma once

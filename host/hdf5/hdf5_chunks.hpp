@@ -1,6 +1,5 @@
 // How a dataset is stored, checked; and its chunks, taken apart here and not by HDF5's filters: HDF5 1.10
-// inflates without a limit, and copies what a chunk should hold from behind what it inflated to. Called by
-// hdf5_reader.cpp.
+// inflates without a limit, and copies what a chunk should hold from behind what it inflated to.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // Filters that HDF5 finds as plugins, and zstd, which is ours: named, looked for, and their chunks looked
-// into before HDF5 unpacks them, since plugins believe the sizes that a chunk states. Called by
-// hdf5_reader.cpp and hdf5_virtual.cpp.
+// into before HDF5 unpacks them, since plugins believe the sizes that a chunk states.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // Which file and which object a path of an HDF5 file leads to. Links are followed here, step by step, and not
 // by the HDF5 library, which looks for a linked file in folders that the environment names: what is read is
-// what is hashed. Called by hdf5_reader.cpp and hdf5_virtual.cpp.
+// what is hashed.
 #pragma once
 
 #include <filesystem>

@@ -2,7 +2,7 @@
 // (hdf5_links.hpp) is one policy for a whole Reader. A dataset comes in one of two ways: checksummed, as our
 // writer makes them, checked down to its stored bytes; or numeric, as others make them, read and converted by
 // HDF5. Either is handed out only after its declaration has been checked, so that callers can size memory by
-// it. Called by vdvr_file.cpp (volumes), hdf5_scan.cpp and volume_stack.cpp (files of others).
+// it.
 #pragma once
 
 #include <filesystem>

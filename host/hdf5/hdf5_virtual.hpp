@@ -1,6 +1,6 @@
 // Datasets of numbers as others write them, wherever their numbers lie: in the file, or as a virtual dataset
 // in others. A virtual dataset is read here, source by source, and not by the HDF5 library, which looks for
-// sources where its environment says and gives fill values where it finds none. Called by hdf5_reader.cpp.
+// sources where its environment says and gives fill values where it finds none.
 #pragma once
 
 #include <memory>

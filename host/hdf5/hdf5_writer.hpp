@@ -1,6 +1,6 @@
 // Writes HDF5 files in which every stored number is under a checksum: datasets are chunked, deflated if asked
 // for, with the Fletcher32 filter last; object headers, chunk indexes and superblock carry HDF5's own
-// checksums (format of HDF5 1.10). Called by write_vdvr.cpp, read_scan.cpp, hdf5_sink.cpp.
+// checksums (format of HDF5 1.10).
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,4 @@
-// zstd as a filter of HDF5, number 32015, over libzstd: Debian has no plugin of it. Called by
-// hdf5_filters.cpp.
+// zstd as a filter of HDF5, number 32015, over libzstd: Debian has no plugin of it.
 #pragma once
 
 #include <hdf5.h>

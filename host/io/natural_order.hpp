@@ -1,4 +1,4 @@
-// The order of numbered files. Called by scan_folder.cpp and volume_stack.cpp.
+// The order of numbered files.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// NumPy's .npy files of real numbers. Called by host/geometry/matrix_geometry.cpp.
+// NumPy's .npy files of real numbers.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Numbers in text files, read strictly: what is left over is a fault. Called by the readers of XML and INI
-// geometry files.
+// Numbers in text files, read strictly: what is left over is a fault.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// How the axes of a raster file run in the world. Called by raster_file.cpp.
+// How the axes of a raster file run in the world.
 #pragma once
 
 #include <array>

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "host/system/limits.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

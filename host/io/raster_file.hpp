@@ -1,6 +1,5 @@
 // MetaImage (.mha, .mhd) and NRRD (.nrrd, .nhdr): headers, and samples of any scalar type as double, raw or
-// gzip, in either byte order. The file's first axis is the fastest. Called by host/io/volume_file.cpp
-// and host/raw/raster_scan.cpp.
+// gzip, in either byte order. The file's first axis is the fastest.
 #pragma once
 
 #include <array>

@@ -1,7 +1,6 @@
 // Greyscale TIFF files as arrays of double: one image, a stack of them in a file, or a row of files. Strips
 // and tiles; integers of 1 to 16, 32 and 64 bits, packed or not; float16, float32, float64; any compression
-// the installed libtiff decodes. libtiff's messages become FileError; nothing is printed. Called by
-// host/raw/scan_folder.cpp and host/io/volume_stack.cpp.
+// the installed libtiff decodes. libtiff's messages become FileError; nothing is printed.
 #pragma once
 
 #include <cstdint>

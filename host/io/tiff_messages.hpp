@@ -1,4 +1,4 @@
-// What libtiff has to say, kept for the exception. Called by tiff.cpp and tiff_sink.cpp.
+// What libtiff has to say, kept for the exception.
 #pragma once
 
 #include <tiffio.h>

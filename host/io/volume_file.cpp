@@ -1,6 +1,5 @@
 // Uniform volumes as MetaImage or NRRD: any scalar type in, float32 out; volume_stack.cpp reads the rest.
-// Layout float samples[z][y][x], x fastest. Called by `simulate --volume`, `probe`, `render --method dvr`,
-// `reconstruct`, `export`.
+// Layout float samples[z][y][x], x fastest.
 #include "vdvr/volume_file.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // The samples of a uniform volume as a reader finds them, x fastest: sized before they come, and held to be
-// finite numbers. Called by volume_file.cpp and volume_stack.cpp.
+// finite numbers.
 #pragma once
 
 #include <array>

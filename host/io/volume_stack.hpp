@@ -1,5 +1,5 @@
 // Uniform volumes that are not one raster file: a dataset of an HDF5 file, a TIFF file of several images, a
-// folder of TIFF slices. Called by volume_file.cpp.
+// folder of TIFF slices.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -1,6 +1,5 @@
 // The part of XML that geometry files use: elements, attributes, text, comments. No document type but its
-// bare name, no entity but the five of the language, nothing that names another file. Called by
-// host/geometry/rtk_geometry.cpp.
+// bare name, no entity but the five of the language, nothing that names another file.
 #pragma once
 
 #include <filesystem>

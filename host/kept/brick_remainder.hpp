@@ -1,6 +1,6 @@
 // What T leaves out, brick by brick, from fourth differences of gold: at twice the rate of kept nodes with
 // six taps in u, at the kept nodes themselves with linear or cubic interpolation (docs/error-bounds.md,
-// section 5). Called by gold_stream.cpp.
+// section 5).
 #pragma once
 
 #include <array>

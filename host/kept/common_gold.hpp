@@ -1,6 +1,5 @@
 // Kept gold that devices of one machine make together and all read: threads of a process, or processes that
-// share memory. Whoever dies or hangs is not waited for: what he took, others make again. Called by
-// kept_gold.cpp, crew.cpp and crew_member.cpp.
+// share memory. Whoever dies or hangs is not waited for: what he took, others make again.
 #pragma once
 
 #include <atomic>
@@ -13,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/crew.hpp"
+#include "vdvr/common_memory.hpp"
 #include "vdvr/progress.hpp"
 
 namespace vdvr {

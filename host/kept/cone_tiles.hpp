@@ -1,6 +1,5 @@
 // Kept nodes of cone beam: tiles of them back-projected from tables of the filtered views, and what they and
-// the filters between them err (docs/error-bounds.md, section 16). Called by kept_gold.cpp. Launches
-// kernels/kept/cone_nodes.cl.
+// the filters between them err (docs/error-bounds.md, section 16). Launches kernels/kept/cone_nodes.cl.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// Gold from fewer nodes: products along z and filters across it, on the device. Called by kept_gold.cpp and
-// brick_remainder.cpp.
+// Gold from fewer nodes: products along z and filters across it, on the device.
 #pragma once
 
 #include <cstdint>

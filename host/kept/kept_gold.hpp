@@ -1,6 +1,6 @@
 // Gold where it determines the field: at twice the detector's columns across z and at its rows along z,
 // back-projected once; gold at every other node is interpolated from there with a bound
-// (docs/error-bounds.md, section 3). Called by gold_stream.cpp, brick_remainder.cpp and plan.cpp.
+// (docs/error-bounds.md, section 3).
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // What a filter between kept nodes errs on what a cone-beam view adds to F, which has no band limit in space
-// (docs/error-bounds.md, section 16). Called by cone_tiles.cpp.
+// (docs/error-bounds.md, section 16).
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// Pointer, wheel and keys. Called by live_json.cpp and notebooks.
+// Pointer, wheel and keys.
 #include "vdvr/live_events.hpp"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // Requests of viewers, read strictly: what a stranger sends is refused by name or does what an event may do.
-// Called by `vdvr serve`, by notebooks and by tests/fuzz/live_fuzz.cpp.
 #include "vdvr/live_json.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Frames of views. Called by `vdvr serve` and notebooks.
+// Frames of views.
 #include "vdvr/live_renderer.hpp"
 
 #include <fmt/format.h>

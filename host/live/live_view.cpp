@@ -1,4 +1,4 @@
-// A volume's facts for viewers, and the options of a view. Called by live_renderer.cpp and programs.
+// A volume's facts for viewers, and the options of a view.
 #include "vdvr/live_view.hpp"
 
 #include <fmt/format.h>

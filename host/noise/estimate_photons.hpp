@@ -1,6 +1,6 @@
 // How many photons a pixel counted in the open beam, from line integrals alone: -log of counts with N photons
 // has the variance e^p / N. Of integrals that are no logarithms of counts one over their variance, the same
-// of all. Called by noise.cpp.
+// of all.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The variance of F by back-projection with squared weights. Called by noise.cpp.
+// The variance of F by back-projection with squared weights.
 #pragma once
 
 #include <cstdint>

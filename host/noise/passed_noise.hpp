@@ -1,4 +1,4 @@
-// What the steps of a preparation leave of white noise. Called by read_noise.cpp.
+// What the steps of a preparation leave of white noise.
 #pragma once
 
 #include <cstdint>

@@ -5,6 +5,7 @@
 #include "host/noise/passed_noise.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/noise.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr {
 namespace {

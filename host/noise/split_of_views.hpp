@@ -1,4 +1,4 @@
-// Signs of views that split a scan into halves. Called by split_of_views.cpp and its test.
+// Signs of views that split a scan into halves.
 #pragma once
 
 #include <vector>

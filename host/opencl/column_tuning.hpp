@@ -1,6 +1,5 @@
 // How the kernels that carry columns of z are launched, by device class: never changes what they compute
-// beyond rounding. Called by the launchers of back_project.cl and batched_product.cl, filter_rows.cpp and
-// gold_stream.cpp.
+// beyond rounding.
 #pragma once
 
 #include <array>

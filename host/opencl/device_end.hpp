@@ -1,6 +1,6 @@
 // For caches of OpenCL objects that lie outside a State: they must let go when their device ends. Left to the
 // destructors of statics, they would go after the thread-local objects of the OpenCL implementation, which
-// some still need then. Called by fft.cpp.
+// some still need then.
 #pragma once
 
 #include "host/opencl/state.hpp"

@@ -1,4 +1,4 @@
-// clFFT behind two functions. Called by host/fbp/filter_rows.cpp.
+// clFFT behind two functions.
 #include "host/opencl/fft.hpp"
 
 #pragma GCC diagnostic push

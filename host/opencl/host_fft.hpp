@@ -1,5 +1,5 @@
 // A radix-2 FFT in double precision on the host, for devices without double precision: only what a
-// convolution needs, so that no element is ever moved to its place. Called by host/fbp/filter_rows.cpp.
+// convolution needs, so that no element is ever moved to its place.
 #pragma once
 
 #include <complex>

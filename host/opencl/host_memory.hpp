@@ -1,6 +1,5 @@
 // The large host arrays of a stage, counted against --max-memory beside the device's. What is not counted
-// (docs/performance.md): scratch no larger than a batch of blocks, and libraries. Called by plan.cpp,
-// build.cpp.
+// (docs/performance.md): scratch no larger than a batch of blocks, and libraries.
 #pragma once
 
 #include <cstdint>

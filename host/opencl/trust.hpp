@@ -1,5 +1,4 @@
-// Whether a device computes as certificates assume: asked when it is opened (docs/robustness.md). Called by
-// device.cpp.
+// Whether a device computes as certificates assume: asked when it is opened (docs/robustness.md).
 #pragma once
 
 #include <string>

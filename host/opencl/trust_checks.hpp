@@ -1,4 +1,4 @@
-// What a device should answer to kernels/opencl/trust.cl, computed on the host. Called by trust.cpp.
+// What a device should answer to kernels/opencl/trust.cl, computed on the host.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // How kernels that carry heights are built and launched, by device class: one rule for all of them, which
-// never changes what they compute. Called by their launchers.
+// never changes what they compute.
 #pragma once
 
 #include <array>

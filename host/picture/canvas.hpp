@@ -1,4 +1,4 @@
-// Pixels, rectangles and smooth lines on a picture. Called by what draws in this room.
+// Pixels, rectangles and smooth lines on a picture.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// The sheet of `vdvr center`: scans of one row with other centres, reconstructed and drawn. Called by
-// programs; calls reconstruct.
+// The sheet of `vdvr center`: scans of one row with other centres, reconstructed and drawn.
 #include "vdvr/center_sheet.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
-// The pictures of `vdvr plan --pictures`. Called by programs; calls spectral_error.cpp, cosine_spectrum.cpp
-// and figure.cpp.
+// The pictures of `vdvr plan --pictures`.
 #include "vdvr/plan_pictures.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// How far a drawn picture can lie from the ideal one. Called by the render and verify commands.
+// How far a drawn picture can lie from the ideal one.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,5 +1,4 @@
-// Intervals of a slice's pixels: V at their middles and the bounds of bricks. Called by the render and verify
-// commands.
+// Intervals of a slice's pixels: V at their middles and the bounds of bricks.
 #include <algorithm>
 #include <cmath>
 #include <limits>

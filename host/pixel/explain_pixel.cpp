@@ -1,5 +1,4 @@
-// Which bricks, and which points of the transfer function, make a pixel's bound. Called by the render
-// command.
+// Which bricks, and which points of the transfer function, make a pixel's bound.
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -1,6 +1,5 @@
 // A pixel of the ideal picture of F under the light that V was drawn with (docs/pixel-bounds.md, section 7).
-// The device finds that light in fp32, so here it is a range: of gradients that its rounding may give. Called
-// by the verify command.
+// The device finds that light in fp32, so here it is a range: of gradients that its rounding may give.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// A pixel of the ideal picture from F itself, in double precision. Called by the verify command.
+// A pixel of the ideal picture from F itself, in double precision.
 #include <algorithm>
 #include <cmath>
 

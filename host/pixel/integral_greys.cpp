@@ -1,4 +1,4 @@
-// Greys of certified line integrals. Called by the render and verify commands.
+// Greys of certified line integrals.
 #include <algorithm>
 #include <cmath>
 

@@ -1,5 +1,4 @@
 // Intervals of pixels whose light is that of F, ray by ray on the host (docs/pixel-bounds.md, section 7).
-// Called by the render and verify commands, and tests.
 #include <fmt/format.h>
 
 #include <algorithm>

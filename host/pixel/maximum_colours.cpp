@@ -1,5 +1,4 @@
-// Colours of certified maxima: what the transfer function has between their bounds. Called by the render and
-// verify commands.
+// Colours of certified maxima: what the transfer function has between their bounds.
 #include <algorithm>
 #include <cmath>
 

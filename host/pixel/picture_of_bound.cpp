@@ -1,4 +1,4 @@
-// The bound of every pixel as a picture with its scale. Called by the render command.
+// The bound of every pixel as a picture with its scale.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Launches kernels/pixel/pixel_bounds.cl: certify_picture, certify_fast. Called by the render and verify
-// commands, and tests.
+// Launches kernels/pixel/pixel_bounds.cl: certify_picture, certify_fast.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// The ray of a pixel in double precision, and what lies behind all. Called by ideal_pixel.cpp,
-// ideal_drawn_pixel.cpp, explain_pixel.cpp, lit_pixels.cpp.
+// The ray of a pixel in double precision, and what lies behind all.
 #pragma once
 
 #include <algorithm>

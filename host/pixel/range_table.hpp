@@ -1,5 +1,5 @@
 // What a transfer function can show over an interval of values, however wide, in two look-ups
-// (docs/pixel-bounds.md, section 3). Called by pixel_bounds.cpp.
+// (docs/pixel-bounds.md, section 3).
 #pragma once
 
 #include <array>

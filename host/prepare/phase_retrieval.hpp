@@ -1,9 +1,9 @@
-// Paganin's phase retrieval of one view (Journal of Microscopy 206, 2002, 33). Called by prepare.cpp.
+// Paganin's phase retrieval of one view (Journal of Microscopy 206, 2002, 33).
 #pragma once
 
 #include "host/opencl/host_fft.hpp"
 #include "host/prepare/view_filters.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 
 namespace vdvr {
 

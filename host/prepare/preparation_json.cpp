@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vdvr/error.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr {
 namespace {

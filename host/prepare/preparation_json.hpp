@@ -1,9 +1,9 @@
-// A Preparation as it stands in the certificate's `field` (docs/file-format.md). Called by certificate.cpp.
+// A Preparation as it stands in the certificate's `field` (docs/file-format.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 
 namespace vdvr {
 

@@ -11,6 +11,7 @@
 #include "host/system/limits.hpp"
 #include "host/system/parallel.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr {
 namespace {

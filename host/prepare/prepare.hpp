@@ -1,4 +1,4 @@
-// The steps of a Preparation: on each view before it is rounded, then on the scan. Called by read_scan.cpp.
+// The steps of a Preparation: on each view before it is rounded, then on the scan.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 #include "host/prepare/phase_retrieval.hpp"
 #include "host/prepare/view_filters.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 

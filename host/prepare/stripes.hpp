@@ -1,6 +1,6 @@
 // Stripes in a sinogram, after Vo, Atwood and Drakopoulos, Optics Express 26, 2018, 28396. A stripe is a
 // column that answers otherwise than its neighbours, in all views or in some. Sinograms are double
-// sinogram[view][column] of line integrals. Called by prepare.cpp.
+// sinogram[view][column] of line integrals.
 //
 // Deviation: the paper corrects columns by a factor, of intensities. Of line integrals a factor of intensity
 // is an offset, so columns are compared by differences.

@@ -1,4 +1,4 @@
-// Filters of one view, each a plain loop. Layouts in the header; called by prepare.cpp and simulate.cpp.
+// Filters of one view, each a plain loop. Layouts in the header.
 #include "host/prepare/view_filters.hpp"
 
 #include <algorithm>

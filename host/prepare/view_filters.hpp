@@ -1,6 +1,6 @@
 // Median, Gaussian blur and binning of one view: what a detector does to it (the paper's section 5), and what
 // may be done to it before it is certified. Views are double view[v][u]. Edges are mirrored about the last
-// pixel's outer side. Called by prepare.cpp and simulate.cpp.
+// pixel's outer side.
 #pragma once
 
 #include <cstdint>

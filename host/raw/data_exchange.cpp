@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "host/system/limits.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

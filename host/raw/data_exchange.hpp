@@ -1,5 +1,4 @@
-// Data Exchange (De Carlo et al. 2014): a group with data, data_white, data_dark and theta. Called by
-// hdf5_scan.cpp.
+// Data Exchange (De Carlo et al. 2014): a group with data, data_white, data_dark and theta.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // Datasets of HDF5 files as frames: [angle][v][u], or [v][angle][u] where an `axes` attribute puts the angle
-// second (sinogram order). Called by data_exchange.cpp and nxtomo.cpp.
+// second (sinogram order).
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 #include "host/hdf5/hdf5_reader.hpp"
 #include "host/raw/raw_scan.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/scan_options.hpp"
 
 namespace vdvr::io {
 

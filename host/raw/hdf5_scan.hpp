@@ -1,4 +1,4 @@
-// Data Exchange and NXtomo. Called by read_scan.cpp and scan_folder.cpp.
+// Data Exchange and NXtomo.
 #pragma once
 
 #include <filesystem>

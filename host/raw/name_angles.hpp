@@ -1,4 +1,4 @@
-// Angles that stand in the names of files. Called by scan_members.cpp.
+// Angles that stand in the names of files.
 #pragma once
 
 #include <string>

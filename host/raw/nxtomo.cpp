@@ -8,7 +8,7 @@
 
 #include "host/raw/nxtomo_beam.hpp"
 #include "host/system/length_unit.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

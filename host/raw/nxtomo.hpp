@@ -1,5 +1,5 @@
 // NXtomo (NeXus): instrument/detector with data and image_key (0 projection, 1 flat, 2 dark, 3 invalid),
-// sample/rotation_angle. Called by hdf5_scan.cpp.
+// sample/rotation_angle.
 #pragma once
 
 #include <string>

@@ -11,7 +11,7 @@
 
 #include "host/system/length_unit.hpp"
 #include "host/system/limits.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

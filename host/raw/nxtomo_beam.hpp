@@ -1,5 +1,5 @@
 // Cone beam from the distances of an NXtomo file. Synchrotron files have distances too, so it is read only
-// when asked for: `beam` of ScanOptions and of scan.json. Called by hdf5_scan.cpp.
+// when asked for: `beam` of ScanOptions and of scan.json.
 #pragma once
 
 #include <string>

@@ -9,7 +9,7 @@
 #include "host/raw/hdf5_scan.hpp"
 #include "host/raw/raster_scan.hpp"
 #include "host/raw/scan_folder.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -1,10 +1,10 @@
-// Which reader a scan is for. Called by read_scan.cpp.
+// Which reader a scan is for.
 #pragma once
 
 #include <filesystem>
 
 #include "host/raw/raw_scan.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/scan_options.hpp"
 
 namespace vdvr::io {
 

@@ -1,5 +1,4 @@
-// A stack of line integrals [angle][v][u] in MetaImage or NRRD, its angles in a text file. Called by
-// read_scan.
+// A stack of line integrals [angle][v][u] in MetaImage or NRRD, its angles in a text file.
 #include "host/raw/raster_scan.hpp"
 
 #include <fmt/format.h>
@@ -11,7 +10,7 @@
 
 #include "host/io/number_text.hpp"
 #include "host/io/raster_file.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

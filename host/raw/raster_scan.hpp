@@ -1,4 +1,4 @@
-// MetaImage and NRRD stacks as scans. Called by read_scan.cpp, scan_folder.cpp and scan_members.cpp.
+// MetaImage and NRRD stacks as scans.
 #pragma once
 
 #include <cstdint>

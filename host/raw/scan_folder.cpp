@@ -1,6 +1,5 @@
 // A folder with scan.json: TIFF frames found by pattern, or an HDF5 file, with the geometry beside them
-// (docs/inputs.md). Every name in scan.json is relative to the folder and stays within it. Called by
-// read_scan.
+// (docs/inputs.md). Every name in scan.json is relative to the folder and stays within it.
 #include "host/raw/scan_folder.hpp"
 
 #include <fmt/format.h>

@@ -1,10 +1,10 @@
-// A folder with a scan.json. Called by read_scan.cpp.
+// A folder with a scan.json.
 #pragma once
 
 #include <filesystem>
 
 #include "host/raw/raw_scan.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/scan_options.hpp"
 
 namespace vdvr::io {
 

@@ -1,5 +1,4 @@
 // Members of scan.json that say where the rays of a scan run: angles, and the kinds of cone-beam geometry.
-// Called by scan_folder.cpp.
 #pragma once
 
 #include <array>

@@ -6,21 +6,19 @@
 
 #include "host/fdk/filter_cone.hpp"
 #include "host/rays/crossings.hpp"
-#include "host/rays/emission.hpp"
 #include "host/rays/line_integral.hpp"
 #include "host/system/outward.hpp"
 #include "host/system/parallel.hpp"
-#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/noted_scan.hpp"
 
 namespace vdvr {
 namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
-FloatImage empty(std::int64_t width, std::int64_t height, std::int64_t channels, float value) {
-  return {width, height, std::vector<float>(static_cast<std::size_t>(width * height * channels), value),
-          channels};
+FloatImage empty(std::int64_t width, std::int64_t height, float value) {
+  return {width, height, std::vector<float>(static_cast<std::size_t>(width * height), value)};
 }
 ProjectionSet geometry_of(const Certificate& certificate) {
   auto scan = noted_geometry(certificate);
@@ -51,14 +49,6 @@ double SurfaceBounds::share(std::uint8_t kind) const {
                            static_cast<double>(hit.size());
 }
 
-std::array<double, 3> background_of(const PictureViews& views, std::int64_t y) {
-  const double part = views.height > 1 ? static_cast<double>(y) / static_cast<double>(views.height - 1) : 0;
-  std::array<double, 3> out{};
-  for (std::size_t c = 0; c < 3; ++c)
-    out[c] = (1 - part) * views.background_top[c] + part * views.background_bottom[c];
-  return out;
-}
-
 struct CertifiedRays::Impl {
   Impl(const MixedVolume& volume, const Certificate& certificate, const ProjectionSet& scan, bool image3d,
        const std::optional<std::array<double, 6>>& box)
@@ -83,29 +73,10 @@ CertifiedRays::CertifiedRays(const MixedVolume& volume, const Certificate& certi
     : impl_(std::make_unique<Impl>(volume, certificate, geometry_of(certificate), image3d, box)) {}
 CertifiedRays::~CertifiedRays() = default;
 
-ColourBounds CertifiedRays::colours(const PictureViews& views, std::size_t view,
-                                    const Progress& progress) const {
-  const MediumRanges ranges(views.transfer);
-  ColourBounds out{empty(views.width, views.height, 3, 0), empty(views.width, views.height, 3, 0)};
-  parallel_for(views.height, progress, "certify", [&](std::int64_t y) {
-    const std::array<double, 3> background = background_of(views, y);
-    for (std::int64_t x = 0; x < views.width; ++x) {
-      const ColourInterval w = colour_interval(
-          impl_->field, pixel_ray(views.cameras[view], views.width, views.height, x, y), ranges, background);
-      for (std::size_t c = 0; c < 3; ++c) {
-        const std::size_t i = static_cast<std::size_t>(y * views.width + x) * 3 + c;
-        out.low.values[i] = down(w.low[c]);
-        out.high.values[i] = up(w.high[c]);
-      }
-    }
-  });
-  return out;
-}
-
 SurfaceBounds CertifiedRays::surface(const Camera& camera, std::int64_t width, std::int64_t height,
                                      double value, const Progress& progress) const {
   SurfaceBounds out{std::vector<std::uint8_t>(static_cast<std::size_t>(width * height)),
-                    empty(width, height, 1, nothing), empty(width, height, 1, nothing)};
+                    empty(width, height, nothing), empty(width, height, nothing)};
   parallel_for(height, progress, "certify", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < width; ++x) {
       const Crossing c = first_crossing(impl_->field, pixel_ray(camera, width, height, x, y), value);
@@ -122,7 +93,7 @@ MaximumBounds CertifiedRays::maximum(const Camera& camera, std::int64_t width, s
                                      const Progress& progress) const {
   MaximumBounds out;
   for (FloatImage* image : {&out.low, &out.high, &out.first, &out.last})
-    *image = empty(width, height, 1, nothing);
+    *image = empty(width, height, nothing);
   parallel_for(height, progress, "certify", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < width; ++x) {
       const Maximum m = maximum_along(impl_->field, pixel_ray(camera, width, height, x, y));
@@ -139,7 +110,7 @@ MaximumBounds CertifiedRays::maximum(const Camera& camera, std::int64_t width, s
 
 IntegralBounds CertifiedRays::integral(const Camera& camera, std::int64_t width, std::int64_t height,
                                        const Progress& progress) const {
-  IntegralBounds out{empty(width, height, 1, 0), empty(width, height, 1, 0),
+  IntegralBounds out{empty(width, height, 0), empty(width, height, 0),
                      std::vector<std::uint8_t>(static_cast<std::size_t>(width * height))};
   parallel_for(height, progress, "certify", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < width; ++x) {

@@ -1,5 +1,4 @@
-// Where F can first pass a value on a ray, and where it must have (docs/pixel-bounds.md, "Surfaces"). Called
-// by certified_surfaces.cpp.
+// Where F can first pass a value on a ray, and where it must have (docs/pixel-bounds.md, "Surfaces").
 #pragma once
 
 #include "host/rays/ray_walk.hpp"

@@ -1,13 +1,12 @@
 // The interval that holds an ideal pixel's colour: box steps from the back to the front
 // (docs/pixel-bounds.md, theorem 3), with exact ranges of the transfer function. Double precision on the
-// host. Called by certified_rays.cpp, lit_emission.cpp.
+// host.
 #pragma once
 
 #include <array>
 #include <vector>
 
 #include "host/rays/ray_walk.hpp"
-#include "vdvr/picture_refinement.hpp"
 #include "vdvr/transfer_function.hpp"
 
 namespace vdvr {
@@ -44,8 +43,6 @@ struct EmissionOptions {
   double kappa = 0.5;          ///< parts of a piece are as long as this share of the bound's width
   double hidden = 1.0 / 4096;  ///< transmittance behind which a ray ends
 };
-/// Of a row of a picture.
-std::array<double, 3> background_of(const PictureViews& views, std::int64_t y);
 /// The ideal colour of F along the ray, before `background`.
 ColourInterval colour_interval(const RayField& field, const WorldRay& ray, const MediumRanges& ranges,
                                const std::array<double, 3>& background, const EmissionOptions& options = {});

@@ -1,6 +1,5 @@
 // What light and highlight a gradient that is known to lie in a box can give: the renderer's own formula
-// (kernels/device/shade.h) over intervals, in double precision (docs/pixel-bounds.md, section 7). Called by
-// lit_emission.cpp and ideal_pixel.cpp.
+// (kernels/device/shade.h) over intervals, in double precision (docs/pixel-bounds.md, section 7).
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
 // The integral of V along a ray, and how far that of F can lie from it (docs/surfaces.md, "Line integrals").
-// Called by certified_rays.cpp.
 #pragma once
 
 #include "host/rays/ray_walk.hpp"

@@ -1,6 +1,6 @@
 // The interval that holds an ideal pixel's colour where light is F's own: box steps as emission.cpp takes
 // them, with colours under all light that the differences of F over one base cell can give
-// (docs/pixel-bounds.md, section 7). Double precision on the host. Called by host/pixel/lit_pixels.cpp.
+// (docs/pixel-bounds.md, section 7). Double precision on the host.
 #pragma once
 
 #include "host/rays/emission.hpp"

@@ -1,4 +1,4 @@
-// Views that suit what is in a volume. Called by programs.
+// Views that suit what is in a volume.
 #include "vdvr/automatic_view.hpp"
 
 #include <fmt/format.h>

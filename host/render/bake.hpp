@@ -1,5 +1,4 @@
 // The transfer function as tables that kernels read, and what those tables leave out of a picture.
-// Called by: raycast.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Cameras, and the one check of them. Called by check_render_options.cpp and the render, run and bench
-// commands.
+// Cameras, and the one check of them.
 #include <algorithm>
 #include <cmath>
 

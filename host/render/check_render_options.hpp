@@ -1,4 +1,4 @@
-// Refuses render options that are out of range or exclude each other. Called by raycast.cpp.
+// Refuses render options that are out of range or exclude each other.
 #pragma once
 
 #include "vdvr/raycast.hpp"

@@ -1,6 +1,6 @@
 // Interpolation of colours in the spaces that transfer functions of other programs name: HSV, CIE L*a*b*, and
 // Moreland's diverging maps in Msh (polar L*a*b*). Colours are sRGB display values in [0, 1], white point
-// D65. Called by transfer_curve.cpp.
+// D65.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
 // D2VR: holds the filtered projections on the device, finds where they leave space empty, launches the
-// ray-caster over them. Called by the render, probe and bench commands. Launches: raycast_dvr, d2vr_points of
-// kernels/render/d2vr.cl.
+// ray-caster over them. Launches: raycast_dvr, d2vr_points of kernels/render/d2vr.cl.
 #include "host/render/d2vr.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
-// Frames of a D2vrScene, and what the classes hold on the device. Called by: renderer.cpp,
-// tests/device/d2vr_test.cpp.
+// Frames of a D2vrScene, and what the classes hold on the device.
 #pragma once
 
 #include <utility>

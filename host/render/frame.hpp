@@ -1,6 +1,5 @@
 // What a renderer keeps on the device from one picture to the next, so that a turntable allocates and
-// computes nothing twice: picture, transfer function, which bricks can be leapt over, bounds. Called by:
-// raycast.cpp, d2vr.cpp, renderer.cpp.
+// computes nothing twice: picture, transfer function, which bricks can be leapt over, bounds.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// Launches the ray-caster over resident volumes: chooses sampler, gradients and packets. Called by
-// renderer.cpp. Launches: raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive,
-// raycast_iso, raycast_mip, raycast_integral, slice of kernels/render/raycast.cl.
+// Launches the ray-caster over resident volumes: chooses sampler, gradients and packets. Launches:
+// raycast_dvr, raycast_preintegrated, raycast_level, raycast_adaptive, raycast_iso, raycast_mip,
+// raycast_integral, slice of kernels/render/raycast.cl.
 #include "host/render/raycast.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // Launches frames of resident volumes, and the float picture behind Renderer::render(), which converts it to
-// 8 bits; tests and benches use it. Called by: renderer.cpp, d2vr.cpp, tests/device/raycast_test.cpp.
+// 8 bits; tests and benches use it.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // What one frame's kernels are told besides the field (kernels/shared/raycast_params.h), from options that
-// check_options() has passed. Called by: raycast.cpp, d2vr.cpp.
+// check_options() has passed.
 #pragma once
 
 #include "host/render/frame.hpp"

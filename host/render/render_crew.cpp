@@ -1,5 +1,5 @@
 // Several devices, or one whose volume comes by bricks: bands of rows go to whoever is free. Calls
-// enqueue_frame() of raycast.cpp and paged_frame.cpp. Called by the render and bench commands.
+// enqueue_frame() of raycast.cpp and paged_frame.cpp.
 #include "vdvr/render_crew.hpp"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // Renderers and the one-shot forms: draws by raycast.cpp or d2vr.cpp, converts pixels to values and 8 bits.
-// Called by the render, run and bench commands.
 #include <algorithm>
 #include <cmath>
 #include <limits>

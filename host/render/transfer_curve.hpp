@@ -1,5 +1,5 @@
 // Piecewise curves with midpoint and sharpness, as VTK's programs (ParaView, 3D Slicer) store them, turned
-// into the straight pieces that our transfer functions have. Called by transfer_file.cpp.
+// into the straight pieces that our transfer functions have.
 #pragma once
 
 #include <vector>

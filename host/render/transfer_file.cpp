@@ -1,5 +1,5 @@
 // Transfer functions from files: our own JSON, 3D Slicer's volume properties (.vp.json) and ParaView's colour
-// presets, told apart by what they hold (docs/rendering.md). Called by the render and bench commands.
+// presets, told apart by what they hold (docs/rendering.md).
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Transfer functions: presets, stretching, opacity per cell. Files: transfer_file.cpp. Called by the render,
-// run and bench commands.
+// Transfer functions: presets, stretching, opacity per cell. Files: transfer_file.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the certificate allows along a chord: the integral of its bounds by brick. Called by residual.cpp.
+// What the certificate allows along a chord: the integral of its bounds by brick.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // The part of every measured ray of a row that lies in the covered region: a single interval, since the
-// region is convex. Called by residual.cpp.
+// region is convex.
 #pragma once
 
 #include <cstdint>

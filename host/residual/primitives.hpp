@@ -1,5 +1,5 @@
 // Antiderivatives of a view's filtered rows: quintic Hermite pieces through the cosine series and its
-// derivatives at nodes, and bounds on what such a piece errs (docs/residual.md). Called by row_integrals.cpp.
+// derivatives at nodes, and bounds on what such a piece errs (docs/residual.md).
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Integrals of F along all measured rays of one detector row, with proved errors. Called by residual.cpp.
+// Integrals of F along all measured rays of one detector row, with proved errors.
 #pragma once
 
 #include <cstdint>

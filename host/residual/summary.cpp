@@ -1,4 +1,4 @@
-// Residuals in a few numbers: shares, the worst ray, view and column. Called by the command residual.
+// Residuals in a few numbers: shares, the worst ray, view and column.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// Residuals as files. Called by the command residual.
+// Residuals as files.
 #include <fmt/format.h>
 
 #include <bit>

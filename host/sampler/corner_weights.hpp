@@ -1,5 +1,5 @@
 // What weights of a cell's corners that are not the trilinear ones do to a value, for any samples
-// (docs/error-bounds.md, section on samplers). Called by probe_sampler.cpp.
+// (docs/error-bounds.md, section on samplers).
 #pragma once
 
 #include <array>

@@ -29,7 +29,7 @@ DeviceField::DeviceField(opencl::State& state, const MixedVolume& v, const Packe
       defines(field_defines(v, records.kind())),
       highest_place(vdvr::highest_place(v)) {
   ScratchPass pass;
-  pass.add(v);
+  pass.add_all(v);
   const auto put = [&](const SampleBlock& block, std::uint64_t first) {
     const auto* from = static_cast<const std::uint8_t*>(block.data());
     for (std::uint64_t at = 0; at < block.bytes(); at += ScratchPass::at_once) {

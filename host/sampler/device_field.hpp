@@ -1,6 +1,5 @@
 // A stored field on the device: sample buffer, brick records, and what kernels must be compiled for to read
-// them. Called by build.cpp, verify_field.cpp, verify_terms.cpp and resident_volume.cpp; read by
-// mixed_sampler.h.
+// them. Read by mixed_sampler.h.
 #pragma once
 
 #include <functional>

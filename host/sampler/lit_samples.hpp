@@ -1,6 +1,6 @@
 // Lit samples: the stored field on the device as float32, and behind all samples their gradients, 4 bytes
 // each, in the layout of tiles (kernels/sampler/lit_samples.cl). Made on the device from the field as it
-// is stored. Called by resident_volume.cpp; read by packet_sampler.h with VDVR_LIT.
+// is stored. Read by packet_sampler.h with VDVR_LIT.
 #pragma once
 
 #include <span>

@@ -187,7 +187,7 @@ VolumePart PagedVolume::Impl::part_of(std::vector<std::uint8_t> here) const {
   const auto offsets = tile_offsets(p);
   part.fill = [this, tiles = std::move(tiles), offsets](std::span<std::uint8_t> to) {
     ScratchPass pass;
-    pass.add(*volume);
+    pass.add_all(*volume);
     std::memcpy(to.data(), volume->base.data(), volume->base.bytes());
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
       const Kind& kind = kinds_[k];

@@ -1,5 +1,4 @@
 // What a PagedVolume knows of its bricks, and how the tiles of some of them become a volume on the device.
-// Called by picture_parts.cpp, paged_frame.cpp, pixel_bounds.cpp.
 #pragma once
 
 #include <cstdint>

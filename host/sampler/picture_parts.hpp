@@ -1,5 +1,4 @@
-// A picture of a volume that comes by bricks, in parts whose bricks fit the device. Called by paged_frame.cpp
-// and pixel_bounds.cpp.
+// A picture of a volume that comes by bricks, in parts whose bricks fit the device.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // What the device's texture unit does to weights and constants, and which sampler is faster (method:
-// docs/error-bounds.md, samplers). Called by `devices --probe`, the certificate's sampler term, which needs
-// no rates, and raycast() for --sampler auto. Launches: read_points, rate_image, rate_buffer of
+// docs/error-bounds.md, samplers). Launches: read_points, rate_image, rate_buffer of
 // kernels/sampler/probe_sampler.cl.
 #include <fmt/format.h>
 

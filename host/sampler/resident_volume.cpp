@@ -1,4 +1,4 @@
-// Uploads a mixed volume once for many frames; packs and builds the image atlas. Called by the renderer.
+// Uploads a mixed volume once for many frames; packs and builds the image atlas.
 #include "host/sampler/resident_volume.hpp"
 
 #include <fmt/format.h>
@@ -266,7 +266,7 @@ FieldFacts facts_of(const MixedVolume& v) {
     for (std::size_t a = 0; a < 3; ++a)
       f.highest_level = std::max(f.highest_level, triple.level[a] - v.coarsening[a]);
   ScratchPass pass;
-  pass.add(v);
+  pass.add_all(v);
   for (std::size_t i = 0; i < v.level.size(); ++i) {
     f.has_tile.push_back(v.level[i] == LevelTriple{0, 0, 0} ? 0 : 1);
     const BrickSamples stored(v, position_of(v, i));

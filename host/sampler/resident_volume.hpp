@@ -4,8 +4,7 @@
 // base volume lies at (0, 0, 0) of its type's. The tiles of a triple stand on one another along z in columns
 // of sx x sy texels; because a triple's tiles are contiguous in the sample buffer, one buffer-to-image copy
 // fills a column. Columns of one triple fill shelves along x; shelves follow one another along y, below the
-// base. So tiles of any size fit any device's limits on each axis. Called by: raycast.cpp, d2vr.cpp,
-// sampler_terms.cpp.
+// base. So tiles of any size fit any device's limits on each axis.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,3 @@
-// Called by programs, live_renderer.cpp and the Python module: whoever draws a certified volume.
 #include "vdvr/safe_sampler.hpp"
 
 #include <fmt/format.h>

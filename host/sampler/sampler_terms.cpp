@@ -70,7 +70,7 @@ FieldSlopes field_slopes(const MixedVolume& v) {
   out.integers = sample_types(v) != 1 << VDVR_F32;
   std::mutex lock;
   ScratchPass pass;
-  pass.add(v);
+  pass.add_all(v);
   parallel_for(bricks[2] * bricks[1], {}, "slopes", [&](std::int64_t row) {
     std::array<double, 3> per_cell{0, 0, 0};
     BrickSteps steps;

@@ -1,5 +1,4 @@
 // What the two samplers can add to the error of a stored field (docs/error-bounds.md, section on samplers).
-// Called by build.cpp and verify.cpp.
 #pragma once
 
 #include <array>

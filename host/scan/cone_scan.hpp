@@ -1,5 +1,4 @@
-// The geometry of a cone-beam scan as it is read: where its axis lies, which rays it measures twice. Called
-// by read_scan.cpp.
+// The geometry of a cone-beam scan as it is read: where its axis lies, which rays it measures twice.
 #pragma once
 
 #include <filesystem>

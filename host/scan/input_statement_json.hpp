@@ -1,5 +1,4 @@
-// An InputStatement as it stands in the certificate's `options` (docs/file-format.md). Called by
-// certify.cpp.
+// An InputStatement as it stands in the certificate's `options` (docs/file-format.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -1,4 +1,4 @@
-// Whether the sample stood still. Called by read_scan.cpp, once views are chosen and lengths known.
+// Whether the sample stood still. Called once views are chosen and lengths known.
 #pragma once
 
 #include <string>

@@ -1,5 +1,4 @@
-// What repeated flats and darks say of a pixel's noise (photon transfer: Janesick, SPIE Press 2007). Called
-// by read_scan.cpp.
+// What repeated flats and darks say of a pixel's noise (photon transfer: Janesick, SPIE Press 2007).
 #pragma once
 
 #include <cstdint>

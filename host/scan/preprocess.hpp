@@ -1,5 +1,5 @@
 // From counts to line integrals: p = -log((raw - dark) / (flat - dark)), dead pixels replaced, air background
-// taken off. Everything in double; the caller rounds to float once. Called by host/scan/read_scan.cpp.
+// taken off. Everything in double; the caller rounds to float once.
 #pragma once
 
 #include <cstdint>

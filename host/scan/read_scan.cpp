@@ -1,6 +1,5 @@
 // A scan from whatever file holds it: told apart by content, read block by block, pre-processed in double,
-// rounded to float once; then the centre. Layout float data[view][v][u]. Called by every command that takes a
-// scan; calls host/io readers, host/scan/preprocess.cpp and host/center/find_center.cpp.
+// rounded to float once; then the centre. Layout float data[view][v][u].
 #include "vdvr/read_scan.hpp"
 
 #include <fmt/format.h>
@@ -27,17 +26,9 @@
 #include "vdvr/find_center.hpp"
 #include "vdvr/hash.hpp"
 #include "vdvr/output_file.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr {
-
-const char* text_of(Beam beam) { return beam == Beam::cone ? "cone" : "parallel"; }
-
-std::optional<Beam> beam_of(const std::string& text) {
-  for (const Beam beam : {Beam::parallel, Beam::cone})
-    if (text == text_of(beam)) return beam;
-  return {};
-}
-
 namespace {
 
 namespace fs = std::filesystem;

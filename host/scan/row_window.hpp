@@ -1,5 +1,4 @@
-// Some rows of a scan, taken for a scan of their own: what a plan of a large scan judges from. Called by
-// plan.cpp.
+// Some rows of a scan, taken for a scan of their own: what a plan of a large scan judges from.
 #pragma once
 
 #include <optional>

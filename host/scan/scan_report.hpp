@@ -1,5 +1,4 @@
-// What reading a scan reports: what was understood, what is doubtful, what cannot be used. Called by
-// read_scan.cpp.
+// What reading a scan reports: what was understood, what is doubtful, what cannot be used.
 #pragma once
 
 #include <string>

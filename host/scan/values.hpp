@@ -1,4 +1,4 @@
-// What the frames of a scan hold, and what turns counts into line integrals. Called by read_scan.cpp.
+// What the frames of a scan hold, and what turns counts into line integrals.
 #pragma once
 
 #include <cmath>

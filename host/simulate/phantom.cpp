@@ -4,7 +4,6 @@
 // With A^2 = a^2 cos^2 + b^2 sin^2, w^2 = 1 - ((v - z0)/c)^2 and t the ray's distance from the centre's
 // projection, the chord is 2 a b sqrt(A^2 w^2 - t^2) / A^2 (Kak and Slaney, Principles of Computerized
 // Tomographic Imaging, section 3.1; each slice of an ellipsoid is an ellipse with semi-axes a w and b w).
-// Called by the simulate command and by tests.
 #include <fmt/format.h>
 
 #include <algorithm>

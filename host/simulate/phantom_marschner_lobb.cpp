@@ -5,7 +5,6 @@
 // and not on the row: its integral is computed once per (theta, u). B(r) is even and entire in r, hence
 // entire along the ray, and Gauss-Legendre converges at once: on a panel of half length h the phase 2 pi f_M
 // cos(pi r/2) turns by at most 6 pi^2 h = 14.8 (h = 1/4), and 24 nodes leave about (14.8/2)^48 / 48! < 1e-19.
-// Called by the simulate command.
 #include <fmt/format.h>
 
 #include <array>

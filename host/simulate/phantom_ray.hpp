@@ -1,5 +1,4 @@
-// The part of a ray inside a box, for the phantoms that are cut by one. Called by phantom_marschner_lobb and
-// phantom_volume.
+// The part of a ray inside a box, for the phantoms that are cut by one.
 #pragma once
 
 #include <algorithm>

@@ -4,8 +4,7 @@
 // interpolation of the integrals through the slices' bilinear interpolants. Along a ray inside one cell a
 // corner's weight, such as (1 - fx)(1 - fy), is quadratic in s; over a segment of length L about its midpoint
 // it integrates to L (1 - fx)(1 - fy) + dx dy L^3 / 12, exactly. The weights are the same for every slice, so
-// one walk serves all rows. Samples are kept as float sample[y][x][z], z fastest, for that. Called by the
-// simulate command.
+// one walk serves all rows. Samples are kept as float sample[y][x][z], z fastest, for that.
 #include <fmt/format.h>
 
 #include <algorithm>

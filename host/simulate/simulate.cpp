@@ -1,7 +1,6 @@
 // Projections of a phantom: line integrals at pixel centres, or 16 per pixel low-passed at Nyquist
 // (simulate_band_limit), then the detector's recipe (simulate_detector): noise, median, Gaussian, binning.
-// Views are independent and spread over threads. float data[view][v][u]. Called by the simulate command,
-// benchmarks and tests.
+// Views are independent and spread over threads. float data[view][v][u].
 #include "vdvr/simulate.hpp"
 
 #include <fmt/format.h>

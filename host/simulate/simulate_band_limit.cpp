@@ -1,4 +1,4 @@
-// The ideal low-pass by transforms. Equations in the header; called by simulate.cpp.
+// The ideal low-pass by transforms. Equations in the header.
 #include "host/simulate/simulate_band_limit.hpp"
 
 #include <bit>

@@ -1,5 +1,5 @@
 // The ideal low-pass of `simulate --band-limited`: rows sampled 16 times per pixel become rows of pixels that
-// hold nothing above the detector's Nyquist frequency. Called by simulate.cpp.
+// hold nothing above the detector's Nyquist frequency.
 //
 // Fine sample n = 16 i + f of pixel i lies at i - 1/2 + (f + 1/2)/16, n = 0 .. N-1, N = 16 U: symmetric
 // within each pixel, covering the detector from edge to edge. With the half-sample mirror extension about

@@ -1,4 +1,4 @@
-// Rays of a cone-beam scan through a phantom. Called by simulate.cpp.
+// Rays of a cone-beam scan through a phantom.
 #pragma once
 
 #include <vector>

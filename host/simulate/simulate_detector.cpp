@@ -1,4 +1,4 @@
-// The detector's noise. Called by simulate.cpp.
+// The detector's noise.
 #include "host/simulate/simulate_detector.hpp"
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // The noise of a detector (the paper's section 5 recipe); its median, blur and binning are
-// host/prepare/view_filters. Called by simulate.cpp.
+// host/prepare/view_filters.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Values as bytes of this machine, for journal records. Called by gold_stream.cpp and build.cpp.
+// Values as bytes of this machine, for journal records.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // Small files that spare the next process some work, in $XDG_CACHE_HOME/vdvr or ~/.cache/vdvr. Whatever fails
-// is as if there were no cache: whoever reads one checks what it holds. Called by trust.cpp and
-// binary_cache.cpp of host/opencl.
+// is as if there were no cache: whoever reads one checks what it holds.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Large results on large pages: a fresh gigabyte of 4 KiB pages costs a quarter of a million faults, which on
-// two cores is a tenth of a reconstruction. Called by reconstruct.cpp and filter_projections.cpp.
+// two cores is a tenth of a reconstruction.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // Journal files: 8 bytes of magic, then records {uint32 crc, uint64 length, payload}, the first of which is
 // the head as JSON. Each crc continues the one before, so a record counts only behind those it was written
-// behind. Called by build.cpp and the commands build and run.
+// behind.
 #include "vdvr/journal.hpp"
 
 #include <fcntl.h>

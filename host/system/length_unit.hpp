@@ -1,4 +1,4 @@
-// Units of length by the names that files give them. Called by readers that compare lengths of two datasets.
+// Units of length by the names that files give them.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // Sizes that come from a file's header: multiplied in 64 bits, compared with memory before anything is
-// allocated. Called by every reader of host/io and by host/scan/read_scan.cpp.
+// allocated.
 #pragma once
 
 #include <cstdint>

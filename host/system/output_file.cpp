@@ -1,4 +1,4 @@
-// Whole-or-nothing output files. Called by every writer.
+// Whole-or-nothing output files.
 #include "vdvr/output_file.hpp"
 
 #include <fcntl.h>

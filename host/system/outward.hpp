@@ -1,5 +1,4 @@
-// Double precision to float, rounded outward: ends of intervals. Called by certified_rays.cpp, residual.cpp,
-// range_table.cpp, certify_slice.cpp, lit_pixels.cpp.
+// Double precision to float, rounded outward: ends of intervals.
 #pragma once
 
 #include <cmath>

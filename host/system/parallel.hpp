@@ -1,5 +1,5 @@
 // A loop over host threads whose progress and exceptions reach the caller, and which ends when a stop is
-// requested. Called by every stage that works on the host.
+// requested.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Reading damaged HDF5 at arm's length. Metadata without checksums (every file of HDF5's default layout) can
 // make the library itself crash, loop or ask for gigabytes; no check of ours comes before its own parsing. So
-// a child process reads first, and takes the fall. Called by read_scan, volume_stack and vdvr_file.
+// a child process reads first, and takes the fall.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Bounds that pass from double precision to fp32. Called by brick_remainder.cpp and node_slack.cpp.
+// Bounds that pass from double precision to fp32.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Scratch files: unlinked as soon as they are open, mapped shared, their pages let go when too many are
-// resident. See scratch.hpp; called by sample_array.cpp.
+// resident. See scratch.hpp.
 #include "vdvr/scratch.hpp"
 
 #include <fcntl.h>

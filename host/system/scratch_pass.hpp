@@ -1,6 +1,6 @@
 // A pass over arrays in scratch that reads or writes faster than the keeper of scratch looks
 // (vdvr/scratch.hpp): it lets go of them by itself, so that what is resident does not depend on who gets a
-// core. Called by close_boundaries.cpp, sampler_terms.cpp, device_field.cpp and content_hash.cpp.
+// core.
 #pragma once
 
 #include <sys/mman.h>
@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/sample_array.hpp"
 
 namespace vdvr {
 
@@ -26,8 +26,10 @@ class ScratchPass {
     // Mapped from a page's first byte on.
     if (samples.scratch()) arrays_.emplace_back(samples.data(), sizeof(T) * samples.size());
   }
-  void add(const MixedVolume& volume) {
-    for_each_array(volume, [&](const auto& samples) { add(samples); });
+  /// All that for_each_array() finds in it.
+  template <class Arrays>
+  void add_all(const Arrays& arrays) {
+    for_each_array(arrays, [&](const auto& samples) { add(samples); });
   }
 
   void touched(std::uint64_t bytes) {

@@ -11,16 +11,16 @@
 #include <random>
 #include <utility>
 
+#include "host/claims/verify_scope.hpp"
+#include "host/claims/verify_terms.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
+#include "host/verify/seams.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/verify/verify_scope.hpp"
-#include "host/volume/seams.hpp"
-#include "host/verify/verify_terms.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/trust.hpp"

@@ -1,5 +1,5 @@
 // Points inside cells where |V - F| is evaluated, because verify's bound there is above the certificate's
-// (docs/error-bounds.md, "What verify compares"). Called by verify.cpp.
+// (docs/error-bounds.md, "What verify compares").
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // The bound on |V - F| as `verify` computes it, gold cell by gold cell, at every rate that is asked for
-// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Called by
-// verify.cpp. Calls verify_parts.cpp and verify_pieces.cpp; F is verify_nodes', of either beam.
+// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Calls
+// verify_parts.cpp and verify_pieces.cpp; F is verify_nodes', of either beam.
 #pragma once
 
 #include <array>

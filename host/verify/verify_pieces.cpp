@@ -1,5 +1,5 @@
-// Pieces of bricks on the device: which cells of gold are tested, and their bounds. Called by
-// verify_field.cpp. Launches kernels/verify/verify_pieces.cl.
+// Pieces of bricks on the device: which cells of gold are tested, and their bounds. Launches
+// kernels/verify/verify_pieces.cl.
 #include <algorithm>
 #include <bit>
 #include <cmath>

@@ -1,6 +1,5 @@
 // Nodes drawn by chance at which verify's F is held to F in double precision: it would tell of a wrong
 // weight, halo or mirror that build and verify had in common (docs/error-bounds.md, "What verify does").
-// Called by verify.cpp.
 #pragma once
 
 #include <cstdint>

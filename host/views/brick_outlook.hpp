@@ -1,5 +1,5 @@
 // What bricks are foreseen to err at each level, and to store, from base samples alone. Nothing of a
-// certificate rests on it. Called by foresee_pictures.cpp.
+// certificate rests on it.
 #pragma once
 
 #include <array>

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "host/bounds/result_units.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/fdk/filter_cone.hpp"
 #include "host/opencl/host_memory.hpp"
 #include "host/sampler/sampler_terms.hpp"
+#include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
 #include "host/views/brick_outlook.hpp"
 #include "host/views/picture_rounds.hpp"

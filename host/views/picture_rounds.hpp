@@ -1,5 +1,5 @@
 // One round of refinement for pictures: bounds of all pixels, bricks' shares in those that are above, smaller
-// bounds for these bricks. Called by picture_refinement.cpp and foresee_pictures.cpp.
+// bounds for these bricks.
 #pragma once
 
 #include <cstdint>

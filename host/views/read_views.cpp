@@ -1,4 +1,4 @@
-// Views as JSON, and what of them depends on the volume. Called by the commands build, run and plan.
+// Views as JSON, and what of them depends on the volume.
 #include <fmt/format.h>
 
 #include <cmath>

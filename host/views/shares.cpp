@@ -112,6 +112,14 @@ PixelShares added(const std::vector<Sample>& samples, const Media& media, Colour
 
 }  // namespace
 
+std::array<double, 3> background_of(const PictureViews& views, std::int64_t y) {
+  const double part = views.height > 1 ? static_cast<double>(y) / static_cast<double>(views.height - 1) : 0;
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c)
+    out[c] = (1 - part) * views.background_top[c] + part * views.background_bottom[c];
+  return out;
+}
+
 std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews& views, std::size_t view,
                                       int parts, const Progress& progress) {
   const Media media(views.transfer);

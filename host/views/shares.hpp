@@ -1,5 +1,5 @@
 // What bricks add to the uncertainty of pixels, to first order in the bounds (docs/pixel-bounds.md): where to
-// refine. It is no bound. Called by picture_refinement.cpp.
+// refine. It is no bound.
 #pragma once
 
 #include <array>
@@ -18,6 +18,9 @@ struct PixelShares {
   std::array<double, 3> colour{};  ///< of V, on fine samples
   std::vector<std::pair<std::uint32_t, float>> bricks;
 };
+
+/// Of a row of a picture.
+std::array<double, 3> background_of(const PictureViews& views, std::int64_t y);
 
 /// [y][x]. Cost: `parts` values of V a cell of each ray, and some 20 of the transfer function each.
 std::vector<PixelShares> pixel_shares(const RayField& field, const PictureViews& views, std::size_t view,

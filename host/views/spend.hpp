@@ -1,5 +1,4 @@
-// How small each brick's bound must be so that pixels hold theirs with few samples. Called by
-// picture_refinement.cpp.
+// How small each brick's bound must be so that pixels hold theirs with few samples.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,5 @@
 // Where each brick's samples lie: on the host in its own arrays, on the device in one sample buffer. That has
 // the base first, then the tiles of each triple and type in map order, each block at a multiple of 4 bytes.
-// Called by mixed_volume.cpp, device_field.cpp, resident_volume.cpp and whatever reads stored samples on the
-// host.
 #pragma once
 
 #include <map>

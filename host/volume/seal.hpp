@@ -1,5 +1,5 @@
 // The seal of a .vdvr file: one hash over its certificate, the totals by brick and every attribute
-// (docs/file-format.md). Called by vdvr_file.cpp and write_vdvr.cpp.
+// (docs/file-format.md).
 #pragma once
 
 #include <span>

@@ -1,5 +1,4 @@
-// Reads the .vdvr file (docs/file-format.md), only after everything in it has been checked. Called by verify,
-// render, probe, export, info.
+// Reads the .vdvr file (docs/file-format.md), only after everything in it has been checked.
 #include "host/volume/vdvr_file.hpp"
 
 #include <fmt/format.h>
@@ -22,7 +21,6 @@
 #include "host/volume/volume_problem.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
-#include "vdvr/read_large.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,4 @@
-// A .vdvr file opened to be read in parts: everything but samples is there. Called by
-// host/export/lazy_volume.cpp.
+// A .vdvr file opened to be read in parts: everything but samples is there.
 #pragma once
 
 #include <filesystem>

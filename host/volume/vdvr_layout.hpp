@@ -1,6 +1,5 @@
 // Names, shapes and versions of the .vdvr file (docs/file-format.md). Datasets are [z][y][x] and triples
-// "ZYX", as MixedVolume holds them; grid attributes are turned from x,y,z to z,y,x. Called by read_vdvr,
-// write_vdvr and content_hash.
+// "ZYX", as MixedVolume holds them; grid attributes are turned from x,y,z to z,y,x.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// Checks of volumes, in the order in which later ones may rely on earlier ones. Called by vdvr_file.cpp and
-// write_vdvr.cpp.
+// Checks of volumes, in the order in which later ones may rely on earlier ones.
 #include "host/volume/volume_problem.hpp"
 
 #include <fmt/format.h>

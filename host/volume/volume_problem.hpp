@@ -1,6 +1,5 @@
 // What a volume in a .vdvr file must satisfy (docs/file-format.md): one set of checks for the reader, who
-// makes a FileError of a problem, and for the writer, who makes an InputError. Called by vdvr_file.cpp and
-// write_vdvr.cpp.
+// makes a FileError of a problem, and for the writer, who makes an InputError.
 #pragma once
 
 #include <cstdint>

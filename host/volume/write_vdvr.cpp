@@ -1,4 +1,4 @@
-// Writes the .vdvr file (docs/file-format.md), whole or not at all. Called by build.
+// Writes the .vdvr file (docs/file-format.md), whole or not at all.
 #include <fmt/format.h>
 
 #include <span>

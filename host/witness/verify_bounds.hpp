@@ -1,6 +1,5 @@
 // The bound on |V - F| as `verify` has it, but for what gold tells cell by cell: sups of the filtered
-// projections and the constants that follow from them (docs/error-bounds.md, "What verify does"). Called by
-// verify_field.cpp and verify_cone_bounds.cpp.
+// projections and the constants that follow from them (docs/error-bounds.md, "What verify does").
 #pragma once
 
 #include <array>

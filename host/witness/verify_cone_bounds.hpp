@@ -1,6 +1,6 @@
 // The constants of verify_bounds.hpp for cone beam, on a box: derivatives of lambda^-2 q(u, v) from the sups
 // of q on the detector, and what computed nodes err (docs/error-bounds.md, "What verify does", "Cone beam").
-// Shares nothing with build but the views' matrices. Called by verify_field.cpp.
+// Shares nothing with build but the views' matrices.
 #pragma once
 
 #include <span>

@@ -1,6 +1,6 @@
 // Nodes of cone beam for `verify`: back-projected where they lie, by eight points of Lagrange both ways from
 // tables of its own (docs/error-bounds.md, "What verify does", "Cone beam"). Shares nothing with build but
-// the views' matrices. Called by verify_nodes.cpp. Launches kernels/witness/verify_cone.cl.
+// the views' matrices. Launches kernels/witness/verify_cone.cl.
 #pragma once
 
 #include <array>

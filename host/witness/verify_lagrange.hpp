@@ -1,6 +1,6 @@
 // Interpolation by Lagrange's polynomials through twelve nodes, as `verify` makes fine gold of coarser nodes,
 // and what differences of its results do with errors of the nodes (docs/error-bounds.md, "What verify does",
-// step 1). Nothing of build uses it. Called by verify_nodes.cpp and verify_bounds.cpp.
+// step 1). Nothing of build uses it.
 #pragma once
 
 #include <cstdint>

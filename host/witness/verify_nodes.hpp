@@ -1,7 +1,6 @@
 // F~ for `verify`: back-projected at nodes a quarter of a pixel apart across z and at the detector's rows (or
 // at heights, where these are fewer), and interpolated to gold from there (docs/error-bounds.md, "What verify
-// does", step 1). Shares nothing with build. Called by verify_field.cpp. Launches
-// kernels/witness/verify_nodes.cl.
+// does", step 1). Shares nothing with build. Launches kernels/witness/verify_nodes.cl.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
 // A certified volume at points and on lattices of points: what V is there, and what its certificate promises.
-// Called by `vdvr probe` and by the Python module.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
-// Pictures of the ideal field F, as far as a certificate tells them: intervals of colours, of the depth of a
-// surface, of a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the
-// host, ray by ray.
+// Pictures of the ideal field F, as far as a certificate tells them: intervals of the depth of a surface, of
+// a maximum, of a line integral (docs/pixel-bounds.md, docs/surfaces.md). Double precision on the host, ray
+// by ray.
 #pragma once
 
 #include <array>
@@ -14,16 +14,10 @@
 #include "vdvr/export.hpp"
 #include "vdvr/image.hpp"
 #include "vdvr/mixed_volume.hpp"
-#include "vdvr/picture_refinement.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
 
 namespace vdvr {
-
-/// Three channels, display values: F's unlit picture of mode dvr lies between, in every pixel.
-struct ColourBounds {
-  FloatImage low, high;
-};
 
 /// Of an iso-surface, [y][x].
 struct SurfaceBounds {
@@ -67,8 +61,6 @@ class VDVR_API CertifiedRays {
   CertifiedRays& operator=(const CertifiedRays&) = delete;
 
   /// Cost: some ten to a hundred cells and parts a ray, 0.1 us each.
-  [[nodiscard]] ColourBounds colours(const PictureViews& views, std::size_t view,
-                                     const Progress& progress = {}) const;
   [[nodiscard]] SurfaceBounds surface(const Camera& camera, std::int64_t width, std::int64_t height,
                                       double value, const Progress& progress = {}) const;
   [[nodiscard]] MaximumBounds maximum(const Camera& camera, std::int64_t width, std::int64_t height,

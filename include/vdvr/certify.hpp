@@ -2,12 +2,11 @@
 // input and writing its output.
 #pragma once
 
-#include <optional>
-
 #include "vdvr/build.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
 #include "vdvr/input_statement.hpp"
+#include "vdvr/noted_scan.hpp"
 #include "vdvr/plan.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -50,15 +49,6 @@ VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const To
 /// back.
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan,
                              const CertifyOptions& options = {}, const Progress& progress = {});
-
-/// The scan without its projections, as certify() noted it in the certificate, with which CertifiedRegion
-/// tells the points that the certificate speaks of; none where another program wrote the file without. Throws
-/// FileError where it is ill-formed.
-VDVR_API std::optional<ProjectionSet> noted_geometry(const Certificate& certificate);
-
-/// What was stated of the input, as certify() noted it; whoever reads the scan again states the same. Throws
-/// FileError where it is ill-formed.
-VDVR_API InputStatement noted_input(const Certificate& certificate);
 
 /// The centre that defines F: the field's, else the scan's.
 inline double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {

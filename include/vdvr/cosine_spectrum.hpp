@@ -1,5 +1,5 @@
 // The cosine coefficients of an image or volume under half-sample mirror extension: the spectrum that bounds
-// by amplitude are sums over. Called by plan_pictures.cpp and vdvr-paper.
+// by amplitude are sums over.
 #pragma once
 
 #include <cstdint>

@@ -13,17 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/common_memory.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/export.hpp"
 
 namespace vdvr {
-
-/// Memory that others have too, zeros at first, and what keeps it; empty: none is to be had.
-struct CommonMemory {
-  std::span<std::byte> bytes{};
-  std::shared_ptr<void> owner{};
-  int sharers = 1;  ///< who may have it, this one included
-};
 
 /// Carries messages between the process that leads a build, number 0, and others, which serve(). A program
 /// has one; the library knows no MPI. Called by one thread.

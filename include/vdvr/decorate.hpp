@@ -1,5 +1,5 @@
 // What can be drawn over a picture: the grid's box, axes, a colour bar, a caption. Drawn on the host with the
-// picture's own camera. Called by the render command.
+// picture's own camera.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,6 @@
 // The worst error of multilinear interpolation of one plane wave cos(k . x + phase), over all phases and
 // positions, as a function of kappa_j = k_j d_j (docs/error-bounds.md, section 3; Figs. 4 and 5 of the
-// paper). It depends on k d alone: the map at rate 8 is the central eighth of the map at rate 1. Called by
-// plan_pictures.cpp.
+// paper). It depends on k d alone: the map at rate 8 is the central eighth of the map at rate 1.
 #pragma once
 
 #include <array>

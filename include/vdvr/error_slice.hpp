@@ -1,6 +1,5 @@
 // Pictures of what bricks are worth: the bound of |V - F|, sigma of the scan's own noise, or the one in units
 // of the other; and of |V - F| itself on one slice, measured pixel by pixel against F reconstructed there.
-// Called by the commands run and render.
 #pragma once
 
 #include <array>

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,4 @@
-// Cameras that frame what a picture shows of a volume, not its grid. Called by automatic_view.cpp and the
-// render and run commands.
+// Cameras that frame what a picture shows of a volume, not its grid.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// Pictures: 8-bit RGB with its PNG form, floats with their NumPy form, and moving ones as APNG and GIF.
+// Pictures: 8-bit RGB with its PNG form, and floats with their NumPy form.
 #pragma once
 
 #include <cstdint>
@@ -31,10 +31,5 @@ VDVR_API std::string png_bytes(const Image& image);
 /// NumPy's format 1.0: float32, little-endian, shape (height, width) or, of several channels,
 /// (height, width, channels), C order.
 VDVR_API void write_npy(const std::filesystem::path& path, const FloatImage& image);
-/// Frames of one size, shown `frame_ms` each, for ever. APNG is lossless; a viewer without it shows frame 0.
-VDVR_API void write_apng(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
-/// One palette of 255 colours for all frames, median cut over their pixels, ordered dither (which stands
-/// still from frame to frame). Sides up to 65535. GIF counts time in hundredths of a second.
-VDVR_API void write_gif(const std::filesystem::path& path, const std::vector<Image>& frames, int frame_ms);
 
 }  // namespace vdvr

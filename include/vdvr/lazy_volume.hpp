@@ -1,5 +1,5 @@
 // A .vdvr file that stays on the disk: V on lattices of points, for which only the chunks of samples are read
-// that hold something of the bricks asked for. Called by the Python module, for xarray.
+// that hold something of the bricks asked for.
 #pragma once
 
 #include <cstdint>

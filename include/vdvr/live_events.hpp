@@ -1,5 +1,5 @@
 // What pointer, wheel and keys do to a view: pure functions of a state and an event. Names and units of
-// events are those of jupyter_rfb and of browsers. Called by live_json.cpp and by notebooks.
+// events are those of jupyter_rfb and of browsers.
 #pragma once
 
 #include <cstdint>

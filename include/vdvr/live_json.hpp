@@ -1,4 +1,4 @@
-// States and events of a viewer as JSON text. Called by `vdvr serve`, by notebooks and by the fuzz program.
+// States and events of a viewer as JSON text.
 #pragma once
 
 #include <string>

@@ -1,5 +1,4 @@
-// Frames of views: coarse ones that keep up with the hand, full ones at rest. Called by `vdvr serve` and by
-// notebooks.
+// Frames of views: coarse ones that keep up with the hand, full ones at rest.
 #pragma once
 
 #include <cstdint>

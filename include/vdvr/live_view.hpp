@@ -1,6 +1,6 @@
 // What an interactive viewer shows of a volume, as plain values: the volume's facts that a viewer needs, a
 // view of it, and the picture's options of a view. Events change views (live_events.hpp), text carries them
-// (live_json.hpp), a LiveRenderer draws them (live_renderer.hpp). Called by `vdvr serve` and by notebooks.
+// (live_json.hpp), a LiveRenderer draws them (live_renderer.hpp).
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
 // How far the bounds lie above the truth: the largest bound over the largest error that a finer gold shows.
-// Called by `vdvr bench bounds` and by tests.
 #pragma once
 
 #include <string>

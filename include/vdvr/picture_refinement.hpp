@@ -1,5 +1,5 @@
 // Volumes refined for pictures: bricks as fine as pixels of given views need them, and no finer
-// (docs/pixel-bounds.md). Called by the commands build, run and plan.
+// (docs/pixel-bounds.md).
 #pragma once
 
 #include <array>

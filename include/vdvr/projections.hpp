@@ -11,7 +11,7 @@
 
 #include "vdvr/cone_geometry.hpp"
 #include "vdvr/export.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/preparation_steps.hpp"
 #include "vdvr/sample_array.hpp"
 
 namespace vdvr {

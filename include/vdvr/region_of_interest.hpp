@@ -1,5 +1,4 @@
-// What a region of interest certifies: the points of its closed box (docs/error-bounds.md, section 1). Called
-// by build.cpp, verify.cpp, error_slice.cpp and the program's probe.
+// What a region of interest certifies: the points of its closed box (docs/error-bounds.md, section 1).
 #pragma once
 
 #include <array>

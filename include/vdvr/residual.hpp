@@ -1,6 +1,6 @@
 // Re-projection residuals: what was measured less the integral of F along the measured ray, as an interval
 // that is proved (docs/residual.md). What no interpolation explains lies in views, truncation, noise or
-// physics. Called by the command residual.
+// physics.
 #pragma once
 
 #include <array>
@@ -12,7 +12,6 @@
 
 #include "vdvr/certificate.hpp"
 #include "vdvr/export.hpp"
-#include "vdvr/image.hpp"
 #include "vdvr/mixed_volume.hpp"
 #include "vdvr/progress.hpp"
 #include "vdvr/projections.hpp"
@@ -83,11 +82,5 @@ VDVR_API ResidualSummary summary_of(const Residual& residual, const ProjectionSe
 VDVR_API void write_residual(const std::filesystem::path& path, const Residual& residual);
 /// Whether write_residual takes it.
 VDVR_API bool is_residual_path(const std::filesystem::path& path);
-
-/// Columns across, views down, of one row: blue where F exceeds what was measured, red where it lacks some,
-/// black dots in a grid where no interpolation explains it, with a scale, the rms by view and by column, and
-/// a caption.
-VDVR_API Image residual_picture(const Residual& residual, const ResidualSummary& summary, std::int64_t row,
-                                const std::string& title);
 
 }  // namespace vdvr

@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "vdvr/export.hpp"
+#include "vdvr/grid.hpp"
 #include "vdvr/projections.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/sample_array.hpp"
 
 namespace vdvr {
 

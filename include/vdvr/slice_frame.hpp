@@ -1,5 +1,4 @@
 // What stands around the picture of a slice: axes in world units, a scale bar, a colour bar, a caption.
-// Called by the commands render and run.
 #pragma once
 
 #include <cstdint>

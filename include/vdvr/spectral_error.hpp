@@ -1,6 +1,5 @@
 // What interpolation can do to the waves of a scan: the spectrum of one filtered projection or of a volume,
 // times the map of worst errors (docs/error-bounds.md, section 3). Comparison only, it decides nothing.
-// Called by plan_pictures.cpp and vdvr-paper.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Certified surfaces as pictures. Called by the command render.
+// Certified surfaces as pictures.
 #pragma once
 
 #include "vdvr/certified_rays.hpp"

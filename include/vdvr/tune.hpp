@@ -1,4 +1,4 @@
-// Launch parameters measured on the device at hand. Called by `vdvr bench tune`.
+// Launch parameters measured on the device at hand.
 #pragma once
 
 #include <array>

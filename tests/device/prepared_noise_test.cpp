@@ -7,6 +7,7 @@
 #include "host/noise/passed_noise.hpp"
 #include "host/prepare/prepare.hpp"
 #include "tests/support/repeated_scans.hpp"
+#include "vdvr/preparation.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -1,7 +1,7 @@
 // Certificates do not depend on the units of a scan: the same scan in other units, by powers of two, gives
 // the same volume to the bit; what fp32 cannot hold is refused; what is no number is no bound.
 #define BOOST_TEST_MODULE units
-#include "host/bounds/result_units.hpp"
+#include "host/volume/result_units.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <optional>
 #include <random>
 
-#include "host/volume/seams.hpp"
+#include "host/verify/seams.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/open_bricks.hpp"

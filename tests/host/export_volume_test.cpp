@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/io/npy_file.hpp"
 #include "tests/support/certificates.hpp"
 #include "tests/support/mixed_volumes.hpp"

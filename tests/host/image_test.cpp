@@ -12,9 +12,10 @@
 #include <set>
 
 #include "host/picture/palette.hpp"
-#include "host/picture/png.hpp"
+#include "host/system/png.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "vdvr/animation.hpp"
 #include "vdvr/decorate.hpp"
 #include "vdvr/error.hpp"
 

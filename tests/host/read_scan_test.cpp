@@ -2,7 +2,7 @@
 #include "vdvr/read_scan.hpp"
 
 #include "host/system/length_unit.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 

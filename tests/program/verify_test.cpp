@@ -13,7 +13,7 @@
 
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/volume/seams.hpp"
+#include "host/verify/seams.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"

@@ -1,7 +1,14 @@
 #!/usr/bin/env python3
-"""Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom. And of kernels what no
-compiler on a CPU holds: masks are asked by device/masks.h alone, no constant is in double precision, and local memory is an
-argument.
+"""Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom.
+
+A file of host/ROOM is of that room. So is a public header, include/vdvr/STEM.hpp, whose source is host/ROOM/STEM.cpp; of one
+without a source HOMES says the room. A room includes its own files and those of rooms above it in ROOMS: this counts what
+files of host/ include, and what public headers include. So no circle of headers runs through several rooms, and none may lie
+within one. `verify` and `witness` include nothing of the rooms that make what they check, nor does any header that they
+include.
+
+Of kernels it holds what no compiler on a CPU does: masks are asked by device/masks.h alone, no constant is in double precision,
+and local memory is an argument.
 
   rooms.py ROOT               one line per fault; exit 1 if there is any
   rooms.py ROOT --self-test   plants one fault of each kind in a copy and checks that it is found
@@ -12,14 +19,30 @@ import shutil
 import sys
 import tempfile
 
-# A room includes the public headers and rooms above it.
+# A room includes those above it.
 ROOMS = ["system", "opencl", "hdf5", "io", "geometry", "center", "prepare", "raw", "scan", "simulate", "fbp", "fdk", "noise", "volume", "sampler", "bounds", "kept", "gold", "crew",
-         "closing", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
+         "closing", "claims", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
 MOST_FILES = 25
+# Of public headers without a source: the room that they are declared for.
+HOMES = {
+    "error": "system", "export": "system", "progress": "system",
+    "grid": "io",
+    "preparation_steps": "geometry",
+    "understood": "raw",
+    "line_noise": "scan",
+    "field_options": "fbp", "rates": "fbp",
+    "common_memory": "kept",
+    "comparison": "closing",
+}
+# They measure what the makers made, by means of their own.
+CHECKERS = ["witness", "verify"]
+MAKERS = ["bounds", "kept", "gold", "crew", "closing", "certify"]
 # What kernels include: `shared` is compiled by the host too, `device` is not.
 KERNEL_HEADERS = {"shared", "device"}
-# Headers of declarations whose definitions are several files, or generated.
+# Headers of declarations whose definitions are several files, or generated; of a public one those that lie in rooms below its
+# own.
 SEVERAL_SOURCES = {
+    "include/vdvr/reconstruct.hpp": ["host/fdk/reconstruct_scan.cpp"],  # of scans of either beam
     "host/opencl/state.hpp": ["device.cpp", "program.cpp", "pace.cpp"],
     "host/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
     "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
@@ -37,11 +60,11 @@ SCOPE_OR_TYPE = re.compile(r"^namespace ([\w:]*) ?\{|^\}  // namespace ?([\w:]*)
 # NVIDIA's compiler refuses them, as the standard does.
 VARIADIC = re.compile(r"#\s*define\s+\w+\([^)\n]*\.\.\.\s*\)")
 OF_THE_LAUNCH = re.compile(r"\bget_(?:group_id|num_groups|global_size|global_offset)\b")
-INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.M)
+INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<((?:vdvr|host|shared|device|apps|tests)/[^>]+)>)', re.M)
 
 
 def includes(path):
-    return INCLUDE.findall(path.read_text(encoding="utf-8"))
+    return [quoted or ours for quoted, ours in INCLUDE.findall(path.read_text(encoding="utf-8"))]
 
 
 def files(folder, *suffixes):
@@ -79,8 +102,82 @@ def declares(text):
     return False
 
 
+class Headers:
+    """Which room a header is of, and what it includes."""
+
+    def __init__(self, root):
+        self.root, self.room, self.sources, self.included = root, {}, {}, {}
+        for path in files(root / "host", ".hpp"):
+            self.add(path, path.relative_to(root).as_posix(), path.parent.name)
+        for path in files(root / "include", ".hpp"):
+            found = sorted(s.relative_to(root).as_posix() for s in root.glob(f"host/*/{path.stem}.cpp"))
+            self.sources[path] = found
+            self.add(path, path.relative_to(root / "include").as_posix(),
+                     found[0].split("/")[1] if found else HOMES.get(path.stem))
+
+    def add(self, path, name, room):
+        self.room[name] = room
+        self.included[name] = includes(path)
+
+    def is_below(self, name, room):
+        """Whether a header is of a room below, or of none."""
+        own = self.room.get(name)
+        return own not in ROOMS or ROOMS.index(own) > ROOMS.index(room)
+
+    def reached(self, names):
+        """Each header that these are or include, with the headers that lead to it."""
+        way = {name: [] for name in names if name in self.included}
+        rest = list(way)
+        while rest:
+            name = rest.pop(0)
+            for next_one in self.included[name]:
+                if next_one in self.included and next_one not in way:
+                    way[next_one] = way[name] + [name]
+                    rest.append(next_one)
+        return way
+
+
+def faults_of_public_headers(headers):
+    for path, sources in headers.sources.items():
+        name, stem = path.relative_to(headers.root).as_posix(), path.stem
+        room = headers.room[f"vdvr/{path.name}"]
+        if len(sources) > 1:
+            yield f"{name}: has sources in several rooms, {', '.join(sources)}"
+        for source in SEVERAL_SOURCES.get(name, []):
+            if not (headers.root / source).is_file():
+                yield f"{name}: has no source, {source}"
+        if sources and stem in HOMES:
+            yield f"{name}: has a home in HOMES and a source, {sources[0]}"
+        if room not in ROOMS:
+            yield f"{name}: has no source, and HOMES names no room"
+            continue
+        for included in headers.included[f"vdvr/{path.name}"]:
+            if included.startswith("vdvr/") and headers.is_below(included, room):
+                yield f"{name}: is of {room} and includes {included}, which is below it"
+    for stem in HOMES:
+        if f"vdvr/{stem}.hpp" not in headers.room:
+            yield f"include/vdvr/{stem}.hpp: is in HOMES and not there"
+
+
+def faults_of_circles(headers):
+    for name, included in headers.included.items():
+        way = headers.reached(included).get(name)
+        if way is not None:
+            yield f"{name}: includes itself, by way of {', '.join(way) or name}"
+
+
+def faults_of_checkers(root, headers):
+    for room in CHECKERS:
+        for path in files(root / "host" / room, ".hpp", ".cpp"):
+            for name, way in headers.reached(includes(path)).items():
+                if headers.room[name] in MAKERS:
+                    by_way = f", by way of {', '.join(way)}" if way else ""
+                    yield f"{path.relative_to(root)}: includes {name}, which makes what {room} checks{by_way}"
+
+
 def faults(root):
     host = root / "host"
+    headers = Headers(root)
     for path in sorted(host.iterdir()):
         if path.is_file():
             yield f"{path.relative_to(root)}: lies loose in host/"
@@ -91,7 +188,10 @@ def faults(root):
         if len(found) > MOST_FILES:
             yield f"host/{room}: {len(found)} files, more than {MOST_FILES}"
         for path in found:
-            yield from faults_of_host_file(root, room, path)
+            yield from faults_of_host_file(root, room, path, headers)
+    yield from faults_of_public_headers(headers)
+    yield from faults_of_circles(headers)
+    yield from faults_of_checkers(root, headers)
     yield from faults_of_kernels(root)
     for path in files(root / "include", ".hpp"):
         for name in includes(path):
@@ -126,7 +226,7 @@ def faults_of_names(root):
                     yield f"{path.relative_to(root)}: {full} is another in {seen[full].relative_to(root)}"
 
 
-def faults_of_host_file(root, room, path):
+def faults_of_host_file(root, room, path, headers):
     name = path.relative_to(root)
     if path.parent != root / "host" / room:
         yield f"{name}: lies deeper than its room"
@@ -135,7 +235,10 @@ def faults_of_host_file(root, room, path):
         if parts[0] == "host":
             if len(parts) != 3 or parts[1] not in ROOMS or ROOMS.index(parts[1]) > ROOMS.index(room):
                 yield f"{name}: includes {included}, which is below it"
-        elif parts[0] not in ("vdvr", "shared"):
+        elif parts[0] == "vdvr":
+            if headers.is_below(included, room):
+                yield f"{name}: includes {included}, which is below it"
+        elif parts[0] != "shared":
             yield f"{name}: includes {included}"
     if path.suffix == ".hpp" and declares(path.read_text(encoding="utf-8")):
         sources = SEVERAL_SOURCES.get(str(name), [path.with_suffix(".cpp").name])
@@ -179,9 +282,22 @@ def faults_of_kernels(root):
 
 
 def plant(root, path, text):
+    """And what takes it out again."""
     target = root / path
+    before = target.read_text() if target.exists() else None
+    new_folder = None if target.parent.exists() else target.parent
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text((target.read_text() if target.exists() else "") + text)
+    target.write_text((before or "") + text)
+
+    def take_out():
+        if before is not None:
+            target.write_text(before)
+            return
+        target.unlink()
+        if new_folder:
+            new_folder.rmdir()
+
+    return take_out
 
 
 FAULTS = [
@@ -189,6 +305,20 @@ FAULTS = [
     ("host/attic/x.hpp", "#pragma once\n", "is no room"),
     ("host/fbp/back_project.hpp", '#include "host/gold/gold_settings.hpp"\n', "which is below it"),
     ("host/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/fbp/coverage.cpp: includes"),
+    ("host/fbp/coverage.cpp", '#include "vdvr/plan.hpp"\n', "includes vdvr/plan.hpp, which is below it"),
+    ("host/fbp/coverage.cpp", "#include <vdvr/plan.hpp>\n", "includes vdvr/plan.hpp, which is below it"),
+    ("host/io/tiff.cpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
+    ("host/io/tiff.cpp", '#include "vdvr/nowhere.hpp"\n', "includes vdvr/nowhere.hpp, which is below it"),
+    ("include/vdvr/projections.hpp", '#include "vdvr/certificate.hpp"\n', "includes vdvr/certificate.hpp, which is below it"),
+    ("include/vdvr/grid.hpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
+    ("include/vdvr/homeless.hpp", "#pragma once\n", "HOMES names no room"),
+    ("include/vdvr/export.hpp", '#include "vdvr/error.hpp"\n', "includes itself, by way of vdvr/error.hpp"),
+    ("host/gold/reconstruct.cpp", "\n", "has sources in several rooms"),
+    ("host/fbp/rates.cpp", "\n", "has a home in HOMES and a source"),
+    ("host/verify/verify.cpp", '#include "vdvr/plan.hpp"\n', "verify.cpp: includes vdvr/plan.hpp, which makes"),
+    ("host/verify/verify.cpp", '#include "host/certify/foresee.hpp"\n', "includes host/certify/foresee.hpp, which makes"),
+    ("host/witness/verify_bounds.hpp", '#include "host/bounds/six_taps.hpp"\n', "verify_bounds.hpp: includes host/bounds/six_taps.hpp, which makes"),
+    ("host/claims/verify_terms.hpp", '#include "host/crew/gold_rates.hpp"\n', "verify.cpp: includes host/crew/gold_rates.hpp, which makes what verify checks, by way of host/claims/verify_terms.hpp"),
     ("host/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
     ("include/vdvr/grid.hpp", '#include "host/system/parallel.hpp"\n', "a public header includes"),
     ("include/vdvr/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "no room has a source of its stem"),
@@ -210,19 +340,19 @@ FAULTS = [
 def self_test(root):
     missed = 0
     with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder) / "tree"
+        for name in ("host", "include", "kernels", "apps", "examples", "tests"):
+            if (root / name).is_dir():
+                shutil.copytree(root / name, copy / name, ignore=shutil.ignore_patterns("*.png", "*.h5"))
         for path, text, expected in FAULTS:
-            copy = pathlib.Path(folder) / "tree"
-            for name in ("host", "include", "kernels", "apps", "examples", "tests"):
-                if (root / name).is_dir():
-                    shutil.copytree(root / name, copy / name, ignore=shutil.ignore_patterns("*.png", "*.h5"))
-            plant(copy, path, text)
+            take_out = plant(copy, path, text)
             if not any(path.split("/")[-1] in f and expected in f or expected in f and "attic" in f for f in faults(copy)):
                 print(f"planted in {path}, not found: {expected}")
                 missed += 1
-            shutil.rmtree(copy)
-        copy = pathlib.Path(folder) / "tree"
-        shutil.copytree(root / "host", copy / "host")
-        shutil.copytree(root / "tests", copy / "tests")
+            take_out()
+        for fault in set(faults(copy)) - set(faults(root)):
+            print(f"left over of what was planted: {fault}")
+            missed += 1
         for i in range(MOST_FILES + 1):
             plant(copy, f"host/fbp/many_{i}.hpp", "#pragma once\n")
         if not any("more than" in f for f in faults(copy)):

@@ -10,6 +10,7 @@
 #include "vdvr/center_sheet.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/find_center.hpp"
+#include "vdvr/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 namespace {

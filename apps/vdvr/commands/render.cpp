@@ -14,6 +14,7 @@
 #include "apps/vdvr/sampler_json.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
+#include "vdvr/animation.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"

@@ -1,5 +1,4 @@
-// Text as editors save it: UTF-8 with or without a byte order mark, UTF-16 with one, Latin-1. Called by the
-// readers of text files, and of texts in HDF5 files.
+// Text as editors save it: UTF-8 with or without a byte order mark, UTF-16 with one, Latin-1.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Covered samples of a grid.
-#include "host/bounds/covered_range.hpp"
+#include "host/volume/covered_range.hpp"
 
 #include <cmath>
 #include <vector>
@@ -7,7 +7,6 @@
 #include "host/system/casts.hpp"
 
 namespace vdvr {
-namespace {}  // namespace
 
 std::vector<std::uint8_t> covered_in_plane(const Grid& grid, const Coverage& coverage) {
   const Index3 n = grid.samples();

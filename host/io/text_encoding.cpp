@@ -1,4 +1,4 @@
-#include "host/system/text_encoding.hpp"
+#include "host/io/text_encoding.hpp"
 
 #include <fmt/format.h>
 

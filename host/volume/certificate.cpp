@@ -1,6 +1,5 @@
 // The certificate as JSON (docs/file-format.md): members in a fixed order, numbers that read back to the bit,
-// no NaN and no infinity. Called by vdvr_file.cpp, write_vdvr.cpp and every command that prints or stores a
-// certificate.
+// no NaN and no infinity.
 #include "vdvr/certificate.hpp"
 
 #include <fmt/format.h>

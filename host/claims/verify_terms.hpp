@@ -1,11 +1,11 @@
 // What a certificate says of its terms, computed again by build's own code: this finds edits, the measure of
-// |V - F| is another (docs/error-bounds.md, "What verify compares"). Called by verify.cpp.
+// |V - F| is another (docs/error-bounds.md, "What verify compares").
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "host/verify/verify_scope.hpp"
+#include "host/claims/verify_scope.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/exact_field.hpp"
 #include "vdvr/progress.hpp"

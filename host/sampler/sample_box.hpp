@@ -1,5 +1,4 @@
-// V on samples of a lattice finer or coarser than the grid's cells, brick by brick. Called by everything that
-// exports.
+// V on samples of a lattice finer or coarser than the grid's cells, brick by brick.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Whether bricks that both store a sample at a point store the same bits. Called by verify.cpp.
+// Whether bricks that both store a sample at a point store the same bits.
 #pragma once
 
 #include <array>

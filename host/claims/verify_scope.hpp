@@ -1,5 +1,5 @@
 // What a certificate says that follows from scan and file alone, computed again (docs/error-bounds.md, "What
-// verify compares"). Called by verify.cpp.
+// verify compares").
 #pragma once
 
 #include <string>

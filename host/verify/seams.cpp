@@ -1,5 +1,5 @@
 // Compares the samples that neighbouring bricks share.
-#include "host/volume/seams.hpp"
+#include "host/verify/seams.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "host/bounds/result_units.hpp"
+#include "host/volume/result_units.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,8 @@ void scale_bounds(std::vector<float>& bounds, int exponent) {
   }
 }
 
+}  // namespace
+
 void scale(ErrorBudget& b, int exponent) {
   for (ErrorTerm* term : {&b.grid, &b.gold, &b.projection, &b.arithmetic, &b.sampler.buffer})
     term->value = std::ldexp(term->value, exponent);
@@ -27,24 +29,10 @@ void scale(std::vector<Bound>& bounds, int exponent) {
   for (Bound& b : bounds) b.value = std::ldexp(b.value, exponent);
 }
 
-}  // namespace
-
 void scale(MixedVolume& volume, int exponent) {
   if (exponent == 0) return;
   for_each_block(volume, [&](SampleBlock& block) { scale(block.f32, exponent); });
   volume.step = std::ldexp(volume.step, exponent);
-}
-
-Plan to_world(Plan plan, const Units& units) {
-  const int density = units.density();
-  plan.grid = to_world(plan.grid, units);
-  plan.base.grid = to_world(plan.base.grid, units);
-  scale(plan.base.samples, density);
-  plan.epsilon_abs = to_world(plan.epsilon_abs, units);
-  plan.reference_range = to_world(plan.reference_range, units);
-  scale(plan.bounds, density);
-  scale(plan.budget, density);
-  return plan;
 }
 
 Certificate to_world(Certificate c, const Units& units) {

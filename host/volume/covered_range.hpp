@@ -1,5 +1,5 @@
 // Which samples of a grid the scan covers, and the range of a field over them: what a tolerance in percent is
-// of. Called by plan.cpp, verify_scope.cpp and verify_terms.cpp.
+// of.
 #pragma once
 
 #include <cstdint>

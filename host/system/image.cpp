@@ -1,4 +1,4 @@
-// Pictures as PNG and values as NumPy files. Called by the render and run commands.
+// Pictures as PNG and values as NumPy files.
 #include "vdvr/image.hpp"
 
 #include <fmt/format.h>
@@ -6,7 +6,7 @@
 #include <bit>
 #include <string>
 
-#include "host/picture/png.hpp"
+#include "host/system/png.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 

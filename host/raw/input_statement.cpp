@@ -1,4 +1,3 @@
-// Called by read_scan.cpp and raw_scan.cpp, and by programs that take statements as options.
 #include "vdvr/input_statement.hpp"
 
 #include <fmt/format.h>

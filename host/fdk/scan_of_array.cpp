@@ -1,4 +1,3 @@
-// Called by programs that have a scan in memory.
 #include "vdvr/scan_of_array.hpp"
 
 #include <fmt/format.h>
@@ -12,6 +11,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/find_center.hpp"
 #include "vdvr/hash.hpp"
+#include "vdvr/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // What a certificate says that scan and file decide alone.
-#include "host/verify/verify_scope.hpp"
+#include "host/claims/verify_scope.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,9 +9,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/bounds/covered_range.hpp"
 #include "host/fdk/filter_cone.hpp"
 #include "host/system/casts.hpp"
+#include "host/volume/covered_range.hpp"
 #include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {

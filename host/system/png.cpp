@@ -1,5 +1,5 @@
-// The one unit that holds stb_image_write. Called by image.cpp and animation.cpp.
-#include "host/picture/png.hpp"
+// The one unit that holds stb_image_write.
+#include "host/system/png.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,3 @@
-// Called by `vdvr probe` and by the Python module.
 #include "vdvr/certified_points.hpp"
 
 #include <fmt/format.h>
@@ -8,11 +7,11 @@
 #include <cstdint>
 #include <limits>
 
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 #include "host/system/casts.hpp"
 #include "host/system/parallel.hpp"
-#include "vdvr/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/noted_scan.hpp"
 #include "vdvr/region_of_interest.hpp"
 
 namespace vdvr {

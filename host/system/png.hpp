@@ -1,4 +1,4 @@
-// A picture as the bytes of a PNG file. Called by image.cpp and animation.cpp.
+// A picture as the bytes of a PNG file.
 #pragma once
 
 #include <filesystem>

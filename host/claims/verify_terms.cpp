@@ -1,6 +1,6 @@
 // What build computes beside |V - F|, made again by its own code and compared with the certificate. This says
 // whether the certificate is the one that build writes; whether V is near F is measured by other means.
-#include "host/verify/verify_terms.hpp"
+#include "host/claims/verify_terms.hpp"
 
 #include <fmt/format.h>
 
@@ -9,15 +9,17 @@
 #include <numbers>
 #include <utility>
 
-#include "host/bounds/covered_range.hpp"
 #include "host/bounds/six_taps.hpp"
-#include "host/certify/classify_bricks.hpp"
-#include "host/bounds/result_units.hpp"
+#include "host/crew/gold_rates.hpp"
+#include "host/fbp/reconstruct.hpp"
 #include "host/fdk/filter_cone.hpp"
 #include "host/gold/base_of_gold.hpp"
-#include "host/fbp/reconstruct.hpp"
+#include "host/gold/gold_batch.hpp"
 #include "host/opencl/host_memory.hpp"
+#include "host/scan/units.hpp"
 #include "host/system/casts.hpp"
+#include "host/volume/covered_range.hpp"
+#include "host/volume/result_units.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // Places in integers: a sample's distance from its brick's first is a small number of 2^-per_cell cells.
-#include "host/export/sample_box.hpp"
+#include "host/sampler/sample_box.hpp"
 
 #include <algorithm>
 #include <cmath>
