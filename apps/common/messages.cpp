@@ -45,6 +45,7 @@ const std::set<std::string>& fields_with_options() {
                                            "nan_as",
                                            "origin",
                                            "oversampling",
+                                           "picture_finest",
                                            "range",
                                            "resume",
                                            "roi",

@@ -153,16 +153,6 @@ Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   return out;
 }
 
-BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
-                             const ScanNoise& noise, CertifyOptions options, const Progress& progress) {
-  options.plan.foresee = false;
-  PlanInSigma made = make_plan_in_sigma(device, scan, multiple, noise, options, progress);
-  options.build.refinement = refinement_in_sigma(made.sigma, multiple);
-  BuildResult result = certify(device, scan, std::move(made.plan), options, progress);
-  note_noise(device, scan, result, noise, made.sigma, multiple, progress);
-  return result;
-}
-
 void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
                 std::optional<double> multiple) {
   const SigmaRange& range = sigma.range;

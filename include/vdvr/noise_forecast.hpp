@@ -75,10 +75,6 @@ VDVR_API std::vector<FilterForecast> foresee_filters(Device& device, const Proje
                                                      const Progress& progress = {});
 /// How build() holds each brick to `multiple` times its sigma.
 VDVR_API Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple);
-/// Plans, builds and notes it. Throws what certify() throws.
-VDVR_API BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
-                                      const ScanNoise& noise, CertifyOptions options = {},
-                                      const Progress& progress = {});
 /// What interpolation errs by on average: the root mean square of (V - F) / sigma over covered points between
 /// samples. An estimate, where the largest is proved.
 struct MeanError {

@@ -18,6 +18,7 @@
 #include "vdvr/certified_points.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/exact_field.hpp"
+#include "vdvr/certify_scan.hpp"
 #include "vdvr/noise_forecast.hpp"
 #include "vdvr/simulate.hpp"
 #include "vdvr/vdvr_file.hpp"
@@ -50,8 +51,8 @@ const BuildResult& built(double multiple) {
   static std::map<double, BuildResult> all;
   auto found = all.find(multiple);
   if (found == all.end())
-    found = all.emplace(multiple,
-                        certify_in_sigma(vdvr::support::device(), noisy_scan(), multiple, stated_noise()))
+    found = all.emplace(multiple, certify_scan(vdvr::support::device(), noisy_scan(), {{}, multiple, {}},
+                                               stated_noise()))
                 .first;
   return found->second;
 }

@@ -185,8 +185,8 @@ int bench_build(Arguments& args) {
     const auto start = Clock::now();
     planned.emplace(read_and_plan(device, args, wanted, progress.callback()));
     plan_seconds = since(start);
-    grid = planned->plan.grid;
-    field = planned->plan.field;
+    grid = planned->made.plan.grid;
+    field = planned->made.plan.field;
     built = build_planned(device, *planned, wanted, progress.callback());
     seconds.push_back(since(start));
   }
