@@ -13,7 +13,7 @@
 #include <exception>
 #include <numbers>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/simulate.hpp"
 #include "vdvr/vdvr_file.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "host/simulate/simulate_band_limit.hpp"
+#include "host/scan/simulate/simulate_band_limit.hpp"
 #include "vdvr/simulate.hpp"
 
 namespace {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "host/gold/node_tolerance.hpp"
+#include "host/certify/gold/node_tolerance.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/build.hpp"
 

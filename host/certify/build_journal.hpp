@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host/crew/crew.hpp"
+#include "host/certify/crew/crew.hpp"
 #include "vdvr/build.hpp"
 
 namespace vdvr {

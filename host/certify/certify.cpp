@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "host/fdk/filter_cone.hpp"
-#include "host/gold/gold_settings.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/certify/gold/gold_settings.hpp"
 #include "host/scan/input_statement_json.hpp"
 #include "host/volume/covered_range.hpp"
 #include "vdvr/certified_region.hpp"

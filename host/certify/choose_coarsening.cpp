@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/volume_problem.hpp"
 
 namespace vdvr {

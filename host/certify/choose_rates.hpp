@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "host/crew/gold_rates.hpp"
+#include "host/certify/crew/gold_rates.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/grid.hpp"

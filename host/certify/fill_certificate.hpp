@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "host/certify/classify_bricks.hpp"
-#include "host/crew/journalled_gold.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/certify/crew/journalled_gold.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
 #include "vdvr/build.hpp"
 
 namespace vdvr {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/certify/classify_bricks.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
 
 namespace vdvr {
 

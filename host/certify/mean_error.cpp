@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/noise_forecast.hpp"

@@ -6,12 +6,12 @@
 #include <numeric>
 #include <random>
 
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/base_of_gold.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
 #include "host/scan/units.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

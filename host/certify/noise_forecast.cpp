@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "host/certify/foresee.hpp"
-#include "host/gold/gold_settings.hpp"
-#include "host/system/casts.hpp"
+#include "host/certify/gold/gold_settings.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/certified_region.hpp"
 #include "vdvr/error.hpp"

@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include "host/crew/crew.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/node_tolerance.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/certify/crew/crew.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/node_tolerance.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/error.hpp"

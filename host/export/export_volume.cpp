@@ -15,12 +15,12 @@
 
 #include "host/export/hdf5_sink.hpp"
 #include "host/export/ome_zarr.hpp"
-#include "host/sampler/sample_box.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "host/export/tiff_sink.hpp"
 #include "host/export/volume_sink.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/export_vtk.hpp"
 

@@ -14,10 +14,10 @@
 
 #include "host/export/export_note.hpp"
 #include "host/export/pack.hpp"
-#include "host/sampler/sample_box.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "host/export/vtk_partition.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 

@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "host/sampler/sample_box.hpp"
-#include "host/hdf5/hdf5_chunks.hpp"
-#include "host/system/casts.hpp"
+#include "host/volume/sampler/sample_box.hpp"
+#include "host/files/hdf5/hdf5_chunks.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/volume_problem.hpp"

@@ -6,7 +6,7 @@
 #include <bit>
 #include <fstream>
 
-#include "host/system/limits.hpp"
+#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 #include "vdvr/volume_file.hpp"

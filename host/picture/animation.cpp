@@ -12,7 +12,7 @@
 #include <string>
 
 #include "host/picture/palette.hpp"
-#include "host/system/png.hpp"
+#include "host/base/system/png.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/output_file.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "vdvr/read_scan.hpp"
 
 namespace vdvr {

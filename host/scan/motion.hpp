@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 

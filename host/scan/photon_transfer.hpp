@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "vdvr/line_noise.hpp"
 
 namespace vdvr {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr {
 

@@ -12,16 +12,16 @@
 #include <numbers>
 #include <thread>
 
-#include "host/prepare/prepare.hpp"
+#include "host/scan/prepare/prepare.hpp"
 #include "host/scan/motion.hpp"
 #include "host/scan/photon_transfer.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/values.hpp"
-#include "host/raw/open_scan.hpp"
+#include "host/scan/raw/open_scan.hpp"
 #include "host/scan/cone_scan.hpp"
 #include "host/scan/scan_report.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/rehearsal.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/rehearsal.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/find_center.hpp"
 #include "vdvr/hash.hpp"

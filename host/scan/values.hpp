@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <mutex>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {

@@ -11,12 +11,12 @@
 #include <random>
 #include <utility>
 
-#include "host/claims/verify_scope.hpp"
-#include "host/claims/verify_terms.hpp"
-#include "host/opencl/host_memory.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/verify/claims/verify_scope.hpp"
+#include "host/verify/claims/verify_terms.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/verify/seams.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"

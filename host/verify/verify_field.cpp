@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/opencl/host_memory.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
 #include "host/volume/result_units.hpp"
 #include "vdvr/error.hpp"

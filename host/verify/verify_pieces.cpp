@@ -4,8 +4,8 @@
 #include <bit>
 #include <cmath>
 
-#include "host/opencl/work_groups.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
 #include "shared/verify_pieces.h"
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host/prepare/preparation_json.hpp"
+#include "host/scan/prepare/preparation_json.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/hash.hpp"
 

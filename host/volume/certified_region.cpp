@@ -1,6 +1,6 @@
 #include "vdvr/certified_region.hpp"
 
-#include "host/fdk/filter_cone.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 
 namespace vdvr {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include "host/system/scratch_pass.hpp"
+#include "host/base/system/scratch_pass.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
 #include "host/volume/volume_problem.hpp"

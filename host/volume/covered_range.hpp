@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/fbp/coverage.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "vdvr/grid.hpp"
 
 namespace vdvr {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "vdvr/error.hpp"
 

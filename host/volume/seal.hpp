@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/hdf5/hdf5.hpp"
+#include "host/files/hdf5/hdf5.hpp"
 
 namespace vdvr {
 

@@ -13,9 +13,9 @@
 #include <optional>
 #include <span>
 
-#include "host/hdf5/hdf5_reader.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/rehearsal.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/rehearsal.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/vdvr_layout.hpp"
 #include "host/volume/volume_problem.hpp"

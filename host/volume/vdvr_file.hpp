@@ -5,7 +5,7 @@
 #include <map>
 #include <memory>
 
-#include "host/hdf5/hdf5_reader.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {

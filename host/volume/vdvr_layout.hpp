@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 
-#include "host/hdf5/hdf5_reader.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr {

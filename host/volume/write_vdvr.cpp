@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "host/hdf5/hdf5_writer.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"

@@ -1,4 +1,4 @@
-// Choice of an OpenCL device. No OpenCL type is visible here; host/opencl holds them.
+// Choice of an OpenCL device. No OpenCL type is visible here; host/base/opencl holds them.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 namespace vdvr {
 
 namespace opencl {
-struct State;  // host/opencl/state.hpp
+struct State;  // host/base/opencl/state.hpp
 }
 
 struct DeviceInfo {

@@ -13,7 +13,7 @@
 
 namespace vdvr {
 
-struct ImageLimits;  // host/sampler/resident_volume.hpp
+struct ImageLimits;  // host/volume/sampler/resident_volume.hpp
 
 /// A volume on a device, uploaded once for many frames: sample buffer, brick records, brick min/max. What
 /// only some frames need is made when one first does: the image3d atlas where the device has one that fits,

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "host/fbp/view_weights.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/exact_columns.hpp"

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/mixed_volumes.hpp"

@@ -7,7 +7,7 @@
 #include <iostream>
 #include <numeric>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/lit_pictures.hpp"
 #include "tests/support/pixel_attack.hpp"

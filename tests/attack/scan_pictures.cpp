@@ -10,8 +10,8 @@
 #include <cstdlib>
 #include <random>
 
-#include "host/fdk/filter_cone.hpp"
-#include "host/rays/crossings.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/picture/rays/crossings.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/pixel_attack.hpp"
 #include "vdvr/certify_picture.hpp"

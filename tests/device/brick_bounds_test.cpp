@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "host/render/raycast.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/certificates.hpp"

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"

@@ -5,9 +5,9 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/view_weights.hpp"
-#include "host/noise/field_variance.hpp"
-#include "host/noise/split_of_views.hpp"
+#include "host/field/fbp/view_weights.hpp"
+#include "host/field/noise/field_variance.hpp"
+#include "host/field/noise/split_of_views.hpp"
 #include "tests/reference/field_variance.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"

@@ -11,8 +11,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "host/opencl/embedded.hpp"
-#include "host/render/raycast.hpp"
+#include "host/base/opencl/embedded.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "host/volume/volume_problem.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/mixed_volumes.hpp"

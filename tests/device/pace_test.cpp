@@ -2,8 +2,8 @@
 #define BOOST_TEST_MODULE pace
 #include <boost/test/unit_test.hpp>
 
-#include "host/opencl/pace.hpp"
-#include "host/opencl/state.hpp"
+#include "host/base/opencl/pace.hpp"
+#include "host/base/opencl/state.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"

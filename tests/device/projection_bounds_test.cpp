@@ -1,15 +1,15 @@
 #define BOOST_TEST_MODULE projection_bounds
-#include "host/bounds/projection_bounds.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <functional>
 #include <numbers>
 #include <random>
 
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/gold_stream.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/device.hpp"

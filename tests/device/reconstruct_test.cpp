@@ -3,9 +3,9 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/filter_projections.hpp"
-#include "host/fbp/ramp_kernel.hpp"
-#include "host/fbp/view_weights.hpp"
+#include "host/field/fbp/filter_projections.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "vdvr/error.hpp"

@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "host/sampler/sampler_terms.hpp"
-#include "host/system/round_up.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
+#include "host/base/system/round_up.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"

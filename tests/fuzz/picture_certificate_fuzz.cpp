@@ -1,5 +1,5 @@
 // X.certificate.json of pictures of every mode, as verify_picture() reads it.
-#include "host/pixel/picture_json.hpp"
+#include "host/picture/pixel/picture_json.hpp"
 #include "tests/fuzz/target.hpp"
 
 namespace vdvr::fuzz {

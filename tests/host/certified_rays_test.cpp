@@ -7,9 +7,9 @@
 #include <limits>
 #include <numbers>
 
-#include "host/rays/crossings.hpp"
-#include "host/rays/emission.hpp"
-#include "host/rays/line_integral.hpp"
+#include "host/picture/rays/crossings.hpp"
+#include "host/picture/rays/emission.hpp"
+#include "host/picture/rays/line_integral.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"

@@ -6,7 +6,7 @@
 #include <random>
 #include <utility>
 
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/support/open_bricks.hpp"
 

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE close_boundaries
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>

@@ -4,8 +4,8 @@
 #include <optional>
 #include <sstream>
 
-#include "host/io/npy_file.hpp"
-#include "host/io/xml_file.hpp"
+#include "host/files/io/npy_file.hpp"
+#include "host/files/io/xml_file.hpp"
 #include "tests/support/cone_files.hpp"
 
 using namespace vdvr;

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host/sampler/sample_box.hpp"
-#include "host/io/npy_file.hpp"
+#include "host/volume/sampler/sample_box.hpp"
+#include "host/files/io/npy_file.hpp"
 #include "tests/support/certificates.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/temporary_folder.hpp"

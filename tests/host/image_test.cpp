@@ -12,7 +12,7 @@
 #include <set>
 
 #include "host/picture/palette.hpp"
-#include "host/system/png.hpp"
+#include "host/base/system/png.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/animation.hpp"

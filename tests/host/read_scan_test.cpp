@@ -1,8 +1,8 @@
 #define BOOST_TEST_MODULE read_scan
 #include "vdvr/read_scan.hpp"
 
-#include "host/system/length_unit.hpp"
-#include "host/io/text_encoding.hpp"
+#include "host/base/system/length_unit.hpp"
+#include "host/files/io/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 

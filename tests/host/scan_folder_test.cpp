@@ -2,8 +2,8 @@
 #define BOOST_TEST_MODULE scan_folder
 #include <boost/test/data/test_case.hpp>
 
-#include "host/io/natural_order.hpp"
-#include "host/raw/scan_folder.hpp"
+#include "host/files/io/natural_order.hpp"
+#include "host/scan/raw/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/hash.hpp"
 

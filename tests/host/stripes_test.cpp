@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE stripes
-#include "host/prepare/stripes.hpp"
+#include "host/scan/prepare/stripes.hpp"
 
 #include <algorithm>
 #include <array>

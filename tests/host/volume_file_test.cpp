@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE volume_file
-#include "host/io/tiff.hpp"
+#include "host/files/io/tiff.hpp"
 #include "vdvr/volume_file.hpp"
 
 #include <hdf5.h>

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/cosine_series.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/cosine_series.hpp"
 #include "vdvr/projections.hpp"
 
 namespace vdvr::reference {

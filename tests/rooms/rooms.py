@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Holds the order of rooms (docs/architecture.md): which file lies where, and who may include whom.
 
-A file of host/ROOM is of that room. So is a public header, include/vdvr/STEM.hpp, whose source is host/ROOM/STEM.cpp; of one
-without a source HOMES says the room. A room includes its own files and those of rooms above it in ROOMS: this counts what
+A file of host/ROOM is of that room; ROOM is WING/NAME, or the wing itself where both have one name. So is a public header,
+include/vdvr/STEM.hpp, whose source is host/ROOM/STEM.cpp; of one without a source HOMES says the room. Kernels lie in the rooms
+that launch them. A room includes its own files and those of rooms above it in ROOMS: this counts what
 files of host/ include, and what public headers include. So no circle of headers runs through several rooms, and none may lie
 within one. `verify` and `witness` include nothing of the rooms that make what they check, nor does any header that they
 include.
@@ -19,34 +20,42 @@ import shutil
 import sys
 import tempfile
 
-# A room includes those above it.
-ROOMS = ["system", "opencl", "hdf5", "io", "geometry", "center", "prepare", "raw", "scan", "simulate", "fbp", "fdk", "noise", "volume", "sampler", "bounds", "kept", "gold", "crew",
-         "closing", "claims", "certify", "witness", "verify", "residual", "render", "rays", "views", "picture", "pixel", "live", "export"]
+# A room includes those above it; a wing is the first part of a room's name, and its rooms stand together.
+ROOMS = ["base/system", "base/opencl",
+         "files/hdf5", "files/io",
+         "scan/geometry", "scan/center", "scan/prepare", "scan/raw", "scan", "scan/simulate",
+         "field/fbp", "field/fdk", "field/noise",
+         "volume", "volume/sampler",
+         "certify/bounds", "certify/kept", "certify/gold", "certify/crew", "certify/closing", "certify",
+         "verify/claims", "verify/witness", "verify", "verify/residual",
+         "picture/render", "picture/rays", "picture/refine", "picture", "picture/pixel", "picture/live",
+         "export"]
+MOST_ROOMS = 7
 MOST_FILES = 25
 # Of public headers without a source: the room that they are declared for.
 HOMES = {
-    "error": "system", "export": "system", "progress": "system",
-    "grid": "io",
-    "preparation_steps": "geometry",
-    "understood": "raw",
+    "error": "base/system", "export": "base/system", "progress": "base/system",
+    "grid": "files/io",
+    "preparation_steps": "scan/geometry",
+    "understood": "scan/raw",
     "line_noise": "scan",
-    "field_options": "fbp", "rates": "fbp",
-    "common_memory": "kept",
-    "comparison": "closing",
+    "field_options": "field/fbp", "rates": "field/fbp",
+    "common_memory": "certify/kept",
+    "comparison": "certify/closing",
 }
 # They measure what the makers made, by means of their own.
-CHECKERS = ["witness", "verify"]
-MAKERS = ["bounds", "kept", "gold", "crew", "closing", "certify"]
+CHECKERS = ["verify/witness", "verify"]
+MAKERS = ["certify/bounds", "certify/kept", "certify/gold", "certify/crew", "certify/closing", "certify"]
 # What kernels include: `shared` is compiled by the host too, `device` is not.
 KERNEL_HEADERS = {"shared", "device"}
 # Headers of declarations whose definitions are several files, or generated; of a public one those that lie in rooms below its
 # own.
 SEVERAL_SOURCES = {
-    "include/vdvr/reconstruct.hpp": ["host/fdk/reconstruct_scan.cpp"],  # of scans of either beam
-    "host/opencl/state.hpp": ["device.cpp", "program.cpp", "pace.cpp"],
-    "host/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
+    "include/vdvr/reconstruct.hpp": ["host/field/fdk/reconstruct_scan.cpp"],  # of scans of either beam
+    "host/base/opencl/state.hpp": ["device.cpp", "program.cpp", "pace.cpp"],
+    "host/base/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
     "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
-    "host/opencl/device_end.hpp": ["device.cpp"],
+    "host/base/opencl/device_end.hpp": ["device.cpp"],
 }
 # any() and all() are never true of one lane; devices without double precision warn of its constants.
 MASK_HEADER = "masks.h"
@@ -54,7 +63,7 @@ BARE_QUESTION = re.compile(r"\b(any|all)\s*\(")
 DOUBLE_CONSTANT = re.compile(r"(?<![\w.])(?:(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+|0x[\da-fA-F.]+p[+-]?\d+)(?![\w.])")
 # PoCL 3.1 shares such an array among all groups (device/shared_column.h).
 LOCAL_ARRAY = re.compile(r"\b__local\b[^;(){}*]*[;=\[]")
-# Long launches are cut (host/opencl/pace.hpp), which work-items do not see as long as they ask for global places.
+# Long launches are cut (host/base/opencl/pace.hpp), which work-items do not see as long as they ask for global places.
 SCOPE_OR_TYPE = re.compile(r"^namespace ([\w:]*) ?\{|^\}  // namespace ?([\w:]*)|"
                            r"^(?:struct|class|enum class|enum) (?:VDVR_API )?(\w+)(?: final)?(?: :[^;{]*)?\s*\{", re.M)
 # NVIDIA's compiler refuses them, as the standard does.
@@ -69,6 +78,21 @@ def includes(path):
 
 def files(folder, *suffixes):
     return sorted(p for p in folder.rglob("*") if p.suffix in suffixes) if folder.is_dir() else []
+
+
+def room_files(root, room):
+    folder = root / "host" / room
+    return sorted(p for p in folder.iterdir() if p.suffix in (".hpp", ".cpp")) if folder.is_dir() else []
+
+
+def sources_of(root, stem):
+    """Where in the rooms a source of a public header's stem lies."""
+    return sorted(s.relative_to(root).as_posix() for s in (root / "host").rglob(f"{stem}.cpp"))
+
+
+def room_of(path):
+    """Of a file, relative to the root: host/base/system/x.cpp is of base/system."""
+    return path.rsplit("/", 1)[0].split("/", 1)[1]
 
 
 def code_of(text):
@@ -108,12 +132,13 @@ class Headers:
     def __init__(self, root):
         self.root, self.room, self.sources, self.included = root, {}, {}, {}
         for path in files(root / "host", ".hpp"):
-            self.add(path, path.relative_to(root).as_posix(), path.parent.name)
+            name = path.relative_to(root).as_posix()
+            self.add(path, name, room_of(name) if "/" in name[5:] else None)
         for path in files(root / "include", ".hpp"):
-            found = sorted(s.relative_to(root).as_posix() for s in root.glob(f"host/*/{path.stem}.cpp"))
+            found = sources_of(root, path.stem)
             self.sources[path] = found
             self.add(path, path.relative_to(root / "include").as_posix(),
-                     found[0].split("/")[1] if found else HOMES.get(path.stem))
+                     room_of(found[0]) if found else HOMES.get(path.stem))
 
     def add(self, path, name, room):
         self.room[name] = room
@@ -140,7 +165,8 @@ class Headers:
 def faults_of_public_headers(headers):
     for path, sources in headers.sources.items():
         name, stem = path.relative_to(headers.root).as_posix(), path.stem
-        room = headers.room[f"vdvr/{path.name}"]
+        public = path.relative_to(headers.root / "include").as_posix()
+        room = headers.room[public]
         if len(sources) > 1:
             yield f"{name}: has sources in several rooms, {', '.join(sources)}"
         for source in SEVERAL_SOURCES.get(name, []):
@@ -151,11 +177,11 @@ def faults_of_public_headers(headers):
         if room not in ROOMS:
             yield f"{name}: has no source, and HOMES names no room"
             continue
-        for included in headers.included[f"vdvr/{path.name}"]:
+        for included in headers.included[public]:
             if included.startswith("vdvr/") and headers.is_below(included, room):
                 yield f"{name}: is of {room} and includes {included}, which is below it"
     for stem in HOMES:
-        if f"vdvr/{stem}.hpp" not in headers.room:
+        if not any(path.stem == stem for path in headers.sources):
             yield f"include/vdvr/{stem}.hpp: is in HOMES and not there"
 
 
@@ -168,7 +194,7 @@ def faults_of_circles(headers):
 
 def faults_of_checkers(root, headers):
     for room in CHECKERS:
-        for path in files(root / "host" / room, ".hpp", ".cpp"):
+        for path in room_files(root, room):
             for name, way in headers.reached(includes(path)).items():
                 if headers.room[name] in MAKERS:
                     by_way = f", by way of {', '.join(way)}" if way else ""
@@ -181,10 +207,15 @@ def faults(root):
     for path in sorted(host.iterdir()):
         if path.is_file():
             yield f"{path.relative_to(root)}: lies loose in host/"
-        elif path.name not in ROOMS:
-            yield f"{path.relative_to(root)}: is no room"
+    for folder in sorted({p.parent for p in files(host, ".hpp", ".cpp")} - {host}):
+        if folder.relative_to(host).as_posix() not in ROOMS:
+            yield f"{folder.relative_to(root)}: is no room"
+    wings = [room.split("/")[0] for room in ROOMS]
+    for wing in dict.fromkeys(wings):
+        if wings.count(wing) > MOST_ROOMS:
+            yield f"host/{wing}: {wings.count(wing)} rooms, more than {MOST_ROOMS}"
     for room in ROOMS:
-        found = files(host / room, ".hpp", ".cpp")
+        found = room_files(root, room)
         if len(found) > MOST_FILES:
             yield f"host/{room}: {len(found)} files, more than {MOST_FILES}"
         for path in found:
@@ -197,7 +228,7 @@ def faults(root):
         for name in includes(path):
             if not name.startswith("vdvr/"):
                 yield f"{path.relative_to(root)}: a public header includes {name}"
-        if declares(path.read_text(encoding="utf-8")) and not list((root / "host").glob(f"*/{path.stem}.cpp")):
+        if declares(path.read_text(encoding="utf-8")) and not sources_of(root, path.stem):
             yield f"{path.relative_to(root)}: no room has a source of its stem"
     for folder in ("apps", "examples"):
         for path in files(root / folder, ".hpp", ".cpp"):
@@ -228,14 +259,9 @@ def faults_of_names(root):
 
 def faults_of_host_file(root, room, path, headers):
     name = path.relative_to(root)
-    if path.parent != root / "host" / room:
-        yield f"{name}: lies deeper than its room"
     for included in includes(path):
         parts = included.split("/")
-        if parts[0] == "host":
-            if len(parts) != 3 or parts[1] not in ROOMS or ROOMS.index(parts[1]) > ROOMS.index(room):
-                yield f"{name}: includes {included}, which is below it"
-        elif parts[0] == "vdvr":
+        if parts[0] in ("host", "vdvr"):
             if headers.is_below(included, room):
                 yield f"{name}: includes {included}, which is below it"
         elif parts[0] != "shared":
@@ -251,17 +277,17 @@ def faults_of_kernels(root):
     kernels = root / "kernels"
     launches = {}
     for source in files(root / "host", ".cpp", ".hpp"):
-        for program in re.findall(r'"(\w+/\w+)"', source.read_text(encoding="utf-8")):
+        for program in re.findall(r'"(\w+(?:/\w+)+)"', source.read_text(encoding="utf-8")):
             launches.setdefault(program, []).append(source)
     for path in files(kernels, ".cl", ".h"):
-        name, room = path.relative_to(root), path.parent.name
-        if path.parent.parent != kernels or room not in set(ROOMS) | KERNEL_HEADERS:
+        name, room = path.relative_to(root), path.parent.relative_to(kernels).as_posix()
+        if room not in set(ROOMS) | KERNEL_HEADERS:
             yield f"{name}: lies in no room"
             continue
         if path.suffix == ".cl" and f"{room}/{path.stem}" not in launches:
             yield f"{name}: nobody builds the program {room}/{path.stem}"
         for source in launches.get(f"{room}/{path.stem}", []):
-            if path.suffix == ".cl" and source.parent.name != room:
+            if path.suffix == ".cl" and source.parent != root / "host" / room:
                 yield f"{name}: is launched from another room, {source.relative_to(root)}"
         for included in includes(path):
             if included.split("/")[0] not in KERNEL_HEADERS:
@@ -303,37 +329,37 @@ def plant(root, path, text):
 FAULTS = [
     ("host/loose.hpp", "#pragma once\n", "lies loose in host/"),
     ("host/attic/x.hpp", "#pragma once\n", "is no room"),
-    ("host/fbp/back_project.hpp", '#include "host/gold/gold_settings.hpp"\n', "which is below it"),
-    ("host/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/fbp/coverage.cpp: includes"),
-    ("host/fbp/coverage.cpp", '#include "vdvr/plan.hpp"\n', "includes vdvr/plan.hpp, which is below it"),
-    ("host/fbp/coverage.cpp", "#include <vdvr/plan.hpp>\n", "includes vdvr/plan.hpp, which is below it"),
-    ("host/io/tiff.cpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
-    ("host/io/tiff.cpp", '#include "vdvr/nowhere.hpp"\n', "includes vdvr/nowhere.hpp, which is below it"),
+    ("host/field/fbp/back_project.hpp", '#include "host/certify/gold/gold_settings.hpp"\n', "which is below it"),
+    ("host/field/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/field/fbp/coverage.cpp: includes"),
+    ("host/field/fbp/coverage.cpp", '#include "vdvr/plan.hpp"\n', "includes vdvr/plan.hpp, which is below it"),
+    ("host/field/fbp/coverage.cpp", "#include <vdvr/plan.hpp>\n", "includes vdvr/plan.hpp, which is below it"),
+    ("host/files/io/tiff.cpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
+    ("host/files/io/tiff.cpp", '#include "vdvr/nowhere.hpp"\n', "includes vdvr/nowhere.hpp, which is below it"),
     ("include/vdvr/projections.hpp", '#include "vdvr/certificate.hpp"\n', "includes vdvr/certificate.hpp, which is below it"),
     ("include/vdvr/grid.hpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
     ("include/vdvr/homeless.hpp", "#pragma once\n", "HOMES names no room"),
     ("include/vdvr/export.hpp", '#include "vdvr/error.hpp"\n', "includes itself, by way of vdvr/error.hpp"),
-    ("host/gold/reconstruct.cpp", "\n", "has sources in several rooms"),
-    ("host/fbp/rates.cpp", "\n", "has a home in HOMES and a source"),
+    ("host/certify/gold/reconstruct.cpp", "\n", "has sources in several rooms"),
+    ("host/field/fbp/rates.cpp", "\n", "has a home in HOMES and a source"),
     ("host/verify/verify.cpp", '#include "vdvr/plan.hpp"\n', "verify.cpp: includes vdvr/plan.hpp, which makes"),
     ("host/verify/verify.cpp", '#include "host/certify/foresee.hpp"\n', "includes host/certify/foresee.hpp, which makes"),
-    ("host/witness/verify_bounds.hpp", '#include "host/bounds/six_taps.hpp"\n', "verify_bounds.hpp: includes host/bounds/six_taps.hpp, which makes"),
-    ("host/claims/verify_terms.hpp", '#include "host/crew/gold_rates.hpp"\n', "verify.cpp: includes host/crew/gold_rates.hpp, which makes what verify checks, by way of host/claims/verify_terms.hpp"),
-    ("host/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
-    ("include/vdvr/grid.hpp", '#include "host/system/parallel.hpp"\n', "a public header includes"),
+    ("host/verify/witness/verify_bounds.hpp", '#include "host/certify/bounds/six_taps.hpp"\n', "verify_bounds.hpp: includes host/certify/bounds/six_taps.hpp, which makes"),
+    ("host/verify/claims/verify_terms.hpp", '#include "host/certify/crew/gold_rates.hpp"\n', "verify.cpp: includes host/certify/crew/gold_rates.hpp, which makes what verify checks, by way of host/verify/claims/verify_terms.hpp"),
+    ("host/field/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
+    ("include/vdvr/grid.hpp", '#include "host/base/system/parallel.hpp"\n', "a public header includes"),
     ("include/vdvr/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "no room has a source of its stem"),
-    ("apps/vdvr/x.cpp", '#include "host/system/parallel.hpp"\n', "only include/vdvr is public"),
+    ("apps/vdvr/x.cpp", '#include "host/base/system/parallel.hpp"\n', "only include/vdvr is public"),
     ("examples/x.cpp", '#include "shared/mixed_sampler.h"\n', "only include/vdvr is public"),
     ("tests/loose_test.cpp", "\n", "lies loose in tests/"),
-    ("kernels/fbp/lonely.cl", "\n", "nobody builds the program"),
+    ("kernels/field/fbp/lonely.cl", "\n", "nobody builds the program"),
     ("kernels/loose.cl", "\n", "lies in no room"),
     ("kernels/shared/untested.h", '#include "device/lanes.h"\n', "the host would have to compile"),
-    ("kernels/gold/cell_test.cl", "int f(int4 m) { return any(m); }\n", "never true of one lane"),
-    ("kernels/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
-    ("kernels/kept/fourth_differences.cl", "__kernel void h() { __local float room[32]; }\n", "is no argument"),
-    ("kernels/kept/fourth_differences.cl", "__kernel void h() { int i = get_group_id(0); }\n", "may be a piece"),
-    ("host/fbp/twice.hpp", "namespace vdvr {\nstruct Grid {\n};\n}  // namespace vdvr\n", "vdvr::Grid is another in"),
-    ("kernels/kept/cone_nodes.cl", "#define CALL(f, ...) f(__VA_ARGS__)\n", "which no macro of OpenCL C may"),
+    ("kernels/certify/gold/cell_test.cl", "int f(int4 m) { return any(m); }\n", "never true of one lane"),
+    ("kernels/certify/kept/cone_nodes.cl", "float g(float x) { return x - (REAL)0.5; }\n", "is in double precision"),
+    ("kernels/certify/kept/fourth_differences.cl", "__kernel void h() { __local float room[32]; }\n", "is no argument"),
+    ("kernels/certify/kept/fourth_differences.cl", "__kernel void h() { int i = get_group_id(0); }\n", "may be a piece"),
+    ("host/field/fbp/twice.hpp", "namespace vdvr {\nstruct Grid {\n};\n}  // namespace vdvr\n", "vdvr::Grid is another in"),
+    ("kernels/certify/kept/cone_nodes.cl", "#define CALL(f, ...) f(__VA_ARGS__)\n", "which no macro of OpenCL C may"),
 ]
 
 
@@ -354,7 +380,7 @@ def self_test(root):
             print(f"left over of what was planted: {fault}")
             missed += 1
         for i in range(MOST_FILES + 1):
-            plant(copy, f"host/fbp/many_{i}.hpp", "#pragma once\n")
+            plant(copy, f"host/field/fbp/many_{i}.hpp", "#pragma once\n")
         if not any("more than" in f for f in faults(copy)):
             print("a room of too many files, not found")
             missed += 1

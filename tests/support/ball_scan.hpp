@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "host/geometry/vectors.hpp"
+#include "host/scan/geometry/vectors.hpp"
 #include "tests/support/cone_files.hpp"
 #include "vdvr/exact_field.hpp"
 

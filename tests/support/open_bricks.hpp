@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "host/closing/open_bricks.hpp"
+#include "host/certify/closing/open_bricks.hpp"
 #include "vdvr/mixed_volume.hpp"
 
 namespace vdvr::support {

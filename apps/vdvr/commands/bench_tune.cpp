@@ -1,5 +1,5 @@
 // vdvr bench tune: launch parameters measured on this device, as a row for the table of
-// host/opencl/column_tuning.cpp.
+// host/base/opencl/column_tuning.cpp.
 #include "apps/vdvr/commands/bench_tune.hpp"
 
 #include <fmt/format.h>
