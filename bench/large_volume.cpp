@@ -15,7 +15,7 @@
 
 #include "host/base/system/parallel.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/scan/simulate/simulate_band_limit.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace {
 

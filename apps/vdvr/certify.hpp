@@ -10,9 +10,9 @@
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/scan_noise.hpp"
 #include "vdvr/certify_scan.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr::cli {
 

@@ -8,8 +8,8 @@
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/clip.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/explain_pixel.hpp"
-#include "vdvr/surface_picture.hpp"
+#include "vdvr/expert/explain_pixel.hpp"
+#include "vdvr/expert/surface_picture.hpp"
 
 namespace fs = std::filesystem;
 

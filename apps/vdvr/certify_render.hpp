@@ -7,7 +7,7 @@
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::cli {
 

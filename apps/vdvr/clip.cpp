@@ -4,7 +4,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

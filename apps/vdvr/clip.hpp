@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "apps/vdvr/pictures.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::cli {
 

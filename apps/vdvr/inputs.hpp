@@ -5,11 +5,11 @@
 #include <filesystem>
 
 #include "apps/vdvr/options.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 #include "vdvr/read_scan.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/expert/understood.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {

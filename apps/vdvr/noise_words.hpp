@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/scan_noise.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/noise_forecast.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
 
 namespace vdvr::cli {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "apps/vdvr/output.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr::cli {
 

@@ -7,7 +7,7 @@
 
 #include "apps/vdvr/options.hpp"
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {

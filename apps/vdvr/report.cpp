@@ -10,7 +10,7 @@
 #include "apps/vdvr/html.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/report_chart.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {

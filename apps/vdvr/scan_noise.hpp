@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/common/arguments.hpp"
-#include "vdvr/noise.hpp"
+#include "vdvr/expert/noise.hpp"
 
 namespace vdvr::cli {
 

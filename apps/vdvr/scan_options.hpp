@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/common/arguments.hpp"
-#include "vdvr/input_statement.hpp"
+#include "vdvr/expert/input_statement.hpp"
 
 namespace vdvr::cli {
 

@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "apps/vdvr/pictures.hpp"
-#include "vdvr/d2vr.hpp"
-#include "vdvr/drawn_volume.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/paged_volume.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/d2vr.hpp"
+#include "vdvr/expert/drawn_volume.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/paged_volume.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr::cli {
 
@@ -41,7 +41,7 @@ class Source {
   [[nodiscard]] Device& device() { return *devices_.front(); }
   /// Of all devices that draw: they passed their test when they were opened.
   [[nodiscard]] bool trusted();
-  /// As of vdvr/trust.hpp, of each of them.
+  /// As of vdvr/expert/trust.hpp, of each of them.
   void require_trusted(const std::string& what);
   /// What safe_sampler() says of the device that draws. Bounds are afterwards those of its certificate.
   SafeSampler take_sampler(SamplerKind asked, bool unverified);

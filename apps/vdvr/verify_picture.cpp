@@ -8,7 +8,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certified_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::cli {
 namespace {

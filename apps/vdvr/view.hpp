@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/vdvr/pictures.hpp"
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 
 namespace vdvr::cli {
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "apps/vdvr/options.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr::cli {
 

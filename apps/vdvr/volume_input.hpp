@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "apps/common/arguments.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr::cli {
 

@@ -1,11 +1,12 @@
-// Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of vdvr/build.hpp).
+// Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of
+// vdvr/expert/build.hpp).
 #pragma once
 
 #include <vector>
 
 #include "host/certify/gold/node_tolerance.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 namespace vdvr {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "host/certify/crew/crew.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // What a program over the library needs to certify: plan, build and the certificate completed.
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 
 #include <fmt/format.h>
 
@@ -12,9 +12,9 @@
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/scan/input_statement_json.hpp"
 #include "host/volume/covered_range.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {

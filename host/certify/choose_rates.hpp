@@ -8,10 +8,10 @@
 
 #include "host/certify/crew/gold_rates.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/plan.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/plan.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -9,8 +9,8 @@
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/covered_range.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // Bounds against a finer gold, on the bricks where bounds or chance say to look.
-#include "vdvr/measure_tightness.hpp"
+#include "vdvr/expert/measure_tightness.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
-// Tolerances in sigma; see vdvr/noise_forecast.hpp.
-#include "vdvr/noise_forecast.hpp"
+// Tolerances in sigma; see vdvr/expert/noise_forecast.hpp.
+#include "vdvr/expert/noise_forecast.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -1,5 +1,5 @@
 // Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md).
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 #include <fmt/format.h>
 
@@ -27,7 +27,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/covered_range.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/scan/units.hpp"
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
 

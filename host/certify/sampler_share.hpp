@@ -11,9 +11,9 @@
 #include "host/certify/gold/node_tolerance.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
 

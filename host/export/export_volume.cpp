@@ -22,7 +22,7 @@
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/export_vtk.hpp"
+#include "vdvr/expert/export_vtk.hpp"
 
 namespace vdvr {
 namespace {

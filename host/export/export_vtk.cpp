@@ -1,5 +1,5 @@
 // VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them.
-#include "vdvr/export_vtk.hpp"
+#include "vdvr/expert/export_vtk.hpp"
 
 #include <fmt/format.h>
 
@@ -19,7 +19,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

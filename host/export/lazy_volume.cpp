@@ -1,6 +1,6 @@
 // Bricks that a lattice touches, the chunks of the file that hold their samples, and these in memory that
 // takes room only where it is written.
-#include "vdvr/lazy_volume.hpp"
+#include "vdvr/expert/lazy_volume.hpp"
 
 #include <fmt/format.h>
 #include <sys/mman.h>
@@ -18,7 +18,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/vdvr_file.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "host/export/volume_sink.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -8,8 +8,8 @@
 
 #include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "vdvr/export_vtk.hpp"
+#include "vdvr/expert/export_vtk.hpp"
 
 namespace vdvr {
 

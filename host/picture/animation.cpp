@@ -1,6 +1,6 @@
 // Moving pictures: APNG (the chunks of the PNG specification, third edition, around frames that are PNG
 // already) and GIF through giflib, with our own palette.
-#include "vdvr/animation.hpp"
+#include "vdvr/expert/animation.hpp"
 
 #include <fmt/format.h>
 #include <gif_lib.h>
@@ -14,7 +14,7 @@
 #include "host/picture/palette.hpp"
 #include "host/base/system/png.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

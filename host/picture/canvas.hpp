@@ -6,7 +6,7 @@
 #include <functional>
 #include <glm/vec2.hpp>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

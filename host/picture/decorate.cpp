@@ -1,4 +1,4 @@
-#include "vdvr/decorate.hpp"
+#include "vdvr/expert/decorate.hpp"
 
 #include <fmt/format.h>
 

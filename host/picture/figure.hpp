@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr::figure {
 

@@ -1,5 +1,5 @@
 // A row's residuals as a sinogram between a scale, the rms of each view and that of each column.
-#include "vdvr/residual_picture.hpp"
+#include "vdvr/expert/residual_picture.hpp"
 
 #include <fmt/format.h>
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

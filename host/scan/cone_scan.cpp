@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "vdvr/input_statement.hpp"
+#include "vdvr/expert/input_statement.hpp"
 
 namespace vdvr {
 

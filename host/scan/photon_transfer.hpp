@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "host/scan/raw/raw_scan.hpp"
-#include "vdvr/line_noise.hpp"
+#include "vdvr/expert/line_noise.hpp"
 
 namespace vdvr {
 

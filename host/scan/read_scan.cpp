@@ -21,12 +21,12 @@
 #include "host/scan/cone_scan.hpp"
 #include "host/scan/scan_report.hpp"
 #include "host/base/system/limits.hpp"
-#include "host/base/system/rehearsal.hpp"
+#include "host/base/system/read_in_child.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/find_center.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/find_center.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {
@@ -259,7 +259,7 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
   const io::RawScan raw = open_described(path, options, folder);
   std::uint64_t bytes = 0;
   for (const auto& stamp : stamps_of(raw)) bytes += stamp.first;
-  io::extend_rehearsal(bytes);
+  io::extend_child(bytes);
   static_cast<void>(geometry_of(raw, path.string()));
   require_room(raw, options, path.string());
   const std::int64_t step = block_views(raw, options.max_memory_bytes);
@@ -271,7 +271,8 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
 
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
                          Understood& understood) {
-  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  if (io::holds_hdf5(path))
+    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
@@ -327,7 +328,8 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
 }
 
 std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const ScanOptions& options) {
-  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  if (io::holds_hdf5(path))
+    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   const io::RawScan raw = open_described(path, options, folder);
   if (!raw.counts) return std::nullopt;

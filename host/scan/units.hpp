@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -14,7 +14,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 #include "vdvr/read_scan.hpp"
 
 namespace vdvr {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

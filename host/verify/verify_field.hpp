@@ -18,8 +18,8 @@
 #include "host/volume/sampler/device_field.hpp"
 #include "host/verify/witness/verify_cone_bounds.hpp"
 #include "host/verify/witness/verify_nodes.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

@@ -5,7 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 #define VDVR_DIALECT_HOST
 #define VDVR_SAMPLE_TYPES 7

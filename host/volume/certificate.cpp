@@ -1,6 +1,6 @@
 // The certificate as JSON (docs/file-format.md): members in a fixed order, numbers that read back to the bit,
 // no NaN and no infinity.
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 
 #include "host/scan/prepare/preparation_json.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 
 #include "host/field/fdk/filter_cone.hpp"
 

@@ -7,8 +7,8 @@
 #include "host/base/system/scratch_pass.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/volume_problem.hpp"
-#include "vdvr/hash.hpp"
+#include "host/volume/validate_volume.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/field/fbp/coverage.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // The certified volume on the host: sampling by the shared header, and storage figures.
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "vdvr/noted_scan.hpp"
+#include "vdvr/expert/noted_scan.hpp"
 
 #include <fmt/format.h>
 

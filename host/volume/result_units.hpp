@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "host/scan/units.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

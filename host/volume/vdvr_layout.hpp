@@ -7,7 +7,7 @@
 #include <initializer_list>
 
 #include "host/files/hdf5/hdf5_reader.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

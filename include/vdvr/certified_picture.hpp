@@ -10,14 +10,14 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
-#include "vdvr/certified_rays.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/drawn_volume.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/drawn_volume.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/vdvr_file.hpp"
 

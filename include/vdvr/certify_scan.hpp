@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-#include "vdvr/certify.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/noise_forecast.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr {
 

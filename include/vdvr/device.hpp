@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/export.hpp"
+#include "vdvr/api.hpp"
 
 namespace vdvr {
 

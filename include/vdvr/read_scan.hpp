@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <optional>
 
-#include "vdvr/export.hpp"
-#include "vdvr/line_noise.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/scan_options.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/line_noise.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/scan_options.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr {
 

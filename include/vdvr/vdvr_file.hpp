@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/certificate.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

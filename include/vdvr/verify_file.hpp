@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/export.hpp"
+#include "vdvr/api.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr {
 

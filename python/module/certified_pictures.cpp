@@ -14,7 +14,7 @@
 #include "long_work.hpp"
 #include "parts.hpp"
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/surface_picture.hpp"
+#include "vdvr/expert/surface_picture.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;

@@ -19,10 +19,10 @@
 #include "long_work.hpp"
 #include "parts.hpp"
 #include "vdvr/certify_scan.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/export_vtk.hpp"
-#include "vdvr/framing.hpp"
-#include "vdvr/journal.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/export_vtk.hpp"
+#include "vdvr/expert/framing.hpp"
+#include "vdvr/expert/journal.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;

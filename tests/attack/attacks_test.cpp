@@ -12,7 +12,7 @@
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 // Every bound of the certificate against F in double precision, without slack: measured <= certified, at

@@ -11,7 +11,7 @@
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/pixel_attack.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 using support::AnalyticField;

@@ -11,7 +11,7 @@
 #include "tests/support/rendering.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

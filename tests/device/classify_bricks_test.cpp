@@ -12,7 +12,7 @@
 #include "host/field/fbp/reconstruct.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 namespace {

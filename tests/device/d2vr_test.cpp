@@ -16,8 +16,8 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 

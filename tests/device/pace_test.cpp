@@ -7,11 +7,11 @@
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/resident_volume.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/resident_volume.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -7,7 +7,7 @@
 #include "host/field/noise/passed_noise.hpp"
 #include "host/scan/prepare/prepare.hpp"
 #include "tests/support/repeated_scans.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -15,8 +15,8 @@
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 using vdvr::testing::empty_scan;

@@ -11,10 +11,10 @@
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/d2vr.hpp"
+#include "vdvr/expert/d2vr.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE reconstruct
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -9,8 +9,8 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 using vdvr::testing::noise_scan;

@@ -13,10 +13,10 @@
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr {
 namespace {

@@ -20,9 +20,9 @@
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/certify.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using vdvr::testing::ConeShape;

@@ -13,8 +13,8 @@
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certified_rays.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 using namespace vdvr;
 

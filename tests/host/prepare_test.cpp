@@ -13,7 +13,7 @@
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 #include "vdvr/read_scan.hpp"
 
 using namespace vdvr;

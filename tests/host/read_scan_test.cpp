@@ -4,7 +4,7 @@
 #include "host/base/system/length_unit.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

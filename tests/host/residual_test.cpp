@@ -14,8 +14,8 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/residual.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/residual.hpp"
 
 using namespace vdvr;
 namespace support = vdvr::testing;

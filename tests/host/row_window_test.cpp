@@ -5,7 +5,7 @@
 
 #include "host/field/fbp/reconstruct.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 

@@ -5,7 +5,7 @@
 #include "host/files/io/natural_order.hpp"
 #include "host/scan/raw/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

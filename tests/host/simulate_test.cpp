@@ -14,7 +14,7 @@
 #include "tests/reference/band_limit.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 

@@ -9,8 +9,8 @@
 #include <random>
 
 #include "tests/support/scans.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 using namespace vdvr;
 

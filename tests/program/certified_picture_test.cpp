@@ -13,7 +13,7 @@
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/certified_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/verify_file.hpp"
 

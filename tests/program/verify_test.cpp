@@ -1,6 +1,6 @@
 // Verify against the truth in double precision, against tampering, and through the program.
 #define BOOST_TEST_MODULE verify
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 #include <sys/wait.h>
 
@@ -17,10 +17,10 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

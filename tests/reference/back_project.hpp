@@ -10,7 +10,7 @@
 
 #include "host/certify/bounds/six_taps.hpp"
 #include "host/field/fbp/cosine_series.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

@@ -34,7 +34,7 @@ MOST_ROOMS = 7
 MOST_FILES = 25
 # Of public headers without a source: the room that they are declared for.
 HOMES = {
-    "error": "base/system", "export": "base/system", "progress": "base/system",
+    "error": "base/system", "vdvr": "export", "api": "base/system", "progress": "base/system",
     "grid": "files/io",
     "preparation_steps": "scan/geometry",
     "understood": "scan/raw",
@@ -51,7 +51,7 @@ KERNEL_HEADERS = {"shared", "device"}
 # Headers of declarations whose definitions are several files, or generated; of a public one those that lie in rooms below its
 # own.
 SEVERAL_SOURCES = {
-    "include/vdvr/reconstruct.hpp": ["host/field/fdk/reconstruct_scan.cpp"],  # of scans of either beam
+    "include/vdvr/expert/reconstruct.hpp": ["host/field/fdk/reconstruct_scan.cpp"],  # of scans of either beam
     "host/base/opencl/state.hpp": ["device.cpp", "program.cpp", "pace.cpp"],
     "host/base/opencl/embedded.hpp": [],                          # embedded_kernels.cpp, made by CMake
     "host/picture/embedded_font.hpp": [],                    # embedded_font.cpp, made by CMake
@@ -331,22 +331,22 @@ FAULTS = [
     ("host/attic/x.hpp", "#pragma once\n", "is no room"),
     ("host/field/fbp/back_project.hpp", '#include "host/certify/gold/gold_settings.hpp"\n', "which is below it"),
     ("host/field/fbp/coverage.cpp", '#include "apps/vdvr/options.hpp"\n', "host/field/fbp/coverage.cpp: includes"),
-    ("host/field/fbp/coverage.cpp", '#include "vdvr/plan.hpp"\n', "includes vdvr/plan.hpp, which is below it"),
-    ("host/field/fbp/coverage.cpp", "#include <vdvr/plan.hpp>\n", "includes vdvr/plan.hpp, which is below it"),
-    ("host/files/io/tiff.cpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
+    ("host/field/fbp/coverage.cpp", '#include "vdvr/expert/plan.hpp"\n', "includes vdvr/expert/plan.hpp, which is below it"),
+    ("host/field/fbp/coverage.cpp", "#include <vdvr/expert/plan.hpp>\n", "includes vdvr/expert/plan.hpp, which is below it"),
+    ("host/files/io/tiff.cpp", '#include "vdvr/expert/rates.hpp"\n', "includes vdvr/expert/rates.hpp, which is below it"),
     ("host/files/io/tiff.cpp", '#include "vdvr/nowhere.hpp"\n', "includes vdvr/nowhere.hpp, which is below it"),
-    ("include/vdvr/projections.hpp", '#include "vdvr/certificate.hpp"\n', "includes vdvr/certificate.hpp, which is below it"),
-    ("include/vdvr/grid.hpp", '#include "vdvr/rates.hpp"\n', "includes vdvr/rates.hpp, which is below it"),
+    ("include/vdvr/expert/projections.hpp", '#include "vdvr/expert/certificate.hpp"\n', "includes vdvr/expert/certificate.hpp, which is below it"),
+    ("include/vdvr/expert/grid.hpp", '#include "vdvr/expert/rates.hpp"\n', "includes vdvr/expert/rates.hpp, which is below it"),
     ("include/vdvr/homeless.hpp", "#pragma once\n", "HOMES names no room"),
-    ("include/vdvr/export.hpp", '#include "vdvr/error.hpp"\n', "includes itself, by way of vdvr/error.hpp"),
+    ("include/vdvr/api.hpp", '#include "vdvr/error.hpp"\n', "includes itself, by way of vdvr/error.hpp"),
     ("host/certify/gold/reconstruct.cpp", "\n", "has sources in several rooms"),
     ("host/field/fbp/rates.cpp", "\n", "has a home in HOMES and a source"),
-    ("host/verify/verify.cpp", '#include "vdvr/plan.hpp"\n', "verify.cpp: includes vdvr/plan.hpp, which makes"),
+    ("host/verify/verify.cpp", '#include "vdvr/expert/plan.hpp"\n', "verify.cpp: includes vdvr/expert/plan.hpp, which makes"),
     ("host/verify/verify.cpp", '#include "host/certify/foresee.hpp"\n', "includes host/certify/foresee.hpp, which makes"),
     ("host/verify/witness/verify_bounds.hpp", '#include "host/certify/bounds/six_taps.hpp"\n', "verify_bounds.hpp: includes host/certify/bounds/six_taps.hpp, which makes"),
     ("host/verify/claims/verify_terms.hpp", '#include "host/certify/crew/gold_rates.hpp"\n', "verify.cpp: includes host/certify/crew/gold_rates.hpp, which makes what verify checks, by way of host/verify/claims/verify_terms.hpp"),
     ("host/field/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
-    ("include/vdvr/grid.hpp", '#include "host/base/system/parallel.hpp"\n', "a public header includes"),
+    ("include/vdvr/expert/grid.hpp", '#include "host/base/system/parallel.hpp"\n', "a public header includes"),
     ("include/vdvr/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "no room has a source of its stem"),
     ("apps/vdvr/x.cpp", '#include "host/base/system/parallel.hpp"\n', "only include/vdvr is public"),
     ("examples/x.cpp", '#include "shared/mixed_sampler.h"\n', "only include/vdvr is public"),

@@ -6,7 +6,7 @@
 
 #include "host/scan/geometry/vectors.hpp"
 #include "tests/support/cone_files.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr::support {
 

@@ -5,7 +5,7 @@
 
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/device.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr::support {
 

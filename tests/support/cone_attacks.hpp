@@ -16,7 +16,7 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/scan/geometry/vectors.hpp"
 #include "tests/support/attack_scans.hpp"
-#include "vdvr/rates.hpp"
+#include "vdvr/expert/rates.hpp"
 
 namespace vdvr::attacks {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "host/certify/closing/open_bricks.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::support {
 

@@ -11,7 +11,7 @@
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/gold_stream.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr::attacks {
 

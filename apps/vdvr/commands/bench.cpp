@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
@@ -17,9 +17,9 @@
 #include "apps/vdvr/view.hpp"
 #include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/measure_tightness.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/measure_tightness.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::cli {
 namespace {

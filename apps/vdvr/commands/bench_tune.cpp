@@ -7,7 +7,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/tune.hpp"
+#include "vdvr/expert/tune.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -1,13 +1,13 @@
 // vdvr build: the certified volume.
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/output.hpp"
 
 namespace vdvr::cli {

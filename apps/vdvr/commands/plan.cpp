@@ -1,6 +1,6 @@
 // vdvr plan: bounds, rates, shares, storage, memory and time foreseen, and pictures of what interpolation
 // does to the scan's frequencies; builds nothing.
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 #include <fmt/format.h>
 
@@ -9,13 +9,13 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/noise_words.hpp"
-#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_forecast.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/plan_pictures.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/plan_pictures.hpp"
 
 namespace vdvr::cli {
 namespace {

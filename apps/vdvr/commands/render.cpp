@@ -5,7 +5,7 @@
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
@@ -14,12 +14,12 @@
 #include "apps/vdvr/sampler_json.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "vdvr/animation.hpp"
+#include "vdvr/expert/animation.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/volume_file.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/volume_file.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

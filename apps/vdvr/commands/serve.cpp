@@ -9,10 +9,10 @@
 #include "apps/vdvr/serve/server.hpp"
 #include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_json.hpp"
-#include "vdvr/live_renderer.hpp"
-#include "vdvr/stop.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/live_json.hpp"
+#include "vdvr/expert/live_renderer.hpp"
+#include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

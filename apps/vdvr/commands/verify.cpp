@@ -10,7 +10,7 @@
 #include "apps/vdvr/verification.hpp"
 #include "apps/vdvr/verify_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr::cli {
 

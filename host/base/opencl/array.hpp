@@ -14,7 +14,7 @@
 
 #include "host/base/opencl/state.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/scratch.hpp"
+#include "vdvr/expert/scratch.hpp"
 
 namespace vdvr::opencl {
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "host/base/opencl/array.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::opencl {
 

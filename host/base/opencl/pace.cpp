@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "host/base/opencl/state.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::opencl {
 namespace {

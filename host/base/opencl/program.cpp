@@ -14,7 +14,7 @@
 #include "host/base/opencl/embedded.hpp"
 #include "host/base/opencl/state.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::opencl {
 namespace {

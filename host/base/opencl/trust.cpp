@@ -17,7 +17,7 @@
 #include "host/base/opencl/trust_checks.hpp"
 #include "host/base/system/cache_files.hpp"
 #include "shared/trust.h"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr::opencl {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "host/base/opencl/state.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::opencl {
 

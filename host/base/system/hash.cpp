@@ -1,5 +1,5 @@
 // SHA-256 over OpenSSL's EVP interface.
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>

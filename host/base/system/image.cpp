@@ -1,5 +1,5 @@
 // Pictures as PNG and values as NumPy files.
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "host/base/system/png.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 

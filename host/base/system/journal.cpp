@@ -1,7 +1,7 @@
 // Journal files: 8 bytes of magic, then records {uint32 crc, uint64 length, payload}, the first of which is
 // the head as JSON. Each crc continues the one before, so a record counts only behind those it was written
 // behind.
-#include "vdvr/journal.hpp"
+#include "vdvr/expert/journal.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -19,7 +19,7 @@
 #include <span>
 
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // Whole-or-nothing output files.
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::io {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

@@ -1,4 +1,4 @@
-#include "vdvr/sample_array.hpp"
+#include "vdvr/expert/sample_array.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -1,6 +1,6 @@
 // Scratch files: unlinked as soon as they are open, mapped shared, their pages let go when too many are
 // resident. See scratch.hpp.
-#include "vdvr/scratch.hpp"
+#include "vdvr/expert/scratch.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

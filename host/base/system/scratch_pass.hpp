@@ -1,6 +1,6 @@
 // A pass over arrays in scratch that reads or writes faster than the keeper of scratch looks
-// (vdvr/scratch.hpp): it lets go of them by itself, so that what is resident does not depend on who gets a
-// core.
+// (vdvr/expert/scratch.hpp): it lets go of them by itself, so that what is resident does not depend on who
+// gets a core.
 #pragma once
 
 #include <sys/mman.h>
@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/sample_array.hpp"
+#include "vdvr/expert/sample_array.hpp"
 
 namespace vdvr {
 

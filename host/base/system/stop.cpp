@@ -1,4 +1,4 @@
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 #include <atomic>
 

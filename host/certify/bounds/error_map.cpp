@@ -1,7 +1,7 @@
 // Bounds of the interpolation error of a plane wave, and the launcher of kernels/certify/bounds/error_map.cl.
 // The theorems are in docs/error-bounds.md, section 3: with r_j = |chord| / |arc| and phi_j its phase, R =
 // prod r_j, C = prod cos(kappa_j / 2), the worst error is max |1 - R exp(i sum phi_j)|.
-#include "vdvr/error_map.hpp"
+#include "vdvr/expert/error_map.hpp"
 
 #include <fmt/format.h>
 

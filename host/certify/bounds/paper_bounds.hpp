@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "host/field/fbp/filter_projections.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

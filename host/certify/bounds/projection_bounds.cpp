@@ -24,7 +24,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_map.hpp"
+#include "vdvr/expert/error_map.hpp"
 
 namespace vdvr {
 namespace {

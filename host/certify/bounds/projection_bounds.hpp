@@ -8,8 +8,8 @@
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fdk/view_derivatives.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

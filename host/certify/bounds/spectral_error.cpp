@@ -1,4 +1,4 @@
-#include "vdvr/spectral_error.hpp"
+#include "vdvr/expert/spectral_error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -51,10 +51,10 @@ void copy_tile(const StoredTile& from, std::size_t size, SampleBlock& to, std::s
 
 }  // namespace
 
-CloseBoundaries::CloseBoundaries(const OpenBricks& b, Closing closing, Room room)
+CloseBoundaries::CloseBoundaries(const OpenBricks& b, Closing closing, MemoryBudget budget)
     : open_(b),
       closing_(closing),
-      room_(std::move(room)),
+      budget_(std::move(budget)),
       stored_{b, b.level, {}, base_limits(b.base, b.lattice)},
       rim_(b.level.size(), 0) {
   if (closing == Closing::none) return;
@@ -125,7 +125,7 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
       bytes +=
           bytes_of[static_cast<std::size_t>(type_[i])] * static_cast<std::uint64_t>(v.tile_size(v.level[i]));
     }
-  const std::shared_ptr<Scratch> scratch = room_.for_bytes(bytes);
+  const std::shared_ptr<Scratch> scratch = budget_.for_bytes(bytes);
   for (auto& [triple, of_type] : counts) {
     TileKind kind(triple);
     std::uint32_t next = 0;

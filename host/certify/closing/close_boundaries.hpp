@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "host/certify/closing/open_bricks.hpp"
-#include "vdvr/comparison.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/scratch.hpp"
+#include "vdvr/expert/comparison.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/scratch.hpp"
 
 namespace vdvr {
 
@@ -34,7 +34,7 @@ MixedVolume close_boundaries(const OpenBricks& bricks, Closing closing = Closing
 class CloseBoundaries {
  public:
   /// `bricks` is referred to. `room`: for the tiles of a volume.
-  CloseBoundaries(const OpenBricks& bricks, Closing closing, Room room = {});
+  CloseBoundaries(const OpenBricks& bricks, Closing closing, MemoryBudget budget = {});
 
   MixedVolume first();
   /// `before`: what the last call gave. `moved`: bricks whose level or samples changed since.
@@ -64,7 +64,7 @@ class CloseBoundaries {
 
   const OpenBricks& open_;
   Closing closing_;
-  Room room_;
+  MemoryBudget budget_;
   StoredAs stored_;
   std::vector<SampleType> type_;  // by brick; of those that have tiles
   std::vector<std::int8_t> shift_;

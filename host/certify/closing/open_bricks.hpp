@@ -10,7 +10,7 @@
 
 #include "host/certify/closing/tile_store.hpp"
 #include "host/volume/quantise.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

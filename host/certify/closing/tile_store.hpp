@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "host/base/system/scratch_pass.hpp"
-#include "vdvr/sample_array.hpp"
+#include "vdvr/expert/sample_array.hpp"
 
 namespace vdvr {
 
@@ -18,7 +18,7 @@ namespace vdvr {
 class TileStore {
  public:
   TileStore() = default;
-  explicit TileStore(Room room) : room_(std::move(room)) {}
+  explicit TileStore(MemoryBudget budget) : budget_(std::move(budget)) {}
 
   void resize(std::size_t bricks) { places_.resize(bricks); }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
@@ -75,7 +75,7 @@ class TileStore {
     if (parts_.empty() || parts_.back().size() - used_ < n) {
       const std::size_t size = std::max(n, std::clamp(bytes_ / sizeof(float), smallest, largest));
       const std::uint64_t more = sizeof(float) * size;
-      parts_.emplace_back(size, room_.for_bytes(bytes_ + more), "the tiles before closing");
+      parts_.emplace_back(size, budget_.for_bytes(bytes_ + more), "the tiles before closing");
       bytes_ += more;
       if (!parts_.back().scratch()) memory_bytes_ += more;
       used_ = 0;
@@ -84,7 +84,7 @@ class TileStore {
             static_cast<std::uint32_t>(std::exchange(used_, used_ + n)), static_cast<std::uint32_t>(n)};
   }
 
-  Room room_;
+  MemoryBudget budget_;
   std::vector<Samples<float>> parts_;
   std::vector<Place> places_;
   std::size_t used_ = 0;  // of the last part

@@ -14,7 +14,7 @@
 #include "host/certify/crew/crew_worker.hpp"
 #include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 namespace {
@@ -290,9 +290,9 @@ Crew::~Crew() {
 std::uint64_t Crew::bytes() const { return state_->traffic.bytes; }
 double Crew::message_seconds() const { return state_->traffic.seconds; }
 
-void Crew::use(const MixedVolume& volume, const Room& room) {
+void Crew::use(const MixedVolume& volume, const MemoryBudget& budget) {
   for (State::Member& m : state_->members)
-    if (!m.lost) m.worker->use(volume, room);
+    if (!m.lost) m.worker->use(volume, budget);
   // No pass need follow before the caller changes it.
   for (State::Member& m : state_->members)
     if (!m.worker->is_remote()) m.worker->halt();

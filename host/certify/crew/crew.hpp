@@ -15,9 +15,9 @@
 
 #include "host/certify/crew/block_pass.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "vdvr/crew.hpp"
+#include "vdvr/expert/crew.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr {
 
@@ -57,7 +57,7 @@ class CrewWorker {
   CrewWorker& operator=(const CrewWorker&) = delete;
   virtual ~CrewWorker() = default;
   /// The field that passes measure from here on. `volume` stays until halt() or the next pass has ended.
-  virtual void use(const MixedVolume& volume, const Room& room) = 0;
+  virtual void use(const MixedVolume& volume, const MemoryBudget& budget) = 0;
   /// Records of `remainder`.
   virtual void learn(const Records& records) = 0;
   virtual void begin(std::uint64_t number, SharedPass pass) = 0;
@@ -79,7 +79,7 @@ class Crew {
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
 
-  void use(const MixedVolume& volume, const Room& room);
+  void use(const MixedVolume& volume, const MemoryBudget& budget);
   void run(GoldStream& gold, const SharedPass& pass, const DeviceField* field, Works works,
            const OnRecord& on_record, const Progress& progress, const std::string& stage);
 

@@ -66,9 +66,9 @@ GoldStream& CrewMember::stream() {
 
 double CrewMember::arithmetic() { return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic(); }
 
-void CrewMember::use(const MixedVolume& volume, const Room& room) {
+void CrewMember::use(const MixedVolume& volume, const MemoryBudget& budget) {
   field_.reset();
-  field_.emplace(state_, volume, room.for_bytes(sample_buffer_bytes(volume)));
+  field_.emplace(state_, volume, budget.for_bytes(sample_buffer_bytes(volume)));
 }
 
 void CrewMember::begin(std::shared_ptr<const BlockPass> pass, const Progress& progress) {

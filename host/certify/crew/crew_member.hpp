@@ -7,7 +7,7 @@
 
 #include "host/certify/crew/block_pass.hpp"
 #include "host/certify/crew/gold_rates.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 
@@ -19,7 +19,7 @@ class CrewMember {
              const GoldSettings& settings)
       : state_(state), scan_(scan), sups_(sups), settings_(settings) {}
 
-  void use(const MixedVolume& volume, const Room& room);
+  void use(const MixedVolume& volume, const MemoryBudget& budget);
   /// Keeps the gold that the pass reads.
   void begin(std::shared_ptr<const BlockPass> pass, const Progress& progress);
   void compute(std::span<const GoldStream::Work> works, const std::function<void(Bytes)>& on_record,

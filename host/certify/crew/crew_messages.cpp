@@ -125,11 +125,11 @@ void put_shape(ByteWriter& out, const SampleBlock& block) {
   out.put(block.offset);
   out.put(block.shift);
 }
-SampleBlock get_block(ByteReader& in, const Room& room) {
+SampleBlock get_block(ByteReader& in, const MemoryBudget& budget) {
   SampleBlock block;
   block.type = static_cast<SampleType>(in.get<std::uint8_t>());
   const auto n = in.get<std::uint64_t>();
-  const auto scratch = room.for_bytes(n * block.sample_bytes());
+  const auto scratch = budget.for_bytes(n * block.sample_bytes());
   if (block.type == SampleType::f32) block.f32 = {n, scratch, "a field to measure"};
   else if (block.type == SampleType::u16) block.u16 = {n, scratch, "a field to measure"};
   else block.u8 = {n, scratch, "a field to measure"};
@@ -293,7 +293,7 @@ void put_shape(ByteWriter& out, const MixedVolume& v) {
   }
 }
 
-MixedVolume get_shape(ByteReader& in, const Room& room) {
+MixedVolume get_shape(ByteReader& in, const MemoryBudget& budget) {
   MixedVolume v;
   v.grid = get_grid(in);
   v.granularity = in.get<int>();
@@ -302,12 +302,12 @@ MixedVolume get_shape(ByteReader& in, const Room& room) {
   v.level = in.get_vector<LevelTriple>();
   v.tile = in.get_vector<std::uint32_t>();
   v.step = in.get<double>();
-  v.base = get_block(in, room);
+  v.base = get_block(in, budget);
   const auto kinds = in.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < kinds; ++i) {
     const auto level = in.get<LevelTriple>();
     const auto part = in.get<std::uint8_t>();
-    v.tiles.emplace(TileKind(level, part), get_block(in, room));
+    v.tiles.emplace(TileKind(level, part), get_block(in, budget));
   }
   return v;
 }

@@ -59,7 +59,7 @@ Works get_works(ByteReader& in);
 
 /// A volume without its samples, and where these lie.
 void put_shape(ByteWriter& out, const MixedVolume& volume);
-MixedVolume get_shape(ByteReader& in, const Room& room);
+MixedVolume get_shape(ByteReader& in, const MemoryBudget& budget);
 /// All of them in one order.
 std::vector<std::span<const std::byte>> samples_of(const MixedVolume& volume);
 std::vector<std::span<std::byte>> samples_to(MixedVolume& volume);

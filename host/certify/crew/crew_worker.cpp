@@ -70,8 +70,8 @@ void ThreadWorker::work() {
   }
 }
 
-void ThreadWorker::use(const MixedVolume& volume, const Room& room) {
-  enqueue({true, [this, &volume, room] { device_.use(volume, room); }});
+void ThreadWorker::use(const MixedVolume& volume, const MemoryBudget& budget) {
+  enqueue({true, [this, &volume, budget] { device_.use(volume, budget); }});
 }
 
 void ThreadWorker::learn(const Records& records) {
@@ -119,7 +119,7 @@ void RemoteWorker::send(Bytes message) {
   traffic_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void RemoteWorker::use(const MixedVolume& volume, const Room&) {
+void RemoteWorker::use(const MixedVolume& volume, const MemoryBudget&) {
   ByteWriter shape;
   put(shape, CrewWord::field);
   put_shape(shape, volume);

@@ -27,7 +27,7 @@ class CrewDevice {
   CrewDevice(const CrewDevice&) = delete;
   CrewDevice& operator=(const CrewDevice&) = delete;
   virtual ~CrewDevice() = default;
-  virtual void use(const MixedVolume& volume, const Room& room) = 0;
+  virtual void use(const MixedVolume& volume, const MemoryBudget& budget) = 0;
   virtual void begin(const SharedPass& pass, const Progress& progress) = 0;
   virtual void learn(const std::vector<Bytes>& records) = 0;
   virtual void compute(const Works& works, const std::function<void(Bytes)>& on_record,
@@ -39,7 +39,7 @@ class OtherDevice final : public CrewDevice {
  public:
   OtherDevice(opencl::State& state, const PreparedScan& from, const GoldSettings& settings)
       : member_(state, from.filtered, from.sups, settings) {}
-  void use(const MixedVolume& volume, const Room& room) override { member_.use(volume, room); }
+  void use(const MixedVolume& volume, const MemoryBudget& budget) override { member_.use(volume, budget); }
   void begin(const SharedPass& pass, const Progress& progress) override { member_.begin(pass, progress); }
   void compute(const Works& works, const std::function<void(Bytes)>& on_record,
                const Progress& progress) override {
@@ -62,7 +62,7 @@ class LeadersDevice final : public CrewDevice {
     gold_ = &gold;
     field_ = field;
   }
-  void use(const MixedVolume&, const Room&) override {}
+  void use(const MixedVolume&, const MemoryBudget&) override {}
   void learn(const std::vector<Bytes>&) override {}
   void begin(const SharedPass& pass, const Progress& progress) override;
   void compute(const Works& works, const std::function<void(Bytes)>& on_record,
@@ -81,7 +81,7 @@ class ThreadWorker final : public CrewWorker {
   /// `inbox` and `device` are referred to.
   ThreadWorker(CrewInbox& inbox, std::size_t index, CrewDevice& device);
   ~ThreadWorker() override;
-  void use(const MixedVolume& volume, const Room& room) override;
+  void use(const MixedVolume& volume, const MemoryBudget& budget) override;
   void learn(const Records& records) override;
   void begin(std::uint64_t number, SharedPass pass) override;
   void give(std::uint64_t number, std::size_t piece, const Works& works) override;
@@ -112,7 +112,7 @@ class RemoteWorker final : public CrewWorker {
  public:
   RemoteWorker(Messenger& messenger, int process, CrewTraffic& traffic)
       : messenger_(messenger), process_(process), traffic_(traffic) {}
-  void use(const MixedVolume& volume, const Room& room) override;
+  void use(const MixedVolume& volume, const MemoryBudget& budget) override;
   void learn(const Records& records) override;
   void begin(std::uint64_t number, SharedPass pass) override;
   void give(std::uint64_t number, std::size_t piece, const Works& works) override;

@@ -13,7 +13,7 @@
 #include "host/certify/crew/block_pass.hpp"
 #include "host/certify/crew/crew.hpp"
 #include "host/certify/crew/gold_rates.hpp"
-#include "vdvr/journal.hpp"
+#include "vdvr/expert/journal.hpp"
 
 namespace vdvr {
 

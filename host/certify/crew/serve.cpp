@@ -9,9 +9,9 @@
 
 #include "host/certify/crew/crew_member.hpp"
 #include "host/certify/crew/crew_messages.hpp"
-#include "vdvr/crew.hpp"
+#include "vdvr/expert/crew.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 namespace {
@@ -186,19 +186,19 @@ class Server {
     if (common != 0)
       member_->share_gold([this, common](std::uint64_t size) { return messenger_.common(common, size); });
     const std::uint64_t share = std::max<std::uint64_t>(device_->state().memory.limit() / 8, least_share);
-    room_ = {std::make_shared<Scratch>(
-                 scratch_folder_.empty() ? default_scratch_folder() : std::filesystem::path(scratch_folder_),
-                 share),
-             share};
+    budget_ = {std::make_shared<Scratch>(scratch_folder_.empty() ? default_scratch_folder()
+                                                                 : std::filesystem::path(scratch_folder_),
+                                         share),
+               share};
     if (mixed) say(CrewWord::ready, member_->arithmetic());
   }
 
   void take_field(ByteReader& in) {
-    field_ = get_shape(in, room_);
+    field_ = get_shape(in, budget_);
     parts_ = samples_to(field_);
     part_ = 0;
     while (part_ < parts_.size() && parts_[part_].empty()) ++part_;
-    if (part_ == parts_.size()) member_->use(field_, room_);
+    if (part_ == parts_.size()) member_->use(field_, budget_);
   }
 
   void take_part(ByteReader& in) {
@@ -209,7 +209,7 @@ class Server {
     parts_[part_] = parts_[part_].subspan(bytes.size());
     while (part_ < parts_.size() && parts_[part_].empty()) ++part_;
     if (part_ < parts_.size()) return;
-    member_->use(field_, room_);
+    member_->use(field_, budget_);
     parts_.clear();
     part_ = 0;
     field_ = {};  // it lies on the device
@@ -259,7 +259,7 @@ class Server {
   FilteredScan scan_;
   FieldSups sups_;
   std::optional<CrewMember> member_;
-  Room room_;
+  MemoryBudget budget_;
   MixedVolume field_;
   std::vector<std::span<std::byte>> parts_;
   std::size_t part_ = 0;

@@ -8,7 +8,7 @@
 #include "host/base/opencl/work_groups.hpp"
 #include "shared/gold_shape.h"
 #include "shared/lattice_shape.h"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

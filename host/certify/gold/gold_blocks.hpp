@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

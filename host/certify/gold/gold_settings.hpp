@@ -8,7 +8,7 @@
 
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/quantise.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

@@ -28,8 +28,8 @@
 #include "host/volume/sampler/device_field.hpp"
 #include "shared/gold_shape.h"
 #include "shared/untested.h"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

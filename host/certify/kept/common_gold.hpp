@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/common_memory.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/common_memory.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

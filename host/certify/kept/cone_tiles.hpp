@@ -18,8 +18,8 @@
 #include "host/certify/kept/projective_error.hpp"
 #include "shared/cone_nodes.h"
 #include "vdvr/error.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

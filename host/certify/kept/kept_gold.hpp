@@ -19,9 +19,9 @@
 #include "host/certify/kept/gold_filters.hpp"
 #include "host/certify/kept/interpolate_gold.hpp"
 #include "host/base/opencl/host_memory.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/rates.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/rates.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/field/fbp/filter_projections.hpp"
-#include "vdvr/rates.hpp"
+#include "vdvr/expert/rates.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // Cosine analysis axis by axis: planes first (x, then y), then bundles of lines along z.
-#include "vdvr/cosine_spectrum.hpp"
+#include "vdvr/expert/cosine_spectrum.hpp"
 
 #include <algorithm>
 

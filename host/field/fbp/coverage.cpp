@@ -11,7 +11,7 @@
 #include "host/field/fbp/view_weights.hpp"
 #include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

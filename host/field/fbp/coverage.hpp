@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/cone_geometry.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -15,9 +15,9 @@
 #include "host/base/opencl/array.hpp"
 #include "host/base/opencl/column_tuning.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/field_options.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/field_options.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -11,8 +11,8 @@
 #include "host/base/opencl/array.hpp"
 #include "host/base/opencl/fft.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/field_options.hpp"
+#include "vdvr/expert/field_options.hpp"
 
 namespace vdvr {
 

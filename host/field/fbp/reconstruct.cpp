@@ -1,5 +1,5 @@
 // Uniform FBP in slabs of rows and blocks of columns.
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 #include <fmt/format.h>
 

@@ -6,9 +6,9 @@
 
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fbp/whole_volume.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // Measures candidates of ColumnTuning. Calls back_project.cpp and filter_rows.cpp.
-#include "vdvr/tune.hpp"
+#include "vdvr/expert/tune.hpp"
 
 #include <fmt/format.h>
 

@@ -13,7 +13,7 @@
 
 #include "host/base/opencl/kernel.hpp"
 #include "host/base/system/huge_pages.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/base/opencl/column_tuning.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {
 

@@ -1,6 +1,6 @@
 // F by its definition: direct sums in double precision over host threads (docs/geometry.md). Shares nothing
 // with the device path but the angular weights and the ramp kernel.
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fbp/view_weights.hpp"
 #include "host/base/system/parallel.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

@@ -8,7 +8,7 @@
 #include "host/field/fbp/whole_volume.hpp"
 #include "host/base/opencl/state.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -10,7 +10,7 @@
 #include "host/base/opencl/host_memory.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

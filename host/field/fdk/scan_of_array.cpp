@@ -1,4 +1,4 @@
-#include "vdvr/scan_of_array.hpp"
+#include "vdvr/expert/scan_of_array.hpp"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "vdvr/error.hpp"
-#include "vdvr/find_center.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/find_center.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {
 

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -1,7 +1,7 @@
-// Variance of F (the equation at the head of vdvr/noise.hpp). Parallel beam: rows of v filtered by g^2 at two
-// columns to a pixel, kernels/field/fbp/back_project.cl with squared view weights. Cone beam: v times the
-// squares of what samples weigh, filtered alike at the pixels, kernels/field/fdk/cone_back_project.cl with
-// lambda^-4.
+// Variance of F (the equation at the head of vdvr/expert/noise.hpp). Parallel beam: rows of v filtered by g^2
+// at two columns to a pixel, kernels/field/fbp/back_project.cl with squared view weights. Cone beam: v times
+// the squares of what samples weigh, filtered alike at the pixels, kernels/field/fdk/cone_back_project.cl
+// with lambda^-4.
 //
 // By Parseval sum_i g(t - i)^2 is the same at every t, so that linear interpolation between half columns
 // leaves means as they are. Between rows S_v^2

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "host/base/opencl/state.hpp"
-#include "vdvr/field_options.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/line_noise.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/field_options.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/line_noise.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

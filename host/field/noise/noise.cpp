@@ -1,5 +1,5 @@
-// The noise of a scan and of F; see vdvr/noise.hpp.
-#include "vdvr/noise.hpp"
+// The noise of a scan and of F; see vdvr/expert/noise.hpp.
+#include "vdvr/expert/noise.hpp"
 
 #include <fmt/format.h>
 

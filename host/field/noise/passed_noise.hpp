@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "vdvr/line_noise.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/line_noise.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -1,11 +1,11 @@
-// The noise of a scan in files; see vdvr/noise.hpp.
+// The noise of a scan in files; see vdvr/expert/noise.hpp.
 #include <fmt/format.h>
 
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "host/base/system/casts.hpp"
-#include "vdvr/noise.hpp"
+#include "vdvr/expert/noise.hpp"
 
 namespace vdvr {
 

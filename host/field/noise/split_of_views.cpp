@@ -10,8 +10,8 @@
 #include "host/field/noise/estimate_photons.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

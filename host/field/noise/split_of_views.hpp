@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

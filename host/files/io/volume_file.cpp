@@ -1,6 +1,6 @@
 // Uniform volumes as MetaImage or NRRD: any scalar type in, float32 out; volume_stack.cpp reads the rest.
 // Layout float samples[z][y][x], x fastest.
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include "host/files/io/volume_stack.hpp"
 #include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

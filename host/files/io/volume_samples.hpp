@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr::io {
 

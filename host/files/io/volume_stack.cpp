@@ -11,7 +11,7 @@
 #include "host/files/io/tiff.hpp"
 #include "host/files/io/volume_samples.hpp"
 #include "host/base/system/limits.hpp"
-#include "host/base/system/rehearsal.hpp"
+#include "host/base/system/read_in_child.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -169,8 +169,8 @@ bool is_tiff_folder(const fs::path& path) {
 }
 
 Volume read_hdf5_volume(const fs::path& path, const std::string& dataset, const VolumeLimits& limits) {
-  io::rehearse(path, limits.max_memory_bytes,
-               [&] { static_cast<void>(read_hdf5_dataset(path, dataset, limits)); });
+  io::read_in_child(path, limits.max_memory_bytes,
+                    [&] { static_cast<void>(read_hdf5_dataset(path, dataset, limits)); });
   return read_hdf5_dataset(path, dataset, limits);
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // Pointer, wheel and keys.
-#include "vdvr/live_events.hpp"
+#include "vdvr/expert/live_events.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Requests of viewers, read strictly: what a stranger sends is refused by name or does what an event may do.
-#include "vdvr/live_json.hpp"
+#include "vdvr/expert/live_json.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // Frames of views.
-#include "vdvr/live_renderer.hpp"
+#include "vdvr/expert/live_renderer.hpp"
 
 #include <fmt/format.h>
 
@@ -9,11 +9,11 @@
 #include <cmath>
 
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/live_events.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/live_events.hpp"
 #include "vdvr/raycast.hpp"
-#include "vdvr/resident_volume.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/resident_volume.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // A volume's facts for viewers, and the options of a view.
-#include "vdvr/live_view.hpp"
+#include "vdvr/expert/live_view.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

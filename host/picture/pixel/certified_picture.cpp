@@ -8,12 +8,12 @@
 
 #include "host/picture/pixel/picture_json.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/safe_sampler.hpp"
-#include "vdvr/stop.hpp"
-#include "vdvr/surface_picture.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
+#include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/surface_picture.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace fs = std::filesystem;
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -6,10 +6,10 @@
 
 #include "host/base/system/outward.hpp"
 #include "shared/raycast_params.h"
-#include "vdvr/certified_points.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certified_points.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 namespace {

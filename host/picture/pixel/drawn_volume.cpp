@@ -1,10 +1,10 @@
-#include "vdvr/drawn_volume.hpp"
+#include "vdvr/expert/drawn_volume.hpp"
 
 #include <fmt/format.h>
 
 #include "vdvr/error.hpp"
-#include "vdvr/render_crew.hpp"
-#include "vdvr/resident_volume.hpp"
+#include "vdvr/expert/render_crew.hpp"
+#include "vdvr/expert/resident_volume.hpp"
 
 namespace vdvr {
 namespace {

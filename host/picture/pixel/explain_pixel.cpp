@@ -4,7 +4,7 @@
 #include <map>
 
 #include "host/picture/pixel/pixel_ray.hpp"
-#include "vdvr/explain_pixel.hpp"
+#include "vdvr/expert/explain_pixel.hpp"
 
 namespace vdvr {
 namespace {

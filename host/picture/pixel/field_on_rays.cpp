@@ -6,8 +6,8 @@
 #include <functional>
 #include <random>
 
-#include "vdvr/exact_field.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 namespace {

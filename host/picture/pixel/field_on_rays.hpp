@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/field_options.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/field_options.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -4,7 +4,7 @@
 
 #include "host/picture/pixel/pixel_ray.hpp"
 #include "host/picture/rays/light_range.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr {
 namespace {

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vdvr/certified_rays.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -11,7 +11,7 @@
 #include "host/picture/render/check_render_options.hpp"
 #include "host/base/system/outward.hpp"
 #include "host/base/system/parallel.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "host/picture/pixel/pixel_ray.hpp"
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/surface_picture.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/surface_picture.hpp"
 
 namespace vdvr {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/decorate.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/decorate.hpp"
 
 namespace vdvr {
 namespace {

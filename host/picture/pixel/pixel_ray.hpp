@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {

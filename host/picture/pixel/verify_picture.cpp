@@ -6,10 +6,10 @@
 #include "host/picture/pixel/field_on_rays.hpp"
 #include "host/picture/pixel/picture_json.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/safe_sampler.hpp"
-#include "vdvr/stop.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
+#include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace vdvr {

@@ -1,4 +1,4 @@
-#include "vdvr/certified_rays.hpp"
+#include "vdvr/expert/certified_rays.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "host/base/system/outward.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noted_scan.hpp"
+#include "vdvr/expert/noted_scan.hpp"
 
 namespace vdvr {
 namespace {

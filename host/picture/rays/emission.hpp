@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "host/picture/rays/ray_walk.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 

@@ -13,9 +13,9 @@
 
 #include "host/field/fbp/coverage.hpp"
 #include "host/volume/brick_layout.hpp"
-#include "vdvr/camera.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/camera.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "host/certify/gold/gold_batch.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

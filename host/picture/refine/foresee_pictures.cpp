@@ -14,7 +14,7 @@
 #include "host/picture/refine/brick_outlook.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // Volumes of a build, round by round, and what the certificate says of them.
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -7,7 +7,7 @@
 
 #include "host/picture/rays/ray_walk.hpp"
 #include "host/picture/refine/spend.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr {
 

@@ -8,8 +8,8 @@
 
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr {
 namespace {

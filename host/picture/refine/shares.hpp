@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "host/picture/rays/ray_walk.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr {
 

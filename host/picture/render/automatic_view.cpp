@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "vdvr/error.hpp"
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/base/opencl/cl.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 

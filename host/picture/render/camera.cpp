@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "host/picture/render/glm_vectors.hpp"
-#include "vdvr/camera.hpp"
+#include "vdvr/expert/camera.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

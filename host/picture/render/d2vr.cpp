@@ -17,7 +17,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -7,7 +7,7 @@
 #include "host/base/opencl/array.hpp"
 #include "host/picture/render/raycast.hpp"
 #include "shared/d2vr_params.h"
-#include "vdvr/d2vr.hpp"
+#include "vdvr/expert/d2vr.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // Finds what a picture shows in blocks of samples, and the orbit that has all of it in the picture.
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -1,6 +1,6 @@
 // Several devices, or one whose volume comes by bricks: bands of rows go to whoever is free. Calls
 // enqueue_frame() of raycast.cpp and paged_frame.cpp.
-#include "vdvr/render_crew.hpp"
+#include "vdvr/expert/render_crew.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -14,7 +14,7 @@
 #include "host/picture/render/check_render_options.hpp"
 #include "host/picture/render/raycast.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "host/picture/render/colour_space.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 

@@ -10,7 +10,7 @@
 
 #include "host/picture/render/transfer_curve.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 namespace {

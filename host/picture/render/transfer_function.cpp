@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "vdvr/error.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 namespace {

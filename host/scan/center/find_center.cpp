@@ -1,5 +1,5 @@
 // The centre by every method that applies, and how sure they make it.
-#include "vdvr/find_center.hpp"
+#include "vdvr/expert/find_center.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "vdvr/find_center.hpp"
+#include "vdvr/expert/find_center.hpp"
 
 namespace vdvr::center {
 

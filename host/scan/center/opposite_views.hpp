@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "vdvr/find_center.hpp"
+#include "vdvr/expert/find_center.hpp"
 
 namespace vdvr::center {
 

@@ -1,6 +1,6 @@
 // Matrices of cone-beam views: what they say, and how circular scans are written as them
 // (docs/geometry.md, "Cone beam").
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr::io {
 

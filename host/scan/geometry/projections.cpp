@@ -1,5 +1,5 @@
 // What a cone-beam scan has in common with a parallel one.
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -5,7 +5,7 @@
 
 #include "host/scan/geometry/cone_views.hpp"
 #include "host/files/io/raster_file.hpp"
-#include "vdvr/rtk_geometry.hpp"
+#include "vdvr/expert/rtk_geometry.hpp"
 
 namespace vdvr::io {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -3,7 +3,7 @@
 
 #include "host/base/opencl/host_fft.hpp"
 #include "host/scan/prepare/view_filters.hpp"
-#include "vdvr/preparation_steps.hpp"
+#include "vdvr/expert/preparation_steps.hpp"
 
 namespace vdvr {
 

@@ -1,4 +1,4 @@
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {

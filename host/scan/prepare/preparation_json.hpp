@@ -3,7 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "vdvr/preparation_steps.hpp"
+#include "vdvr/expert/preparation_steps.hpp"
 
 namespace vdvr {
 

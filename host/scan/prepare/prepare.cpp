@@ -11,7 +11,7 @@
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "host/scan/prepare/phase_retrieval.hpp"
 #include "host/scan/prepare/view_filters.hpp"
-#include "vdvr/preparation_steps.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/preparation_steps.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

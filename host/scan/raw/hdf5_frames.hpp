@@ -8,7 +8,7 @@
 
 #include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/scan/raw/raw_scan.hpp"
-#include "vdvr/scan_options.hpp"
+#include "vdvr/expert/scan_options.hpp"
 
 namespace vdvr::io {
 

@@ -1,4 +1,4 @@
-#include "vdvr/input_statement.hpp"
+#include "vdvr/expert/input_statement.hpp"
 
 #include <fmt/format.h>
 

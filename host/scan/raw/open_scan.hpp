@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "host/scan/raw/raw_scan.hpp"
-#include "vdvr/scan_options.hpp"
+#include "vdvr/expert/scan_options.hpp"
 
 namespace vdvr::io {
 

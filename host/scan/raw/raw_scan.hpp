@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "host/scan/geometry/cone_views.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr::io {
 

@@ -1,4 +1,4 @@
-#include "vdvr/scan_options.hpp"
+#include "vdvr/expert/scan_options.hpp"
 
 namespace vdvr {
 

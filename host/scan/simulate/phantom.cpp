@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 namespace {

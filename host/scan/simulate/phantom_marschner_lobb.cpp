@@ -14,7 +14,7 @@
 
 #include "host/scan/simulate/phantom_ray.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 namespace {

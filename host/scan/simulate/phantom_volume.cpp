@@ -19,8 +19,8 @@
 
 #include "host/scan/simulate/phantom_ray.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,7 +1,7 @@
 // Projections of a phantom: line integrals at pixel centres, or 16 per pixel low-passed at Nyquist
 // (simulate_band_limit), then the detector's recipe (simulate_detector): noise, median, Gaussian, binning.
 // Views are independent and spread over threads. float data[view][v][u].
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@
 #include "host/scan/simulate/simulate_cone.hpp"
 #include "host/scan/simulate/simulate_detector.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "host/scan/simulate/simulate_band_limit.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 #include "vdvr/read_scan.hpp"
 
 namespace vdvr {

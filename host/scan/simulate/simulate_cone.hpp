@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "vdvr/cone_geometry.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 

@@ -12,7 +12,7 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/volume/covered_range.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -7,8 +7,8 @@
 
 #include "host/verify/claims/verify_scope.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "host/verify/residual/covered_chords.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,5 @@
 // Row by row: chords, integrals of F with their errors, bounds along the chords.
-#include "vdvr/residual.hpp"
+#include "vdvr/expert/residual.hpp"
 
 #include <fmt/format.h>
 

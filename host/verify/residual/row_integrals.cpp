@@ -8,7 +8,7 @@
 
 #include "host/verify/residual/primitives.hpp"
 #include "host/base/system/parallel.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr {
 namespace {

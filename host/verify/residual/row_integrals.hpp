@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "host/verify/residual/covered_chords.hpp"
-#include "vdvr/field_options.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/field_options.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

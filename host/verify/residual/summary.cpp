@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vdvr/residual.hpp"
+#include "vdvr/expert/residual.hpp"
 
 namespace vdvr {
 namespace {

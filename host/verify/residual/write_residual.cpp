@@ -6,9 +6,9 @@
 
 #include "host/files/hdf5/hdf5_writer.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/residual.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/residual.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "host/verify/witness/verify_lagrange.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -7,7 +7,7 @@
 
 #include "host/verify/witness/verify_bounds.hpp"
 #include "host/verify/witness/verify_cone_nodes.hpp"
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {
 

@@ -15,7 +15,7 @@
 #include "host/verify/witness/verify_cosines.hpp"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
-#include "vdvr/cone_geometry.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

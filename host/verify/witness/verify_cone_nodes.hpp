@@ -9,8 +9,8 @@
 
 #include "host/field/fbp/coverage.hpp"
 #include "host/base/opencl/array.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

@@ -12,8 +12,8 @@
 #include "host/verify/witness/verify_bounds.hpp"
 #include "host/verify/witness/verify_cone_nodes.hpp"
 #include "shared/verify_nodes.h"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

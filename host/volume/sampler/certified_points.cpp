@@ -1,4 +1,4 @@
-#include "vdvr/certified_points.hpp"
+#include "vdvr/expert/certified_points.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noted_scan.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/noted_scan.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

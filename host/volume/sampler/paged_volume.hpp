@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/volume/sampler/resident_volume.hpp"
-#include "vdvr/paged_volume.hpp"
+#include "vdvr/expert/paged_volume.hpp"
 
 namespace vdvr {
 

@@ -13,7 +13,7 @@
 #include <numeric>
 
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 namespace {

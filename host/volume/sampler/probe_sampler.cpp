@@ -16,7 +16,7 @@
 
 #include "host/base/opencl/kernel.hpp"
 #include "host/volume/sampler/corner_weights.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr {
 namespace {

@@ -20,7 +20,7 @@
 
 #include "host/volume/sampler/device_field.hpp"
 #include "host/volume/sampler/lit_samples.hpp"
-#include "vdvr/resident_volume.hpp"
+#include "vdvr/expert/resident_volume.hpp"
 
 namespace vdvr {
 

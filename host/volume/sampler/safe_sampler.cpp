@@ -1,4 +1,4 @@
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 #include <fmt/format.h>
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
-#include "vdvr/certified_points.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/certified_points.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

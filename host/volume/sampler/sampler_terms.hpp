@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "host/volume/choose_lattice.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr {
 
