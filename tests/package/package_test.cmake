@@ -82,6 +82,14 @@ foreach(name IN ITEMS volume error)
     message(FATAL_ERROR "${name}.png has ${bytes} bytes")
   endif()
 endforeach()
+# The page shows the example as it is.
+file(READ "${SOURCE}/docs/library.md" page)
+file(READ "${SOURCE}/examples/certify_picture.cpp" example)
+string(FIND "${page}" "${example}" shown)
+if(shown EQUAL -1)
+  message(FATAL_ERROR "docs/library.md does not show examples/certify_picture.cpp")
+endif()
+
 # Certified pictures: those of the command line, to the byte.
 file(MAKE_DIRECTORY "${work}/program")
 run(0 "${work}/found/certify_picture" "${work}/example.vdvr" "${work}/scan.h5" "${work}/pictures/certified.png")
