@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/scan_noise.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/noise_forecast.hpp"

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "apps/common/common_options.hpp"
-#include "apps/vdvr/expert/scan_options.hpp"
+#include "apps/vdvr/scan_options.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/plan.hpp"

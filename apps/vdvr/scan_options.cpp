@@ -1,4 +1,4 @@
-#include "apps/vdvr/expert/scan_options.hpp"
+#include "apps/vdvr/scan_options.hpp"
 
 #include <fmt/format.h>
 

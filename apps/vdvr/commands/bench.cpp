@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
