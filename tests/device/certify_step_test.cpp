@@ -26,7 +26,7 @@ constexpr double u = tolerance::unit_roundoff;
 cl::Program build_steps(int lanes, bool joint) {
   std::ifstream file(VDVR_SOURCE_DIR "/tests/device/certify_step.cl");
   std::ostringstream text;
-  text << opencl::resolve_source("pixel/pixel_bounds.cl") << file.rdbuf();
+  text << opencl::resolve_source("picture/pixel/pixel_bounds.cl") << file.rdbuf();
   const ResidentVolume any(
       device(), as_mixed(fields::uniform(fields::centred_grid({4, 4, 4}), [](auto...) { return 0.5; })));
   RenderOptions o;

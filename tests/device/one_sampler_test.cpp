@@ -240,7 +240,7 @@ cl::Program build_points(const opencl::Defines& defines) {
   const std::string points = text.str();
   BOOST_REQUIRE(!points.empty());
   opencl::State& state = device().state();
-  cl::Program program(state.context, opencl::resolve_source("render/raycast.cl") + points);
+  cl::Program program(state.context, opencl::resolve_source("picture/render/raycast.cl") + points);
   const std::string options = opencl::build_options(defines);
   try {
     program.build({state.device}, options.c_str());

@@ -75,7 +75,7 @@ std::string identity(const State& state) {
   for (const std::string& part :
        {d.platform, platform.getInfo<CL_PLATFORM_VERSION>(), d.name, d.vendor, d.version, d.driver,
         std::string(VDVR_VERSION), build_options(defines_for(state)),
-        sha256_of_text(resolve_source("opencl/trust.cl"))})
+        sha256_of_text(resolve_source("base/opencl/trust.cl"))})
     text += part + '\n';
   for (const bool flag : {d.is_gpu, d.is_cpu, has_double(state), d.subnormals}) text += flag ? '1' : '0';
   return text + '\n';
