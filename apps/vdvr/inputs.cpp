@@ -59,7 +59,7 @@ ScanOptions scan_options(const Arguments& args, const FieldOptions& field, std::
                          const InputStatement& stored) {
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
-  options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
+  options.beam = args.has("beam") ? beam_of(args.choice("beam", "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
   options.input = input_statement(args, stored);

@@ -22,7 +22,6 @@ Json paging_json(const std::optional<PagingCounts>& counts);
 /// A line, or none.
 void print_paging(const std::optional<PagingCounts>& counts);
 
-const std::vector<std::string>& render_methods();
 void add_method(Arguments& args);
 /// A group of the options that only d2vr has, without the scan's (add_scan).
 void add_projection_options(Arguments& args);

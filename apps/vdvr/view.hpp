@@ -21,7 +21,8 @@ std::optional<std::pair<double, double>> given_range(const Arguments& args);
 /// Opacities are those of one base cell of the grid. What a reader filled in stands in `note`.
 TransferFunction transfer_for(const Arguments& args, const Brightness& brightness, const Grid& grid);
 
-/// From --gradient.
+/// From --sampler and --gradient.
+SamplerKind sampler_option(const Arguments& args);
 GradientKind gradient_option(const Arguments& args);
 const char* gradient_name(GradientKind kind);
 

@@ -246,7 +246,7 @@ int bench_render(Arguments& args) {
   const CommonOptions common = common_options(args);
   const std::string method = method_option(args);
   const std::int64_t frames = args.integer_or("frames", 60, 1, 100000);
-  const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
+  const SamplerKind sampler = sampler_option(args);
   ProgressLine progress(args.who(), common.quiet);
   Source source(args, common, method, false, progress.callback());
   const Scene& scene = source.scene();
@@ -262,10 +262,7 @@ int bench_render(Arguments& args) {
   o.gradient = gradient_option(args);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   // A speed promises nothing: one asked for by name is timed whatever it may err by.
-  const SafeSampler safe = source.take_sampler(sampler == "auto"     ? SamplerKind::automatic
-                                               : sampler == "buffer" ? SamplerKind::buffer
-                                                                     : SamplerKind::image3d,
-                                               true);
+  const SafeSampler safe = source.take_sampler(sampler, true);
   o.sampler = safe.sampler;
 
   o.skip_empty = !args.has("no-skip");
