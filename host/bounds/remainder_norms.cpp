@@ -117,10 +117,6 @@ double mixed_factor(const RemainderNorms& first, const RemainderNorms& second, c
   return first.second * second.second * across.value;
 }
 
-double amplitude_tail(const RemainderNorms& x, const RemainderNorms& y, const RemainderNorms& z) {
-  return (1 + x.eta) * (1 + y.eta) * (1 + z.eta) - 1;
-}
-
 // d (x) a (x) a is a derivative, at most band^4 sup |f| (Bernstein), and three errors: the product of what
 // each may be, but for the derivative itself.
 double pure_tail(const RemainderNorms& along, const RemainderNorms& across, const RemainderNorms& other) {

@@ -327,7 +327,6 @@ class Planner {
     plan_.samples_ratio = foreseen.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
-    plan_.seconds_of_levels = foreseen.seconds - foreseen.kept_seconds;
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
     foresee_memory(foreseen, gold.fine().source()->kept);

@@ -3,7 +3,6 @@
 // binary_cache.cpp of host/opencl.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -17,8 +16,5 @@ std::filesystem::path cache_folder();
 std::optional<std::string> read_cached(const std::string& name);
 /// Whole or not at all, whoever else writes it.
 void write_cached(const std::string& name, const std::string& bytes) noexcept;
-
-/// Removes the files of a folder of the cache that were longest unread, until they take at most `bytes`.
-void shrink_cache(const std::string& folder, std::uint64_t bytes) noexcept;
 
 }  // namespace vdvr
