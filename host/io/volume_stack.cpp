@@ -12,6 +12,7 @@
 #include "host/io/volume_samples.hpp"
 #include "host/system/limits.hpp"
 #include "host/system/rehearsal.hpp"
+#include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -20,13 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kSlabBytes = std::uint64_t{32} << 20;
-
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 // --- HDF5 ---
 

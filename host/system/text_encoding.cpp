@@ -97,6 +97,14 @@ std::string read_text(const std::filesystem::path& path, const std::string& what
   return utf8_of(std::move(text));
 }
 
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+std::string lower_extension(const std::filesystem::path& path) { return lower(path.extension().string()); }
+
 std::string comma_hint(const std::string& word) {
   const std::size_t comma = word.find(',');
   if (comma == std::string::npos || word.find(',', comma + 1) != std::string::npos ||

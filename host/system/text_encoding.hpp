@@ -16,6 +16,11 @@ std::string utf8_of(std::string text);
 /// `most` bytes.
 std::string read_text(const std::filesystem::path& path, const std::string& what, std::uintmax_t most);
 
+/// With the letters A to Z small.
+std::string lower(std::string text);
+/// Of a file's name, with its dot: ".tif".
+std::string lower_extension(const std::filesystem::path& path);
+
 /// "; a decimal comma? write 0.5" where the word is a number with one; else empty.
 std::string comma_hint(const std::string& word);
 
