@@ -178,10 +178,6 @@ struct DenseGrid {
   double rise = 1;
 };
 
-}  // namespace
-
-namespace {
-
 // Rows from which on transforms along v are faster than a product, which takes rows squared.
 constexpr std::int64_t fewest_dense_rows = 96;
 

@@ -70,10 +70,6 @@ Functional over_positions(int order, double band, int taps, double eta, int inte
   return largest;
 }
 
-}  // namespace
-
-namespace {
-
 RemainderNorms compute(double band, int taps, double eta) {
   // As many positions as leave four fifths of eta to the taps: (band / 2 n)^2 / 8 <= eta / 5.
   const int intervals = static_cast<int>(std::ceil(band / 2 * std::sqrt(5 / (8 * eta))));

@@ -361,10 +361,6 @@ class Planner {
   bool estimates_views_ = false;
 };
 
-}  // namespace
-
-namespace {
-
 // A scan of more samples is judged from a window of its rows.
 constexpr std::int64_t most_samples_planned = std::int64_t{8} << 20;
 

@@ -10,6 +10,7 @@
 
 #include "host/fbp/view_weights.hpp"
 #include "host/geometry/vectors.hpp"
+#include "host/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -18,8 +19,6 @@ namespace {
 constexpr double pi = std::numbers::pi;
 
 double degrees(double radians) { return radians * 180 / pi; }
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

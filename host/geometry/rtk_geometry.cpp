@@ -11,6 +11,7 @@
 #include <pugixml.hpp>
 #include <string_view>
 
+#include "host/geometry/vectors.hpp"
 #include "host/io/number_text.hpp"
 #include "host/system/text_encoding.hpp"
 #include "vdvr/error.hpp"
@@ -25,7 +26,6 @@ constexpr double same_matrix = 1e-9;
 double dot_rows(const ViewMatrix& m, std::size_t a, std::size_t b) {
   return m[a][0] * m[b][0] + m[a][1] * m[b][1] + m[a][2] * m[b][2];
 }
-double along(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // The largest difference of the matrices, each row relative to its largest entries: those that multiply
 // lengths, and the last.
@@ -72,8 +72,8 @@ CircularView circular_parameters(const ViewMatrix& matrix, double pitch_u, doubl
   out.pitch_v = pitch_v;
   out.center = center;
   out.row = row;
-  out.source_offset_u = along(view.source, view.along_u);
-  out.source_offset_v = along(view.source, view.along_v);
+  out.source_offset_u = dot(view.source, view.along_u);
+  out.source_offset_v = dot(view.source, view.along_v);
   // The pixel that the normal through the source hits.
   const double depth2 = dot_rows(matrix, 2, 2), foot_u = dot_rows(matrix, 0, 2) / depth2,
                foot_v = dot_rows(matrix, 1, 2) / depth2;
