@@ -8,7 +8,7 @@
 
 #include "apps/common/common_options.hpp"
 #include "apps/vdvr/options.hpp"
-#include "apps/vdvr/scan_noise.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/noise_forecast.hpp"
 #include "vdvr/picture_refinement.hpp"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/scan_noise.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/noise.hpp"
 #include "vdvr/noise_forecast.hpp"
 

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "apps/common/common_options.hpp"
-#include "apps/vdvr/scan_options.hpp"
 #include "vdvr/build.hpp"
 #include "vdvr/certificate.hpp"
 #include "vdvr/plan.hpp"

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "vdvr/automatic_view.hpp"
 #include "vdvr/decorate.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/error_slice.hpp"

@@ -7,7 +7,7 @@
 #include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/vdvr/volume_input.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/certify_picture.hpp"
 #include "vdvr/d2vr.hpp"
 #include "vdvr/error_slice.hpp"

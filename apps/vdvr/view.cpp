@@ -126,6 +126,10 @@ Camera camera_for(const Arguments& args, const OrbitFrame& frame, const Orbit& o
                  args.positive_or("camera-view-angle", camera.view_angle_deg));
 }
 
+const char* sampler_name(SamplerKind kind) {
+  return kind == SamplerKind::image3d ? "image3d" : kind == SamplerKind::buffer ? "buffer" : "auto";
+}
+
 SamplerKind sampler_option(const Arguments& args) {
   const std::string asked = args.choice("sampler", "auto");
   return asked == "auto"     ? SamplerKind::automatic

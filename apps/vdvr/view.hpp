@@ -5,8 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "vdvr/automatic_view.hpp"
 #include "vdvr/framing.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {
 
@@ -22,6 +24,7 @@ std::optional<std::pair<double, double>> given_range(const Arguments& args);
 TransferFunction transfer_for(const Arguments& args, const Brightness& brightness, const Grid& grid);
 
 /// From --sampler and --gradient.
+const char* sampler_name(SamplerKind kind);
 SamplerKind sampler_option(const Arguments& args);
 GradientKind gradient_option(const Arguments& args);
 const char* gradient_name(GradientKind kind);

@@ -13,6 +13,7 @@
 #include <numbers>
 #include <utility>
 
+#include "host/bounds/amplitude_bounds.hpp"
 #include "host/bounds/covered_range.hpp"
 #include "host/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 
+#include "host/bounds/amplitude_bounds.hpp"
 #include "host/bounds/six_taps.hpp"
 #include "host/fbp/reconstruct.hpp"
 #include "host/sampler/sampler_terms.hpp"

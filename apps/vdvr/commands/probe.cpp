@@ -10,7 +10,6 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/certified_points.hpp"
 #include "vdvr/certify.hpp"
 #include "vdvr/d2vr.hpp"

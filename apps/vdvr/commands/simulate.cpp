@@ -11,7 +11,6 @@
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 
