@@ -1,4 +1,4 @@
-// What a build depends on, as its journal says it. Called by build.cpp.
+// What a build depends on, as its journal says it. Called by build.cpp and certify.cpp.
 #pragma once
 
 #include <string>
@@ -8,6 +8,9 @@
 #include "vdvr/build.hpp"
 
 namespace vdvr {
+
+/// "auto", "f32", "u16", "u8".
+const char* text_of(StorageChoice storage);
 
 /// The plan is made again by a resumed process: this stands for it, before its base samples are given away.
 std::string plan_digest(const ProjectionSet& scan, const Plan& plan);
