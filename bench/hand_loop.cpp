@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define VDVR_HAND_LOOP 1

@@ -1,5 +1,5 @@
-// The same back-projection as kernels/fbp/back_project.cl with linear u, written by hand for AVX-512: per
-// update two loads and two fused multiply-adds. What the engine is measured against; never part of the
+// The same back-projection as kernels/field/fbp/back_project.cl with linear u, written by hand for AVX-512:
+// per update two loads and two fused multiply-adds. What the engine is measured against; never part of the
 // library. Called by back_project_bench.cpp.
 #pragma once
 

@@ -13,9 +13,9 @@
 #include <exception>
 #include <numbers>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "host/simulate/simulate_band_limit.hpp"
-#include "vdvr/simulate.hpp"
+#include "host/scan/simulate/simulate_band_limit.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/verify_file.hpp"
 

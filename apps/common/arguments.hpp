@@ -12,7 +12,7 @@
 
 #include "apps/common/command.hpp"
 #include "apps/common/option_table.hpp"
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr::cli {
 

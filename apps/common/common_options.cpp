@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "vdvr/scratch.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/scratch.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 

@@ -23,7 +23,8 @@ struct CommonOptions {
 
 void add_common(Arguments& args);
 CommonOptions common_options(const Arguments& args);
-/// Of commands that draw: a device that fails its test (vdvr/trust.hpp) is opened where the user says so.
+/// Of commands that draw: a device that fails its test (vdvr/expert/trust.hpp) is opened where the user says
+/// so.
 void add_untrusted(Arguments& args);
 void untrusted_option(const Arguments& args);
 inline Device open_device(const CommonOptions& common) { return Device(common.device, common.max_memory); }

@@ -5,7 +5,7 @@
 #include <system_error>
 
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace fs = std::filesystem;
 

@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::cli {
 namespace {

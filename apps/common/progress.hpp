@@ -8,12 +8,12 @@
 #include <mutex>
 #include <string>
 
-#include "vdvr/progress.hpp"
-#include "vdvr/stop.hpp"  // for every report of progress, and before every output
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/stop.hpp"  // for every report of progress, and before every output
 
 namespace vdvr::cli {
 
-/// Installs the handlers of SIGINT and SIGTERM, which ask the library to stop; see vdvr/stop.hpp. Work
+/// Installs the handlers of SIGINT and SIGTERM, which ask the library to stop; see vdvr/expert/stop.hpp. Work
 /// that has not unwound 0.6 s later is in a call that cannot be left, such as the compilation of a kernel:
 /// the process then ends without unwinding, its temporary files removed. A pipe that nobody reads any more is
 /// a failing write, not the end of the process. `who`: for the message, "vdvr build".

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::cli {
 

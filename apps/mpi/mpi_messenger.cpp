@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "vdvr/error.hpp"
-#include "vdvr/scratch.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/scratch.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::cli {
 namespace {

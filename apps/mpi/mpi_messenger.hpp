@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/crew.hpp"
+#include "vdvr/expert/crew.hpp"
 
 namespace vdvr::cli {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr::paper {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "apps/paper/error_measure.hpp"
 #include "apps/paper/fields.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::paper {

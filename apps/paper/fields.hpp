@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "vdvr/d2vr.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/d2vr.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::paper {
 

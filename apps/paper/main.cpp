@@ -10,7 +10,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/paper/report.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr::paper {
 namespace {

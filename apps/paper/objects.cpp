@@ -8,7 +8,7 @@
 #include "apps/paper/scans.hpp"
 #include "apps/paper/upsample_volume.hpp"
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr::paper {
 namespace {

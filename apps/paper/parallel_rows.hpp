@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "vdvr/progress.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::paper {
 

@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "apps/paper/report.hpp"
-#include "vdvr/cosine_spectrum.hpp"
-#include "vdvr/error_map.hpp"
-#include "vdvr/spectral_error.hpp"
+#include "vdvr/expert/cosine_spectrum.hpp"
+#include "vdvr/expert/error_map.hpp"
+#include "vdvr/expert/spectral_error.hpp"
 
 namespace vdvr::paper {
 namespace {

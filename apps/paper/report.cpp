@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::paper {
 namespace {

@@ -12,8 +12,8 @@
 #include "apps/common/output_folder.hpp"
 #include "apps/paper/cases.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/image.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/image.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::paper {
 

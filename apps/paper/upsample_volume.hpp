@@ -2,8 +2,8 @@
 // 14): the spectrum of the samples, padded with zeros. Called by the sections of the report.
 #pragma once
 
-#include "vdvr/grid.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::paper {
 

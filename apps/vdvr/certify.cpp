@@ -1,14 +1,14 @@
-#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 
 #include <fmt/format.h>
 
 #include <utility>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr::cli {
 
@@ -37,7 +37,7 @@ constexpr double everywhere_of_pictures = 0.25;
 // sees.
 constexpr double levels_to_finest = 4000;
 
-std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
+std::optional<PictureTolerance> pictures_wanted(const Arguments& args) {
   if (!args.has("picture-tolerance")) {
     refuse(args, {"picture-views", "picture-finest"}, "goes with --picture-tolerance");
     return std::nullopt;
@@ -51,7 +51,7 @@ std::optional<PictureWanted> pictures_wanted(const Arguments& args) {
     throw InputError(
         "--epsilon in sigma excludes --picture-tolerance: one of the two decides what bricks need");
   refuse(args, {"window"}, "excludes --picture-tolerance: bricks beside the window have no bound");
-  PictureWanted out;
+  PictureTolerance out;
   out.levels = args.positive_or("picture-tolerance", out.levels);
   if (out.levels > 255)
     throw InputError(fmt::format("--picture-tolerance: {} levels, but a pixel has 255", out.levels));
@@ -68,13 +68,13 @@ Wanted wanted_of(const Arguments& args, bool may_choose_tolerance) {
   w.options.field = field_options(args);
   w.options.grid = grid_options(args);
   w.options.rates = rate_options(args);
-  w.pictures = pictures_wanted(args);
-  w.sigmas = sigmas_option(args);
+  w.asked.pictures = pictures_wanted(args);
+  w.asked.sigmas = sigmas_option(args);
   const bool given = args.has("epsilon") || args.has("epsilon-abs");
-  w.chosen_by_noise = may_choose_tolerance && !given && !w.pictures;
-  if (w.pictures && !given) w.tolerance = Tolerance{everywhere_of_pictures, {}};
-  else if (w.sigmas) refuse(args, {"epsilon-abs"}, "excludes --epsilon");
-  else if (!w.chosen_by_noise) w.tolerance = tolerance(args);
+  w.chosen_by_noise = may_choose_tolerance && !given && !w.asked.pictures;
+  if (w.asked.pictures && !given) w.asked.tolerance = Tolerance{everywhere_of_pictures, {}};
+  else if (w.asked.sigmas) refuse(args, {"epsilon-abs"}, "excludes --epsilon");
+  else if (!w.chosen_by_noise) w.asked.tolerance = tolerance(args);
   w.options.build = build_options(args);
   w.options.plan = plan_settings(args);
   return w;
@@ -101,35 +101,23 @@ constexpr double percent_where_noise_is_not_known = 0.03;
 
 // The noise of the scan, and the tolerance where it depends on that.
 void choose_tolerance(Planned& planned, Wanted& wanted, const Arguments& args) {
-  if (!wanted.sigmas && !wanted.chosen_by_noise && !wanted.noted_noise) return;
+  AskedTolerance& asked = wanted.asked;
+  if (!asked.sigmas && !wanted.chosen_by_noise && !wanted.noted_noise) return;
   planned.noise = noise_of_scan(args.path("IN"), args, wanted.options.field, planned.scan);
   const auto& noise = planned.noise.noise;
   if (wanted.chosen_by_noise && noise && noise->agreed) {
-    wanted.sigmas = 1;
+    asked.sigmas = 1;
     planned.chosen = "1sigma, the noise of the scan itself: " + noise->words;
   } else if (wanted.chosen_by_noise) {
-    wanted.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
+    asked.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
     planned.chosen = "3 % of the range, since " +
                      (noise ? "two sources do not agree on the noise: " + noise->words : planned.noise.why);
   }
-  planned.sigmas = wanted.sigmas;
-  if (wanted.sigmas && !noise)
+  if (asked.sigmas && !noise)
     throw InputError(fmt::format(
         "{}: --epsilon in sigma needs the scan's noise, and none is known: {}; state it by --photons or "
         "--sigma-p, or give a tolerance such as --epsilon 3%",
         args.path("IN").string(), planned.noise.why));
-}
-
-// Beside a tolerance of another kind sigma is told where it can be had; no build fails for it.
-std::optional<BrickSigma> noted_sigma(Device& device, Planned& planned, const Progress& progress) {
-  if (!planned.noise.noise) return std::nullopt;
-  try {
-    return sigma_of_plan(device, planned.scan, planned.plan, *planned.noise.noise, progress);
-  } catch (const Error& e) {
-    if (e.kind() == ErrorKind::interrupted) throw;
-    planned.noise.why = e.what();
-    return std::nullopt;
-  }
 }
 
 }  // namespace
@@ -141,66 +129,26 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& asked
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
   choose_tolerance(planned, wanted, args);
   if (seen) seen(planned);
-  if (wanted.sigmas) try {
-      PlanInSigma made = make_plan_in_sigma(device, planned.scan, *wanted.sigmas, *planned.noise.noise,
-                                            wanted.options, progress);
-      planned.plan = std::move(made.plan);
-      planned.sigma = std::move(made.sigma);
-      return planned;
-    } catch (const ToleranceError& e) {
-      if (!wanted.chosen_by_noise) throw;
-      wanted.tolerance = Tolerance{percent_where_noise_is_not_known, {}};
-      planned.sigmas.reset();
-      say(fmt::format("{}: one sigma of this scan is out of reach ({}); takes 3 % of the range\n", args.who(),
-                      e.what()));
-    }
-  if (!wanted.pictures) {
-    planned.plan = make_plan(device, planned.scan, wanted.tolerance, wanted.options, progress);
-    planned.sigma = noted_sigma(device, planned, progress);
-    return planned;
+  const auto plan = [&] {
+    return plan_scan(device, planned.scan, wanted.asked, planned.noise.noise, wanted.options, progress);
+  };
+  try {
+    planned.made = plan();
+  } catch (const ToleranceError& e) {
+    if (!wanted.chosen_by_noise || !wanted.asked.sigmas) throw;
+    wanted.asked = {Tolerance{percent_where_noise_is_not_known, {}}, {}};
+    say(fmt::format("{}: one sigma of this scan is out of reach ({}); takes 3 % of the range\n", args.who(),
+                    e.what()));
+    planned.made = plan();
   }
-  CertifyOptions options = wanted.options;
-  options.plan.everywhere = wanted.tolerance;
-  // Pictures are of the whole grid, so a part of the scan does not do.
-  options.plan.estimate = false;
-  planned.plan = make_plan(device, planned.scan, Tolerance{wanted.pictures->finest, {}}, options, progress);
-  everywhere_of(planned, wanted);
-  planned.pictures =
-      std::make_shared<PictureRefinement>(wanted.pictures->views, planned.scan, planned.plan.field,
-                                          refinement_options(planned, wanted), progress);
-  planned.sigma = noted_sigma(device, planned, progress);
+  if (!planned.made.no_sigma.empty()) planned.noise.why = planned.made.no_sigma;
   return planned;
-}
-
-PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted) {
-  PictureRefinementOptions options;
-  options.levels = wanted.pictures->levels;
-  options.finest_abs = planned.plan.epsilon_abs;
-  return options;
-}
-
-double everywhere_of(const Planned& planned, const Wanted& wanted) {
-  const Plan& plan = planned.plan;
-  const double everywhere = wanted.tolerance.absolute.value_or(wanted.tolerance.relative.value_or(1) *
-                                                               (plan.epsilon_abs / plan.epsilon));
-  if (!(everywhere >= plan.epsilon_abs))
-    throw InputError(
-        fmt::format("--epsilon {:.4g} lies below {:.4g}, the least that --picture-finest asks of a brick",
-                    everywhere, plan.epsilon_abs));
-  return everywhere;
 }
 
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress) {
   CertifyOptions options = wanted.options;
   options.input = planned.understood.stated;
-  if (planned.pictures)
-    options.build.refinement = planned.pictures->refinement(everywhere_of(planned, wanted));
-  else if (planned.sigmas) options.build.refinement = refinement_in_sigma(*planned.sigma, *planned.sigmas);
-  BuildResult result = certify(device, planned.scan, std::move(planned.plan), options, progress);
-  if (planned.pictures) planned.pictures->note(result.certificate);
-  if (planned.sigma)
-    note_noise(device, planned.scan, result, *planned.noise.noise, *planned.sigma, planned.sigmas, progress);
-  return result;
+  return certify_planned(device, planned.scan, planned.made, std::move(options), progress);
 }
 
 std::filesystem::path journal_path(const std::filesystem::path& output) {
@@ -283,32 +231,32 @@ int resumable(const Journal& journal, const std::function<int()>& work) {
 }
 
 Json pictures_json(const Planned& planned) {
-  if (!planned.pictures || planned.pictures->rounds().empty()) return nullptr;
+  if (!planned.made.pictures || planned.made.pictures->rounds().empty()) return nullptr;
   Json rounds = Json::array();
-  for (const PictureRound& r : planned.pictures->rounds())
+  for (const PictureRound& r : planned.made.pictures->rounds())
     rounds.push_back(
         {{"worst", r.worst}, {"mean", r.mean}, {"over", r.over}, {"samples", r.samples}, {"asked", r.asked}});
-  return {{"met", planned.pictures->met()},
-          {"worst", planned.pictures->rounds().back().worst},
+  return {{"met", planned.made.pictures->met()},
+          {"worst", planned.made.pictures->rounds().back().worst},
           {"rounds", rounds}};
 }
 
 void print_pictures(const Planned& planned) {
-  if (!planned.pictures || planned.pictures->rounds().empty()) return;
-  const auto& rounds = planned.pictures->rounds();
+  if (!planned.made.pictures || planned.made.pictures->rounds().empty()) return;
+  const auto& rounds = planned.made.pictures->rounds();
   fmt::print(
       "pictures       {} view(s): worst pixel {:.1f} levels, mean {:.2f}, {:.2f} % above; {} rounds from "
       "{:.1f}\n",
-      planned.pictures->views().cameras.size(), rounds.back().worst, rounds.back().mean,
+      planned.made.pictures->views().cameras.size(), rounds.back().worst, rounds.back().mean,
       100 * rounds.back().over, rounds.size(), rounds.front().worst);
 }
 
 int pictures_exit_code(const std::string& who, const Planned& planned) {
-  if (!planned.pictures || planned.pictures->met()) return 0;
+  if (!planned.made.pictures || planned.made.pictures->met()) return 0;
   say(fmt::format(
       "{}: pictures are not within the tolerance: the worst pixel is certain to {:.1f} levels; a smaller "
       "--picture-finest lets bricks go further\n",
-      who, planned.pictures->rounds().empty() ? 255.0 : planned.pictures->rounds().back().worst));
+      who, planned.made.pictures->rounds().empty() ? 255.0 : planned.made.pictures->rounds().back().worst));
   return 1;
 }
 

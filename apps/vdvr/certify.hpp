@@ -9,35 +9,26 @@
 #include "apps/common/common_options.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/certify.hpp"
-#include "vdvr/noise_forecast.hpp"
-#include "vdvr/picture_refinement.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/certify_scan.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr::cli {
 
 /// Scan, tolerance, field, grid and rate options.
 void add_plan_options(Arguments& args);
 
-/// Pictures that decide how fine bricks are: `tolerance` of Wanted then holds everywhere, and `finest` is the
-/// least that a brick can be asked for.
-struct PictureWanted {
-  WantedViews views;
-  double levels = 8;
-  double finest = 0.002;  ///< fraction of the range
-};
-
 /// Everything that can be refused before a scan is read.
 struct Wanted {
-  Tolerance tolerance;           ///< without `sigmas`
-  std::optional<double> sigmas;  ///< --epsilon 1sigma
+  AskedTolerance asked;
   bool chosen_by_noise = false;  ///< no tolerance was given: 1 sigma where the noise is known well, else 3 %
   bool noted_noise = true;       ///< sigma of F is looked for, whatever the tolerance
   CertifyOptions options;
   Compression compression = Compression::deflate;  ///< of the file; `build` and `run` fill it in
-  std::optional<PictureWanted> pictures;           ///< refine for these
 };
 /// `may_choose_tolerance`: none need be given.
 Wanted wanted_of(const Arguments& args, bool may_choose_tolerance = false);
@@ -49,13 +40,10 @@ Wanted wanted_to_certify(const Arguments& args, bool may_choose_tolerance = fals
 
 struct Planned {
   ProjectionSet scan;
-  Understood understood;         ///< of its files
-  NoiseFound noise;              ///< of the scan
-  std::optional<double> sigmas;  ///< the tolerance, where it is one in sigma
-  std::string chosen;            ///< one line, where the tolerance was chosen: which, and why
-  Plan plan;
-  std::optional<BrickSigma> sigma;              ///< of F, where the noise is known
-  std::shared_ptr<PictureRefinement> pictures;  ///< none, unless refined for some
+  Understood understood;  ///< of its files
+  NoiseFound noise;       ///< of the scan
+  std::string chosen;     ///< one line, where the tolerance was chosen: which, and why
+  PlannedScan made;
 };
 /// How refinement went: what it was asked, each round, whether the tolerance is met. Null without pictures.
 Json pictures_json(const Planned& planned);
@@ -63,11 +51,7 @@ void print_pictures(const Planned& planned);
 /// Reads IN and plans. `seen` is called between the two, when the tolerance is known.
 Planned read_and_plan(Device& device, const Arguments& args, const Wanted& wanted, const Progress& progress,
                       const std::function<void(const Planned&)>& seen = {});
-/// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.
-/// Throws InputError where that is less than what a brick may be asked for.
-PictureRefinementOptions refinement_options(const Planned& planned, const Wanted& wanted);
-double everywhere_of(const Planned& planned, const Wanted& wanted);
-/// The second half of vdvr::certify. Takes the plan.
+/// By certify_planned(). Takes the plan.
 BuildResult build_planned(Device& device, Planned& planned, const Wanted& wanted, const Progress& progress);
 
 /// The journal of an output file: beside it, with this name.

@@ -5,40 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/vdvr/certified_drawing.hpp"
+#include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/clip.hpp"
-#include "apps/vdvr/picture_certificate.hpp"
-#include "apps/vdvr/picture_light.hpp"
-#include "apps/vdvr/picture_tolerance.hpp"
-#include "apps/vdvr/sampler_json.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/explain_pixel.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/stop.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/explain_pixel.hpp"
+#include "vdvr/expert/surface_picture.hpp"
+
+namespace fs = std::filesystem;
 
 namespace vdvr::cli {
 namespace {
-
-const std::vector<std::string> kShown{"bound", "lo", "hi", "middle"};
-const std::vector<std::string> kForms{"exact", "box", "fast"};
-
-std::string form_of(const Arguments& args) {
-  return args.has("certify") ? args.choice("certify", kForms, "exact") : "exact";
-}
-
-struct Outputs {
-  std::filesystem::path picture, bound, certificate;
-  bool values = false;  ///< .npy
-};
-
-Outputs outputs_of(const std::filesystem::path& picture) {
-  Outputs o{picture, picture, picture, picture.extension() == ".npy"};
-  o.bound.replace_extension(".bound.png");
-  o.certificate.replace_extension(".certificate.json");
-  return o;
-}
 
 /// Between or of the ends, values as float32 or as they are shown.
 FloatImage end_of(const PixelBounds& b, const std::string& which) {
@@ -56,18 +32,6 @@ Image as_image(const FloatImage& values) {
   return image;
 }
 
-CertifyPictureOptions certify_options(const Arguments& args, const Certificate& certificate,
-                                      const RenderOptions& o) {
-  CertifyPictureOptions c;
-  c.window = certificate.window;
-  c.fast = form_of(args) == "fast";
-  c.box = form_of(args) == "box";
-  c.kappa = args.positive_or("certify-parts", c.kappa);
-  if (o.mode == RenderMode::dvr)
-    c.theta = ending_share(c.theta, brick_bounds(certificate, false), o.transfer);
-  return c;
-}
-
 std::vector<std::string> overlay_names(const Overlay& overlay) {
   std::vector<std::string> names;
   if (overlay.axes) names.emplace_back("axes");
@@ -77,42 +41,92 @@ std::vector<std::string> overlay_names(const Overlay& overlay) {
   return names;
 }
 
-std::vector<std::string> caption_of(const PictureBound& bound, const PixelBounds& bounds,
-                                    const Certificate& certificate, bool slice) {
-  if (slice)
-    return {bound_line(bound, certificate, bounds.light),
-            "Certified: F at the middles of pixels, where it is covered."};
-  return {bound_line(bound, certificate, bounds.light),
-          fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
-                      text_of(bounds.light))};
+std::string line_of(const CertifiedPicture& picture) {
+  return bound_line(picture.bound, picture.epsilon, picture.bounds.light);
 }
 
+std::vector<std::string> caption_of(const CertifiedPicture& picture) {
+  if (picture.record.options.mode == RenderMode::slice)
+    return {line_of(picture), "Certified: F at the middles of pixels, where it is covered."};
+  return {line_of(picture),
+          fmt::format("Certified, {}: the ideal picture of F inside the covered region. Overlays are not.",
+                      text_of(picture.bounds.light))};
+}
+
+/// A slice within its frame.
+struct Framed {
+  SliceFrame frame;
+  std::int64_t width = 0, height = 0;  ///< of both; the slice alone is smaller
+};
+
 /// The slice alone where there is a frame around it.
-SliceFrame set_slice(RenderOptions& o, const Scene& scene, bool plain) {
+Framed set_slice(RenderOptions& o, const Scene& scene) {
   const Grid& g = scene.volume.grid;
   const auto axis = static_cast<std::size_t>(o.slice_axis);
   if (!o.slice_position)
     o.slice_position = g.origin[axis] + 0.5 * static_cast<double>(g.cells[axis]) * g.spacing[axis];
-  SliceFrame frame = frame_of_slice(o, g, scene.certificate);
-  frame.caption_lines = 3;  // what it says is known later
-  if (plain) return frame;
-  const SlicePlace place = slice_place(frame, o.width, o.height);
+  Framed framed{frame_of_slice(o, g, scene.certificate), o.width, o.height};
+  framed.frame.caption_lines = 3;  // what it says is known later
+  const SlicePlace place = slice_place(framed.frame, o.width, o.height);
   o.width = place.width;
   o.height = place.height;
-  return frame;
+  return framed;
 }
 
-void write_shown(const Outputs& out, const std::string& show, const PixelBounds& bounds,
-                 const PictureBound& bound) {
-  if (show == "bound") {
-    if (out.values) write_npy(out.picture, bound.levels);
-    else write_png(out.picture, picture_of_bound(bound, bounds));
-    return;
+/// What --show asks for in place of the picture: values, or a picture of them.
+FloatImage values_of(const std::string& show, const CertifiedPicture& p) {
+  const RenderMode mode = p.record.options.mode;
+  if (mode == RenderMode::iso) {
+    if (show == "class")
+      return {p.surface.first.width, p.surface.first.height, {p.surface.hit.begin(), p.surface.hit.end()}, 1};
+    return show == "lo" ? p.surface.first : show == "hi" ? p.surface.last : band_of(p.surface);
   }
-  const FloatImage values = end_of(bounds, show);
-  if (out.values) write_npy(out.picture, values);
-  else write_png(out.picture, as_image(values));
+  if (show == "bound") return p.bound.levels;
+  if (mode == RenderMode::mip) return show == "lo" ? p.maxima.low : p.maxima.high;
+  if (mode == RenderMode::integral) return show == "lo" ? p.integrals.low : p.integrals.high;
+  return end_of(p.bounds, show);
 }
+
+Image picture_of(const std::string& show, const CertifiedPicture& p, const std::optional<double>& at_white) {
+  if (show == "class") return class_picture(p.surface);
+  if (show == "band") return band_picture(p.surface, at_white && *at_white > 0 ? *at_white : 1);
+  return show == "bound" ? picture_of_bound(p.bound, p.bounds) : as_image(end_of(p.bounds, show));
+}
+
+Image with_overlay(CertifiedPicture& picture, const Scene& scene, const Overlay& overlay,
+                   std::optional<Framed>& framed) {
+  const RenderMode mode = picture.record.options.mode;
+  const auto caption = caption_of(picture);
+  if (framed) {
+    framed->frame.caption = caption;
+    return framed_slice(framed->frame, picture.drawn.image, framed->width, framed->height);
+  }
+  RenderResult drawn = picture.drawn;
+  if (mode == RenderMode::dvr) draw_overlay(drawn, scene, picture.record.options, overlay, true, caption);
+  return std::move(drawn.image);
+}
+
+/// What is written as the picture.
+PictureFile file_of(const std::string& show, CertifiedPicture& picture, const Scene& scene,
+                    const Overlay& overlay, std::optional<Framed>& framed, bool values) {
+  const RenderMode mode = picture.record.options.mode;
+  PictureFile file;
+  if (framed) file.overlays = {"frame"};
+  else if (!is_certified_by_ray(mode)) file.overlays = overlay_names(overlay);
+  if (show == "band") file.band_at_white = band_quantile(picture.surface, 0.99);
+  if (show != "colour")
+    file.write = [&, show, values, at_white = file.band_at_white](const fs::path& path) {
+      if (values) write_npy(path, values_of(show, picture));
+      else write_png(path, picture_of(show, picture, at_white));
+    };
+  else if (!is_certified_by_ray(mode))
+    file.write = [&](const fs::path& path) {
+      write_png(path, with_overlay(picture, scene, overlay, framed));
+    };
+  return file;
+}
+
+// --- --explain ---
 
 struct Explained {
   std::int64_t x = 0, y = 0;
@@ -130,13 +144,15 @@ void check_pixel(const Arguments& args, const RenderOptions& o) {
                                  (*pixel)[1], o.width, o.height));
 }
 
-std::optional<Explained> explained(const Arguments& args, const Scene& scene, const Certificate& certificate,
-                                   const RenderOptions& o, SamplerKind sampler) {
+std::optional<Explained> explained(const Arguments& args, const Source& source,
+                                   const CertifiedPicture& picture) {
   const auto pixel = args.numbers("explain", 2);
   if (!pixel) return std::nullopt;
   Explained e{static_cast<std::int64_t>((*pixel)[0]), static_cast<std::int64_t>((*pixel)[1]), {}};
-  e.why = explain_pixel(scene.volume, brick_bounds(certificate, sampler == SamplerKind::image3d), o, e.x, e.y,
-                        certificate.window.has_value());
+  const Certificate& certificate = source.certificate();
+  e.why = explain_pixel(source.scene().volume,
+                        brick_bounds(certificate, picture.bounds.sampler == SamplerKind::image3d),
+                        picture.record.options, e.x, e.y, certificate.window.has_value());
   return e;
 }
 
@@ -149,14 +165,17 @@ Json explained_json(const Explained& e) {
   return {{"pixel", Json::array({e.x, e.y})}, {"bricks", bricks}, {"of_points", e.why.of_points}};
 }
 
-void print_explained(const Explained& e, const Scene& scene, const RenderOptions& o, double bound) {
+void print_explained(const Explained& e, const MixedVolume& volume, const CertifiedPicture& picture) {
+  const RenderOptions& o = picture.record.options;
+  const auto bound =
+      static_cast<double>(picture.bound.levels.values[static_cast<std::size_t>(e.y * o.width + e.x)]);
   fmt::print("  pixel ({}, {}): bound {:.1f} levels; to first order {:.1f}, of which\n", e.x, e.y, bound,
              e.why.levels);
-  const Index3 n = scene.volume.bricks();
+  const Index3 n = volume.bricks();
   for (std::size_t i = 0; i < std::min<std::size_t>(6, e.why.bricks.size()); ++i) {
     const BrickShare& b = e.why.bricks[i];
     const auto at = static_cast<std::int64_t>(b.brick);
-    const LevelTriple& l = scene.volume.level[b.brick];
+    const LevelTriple& l = volume.level[b.brick];
     fmt::print("    {:>5.1f}  brick ({}, {}, {}), level zyx {}{}{}, |V - F| <= {:.4g}\n", b.levels, at % n[0],
                at / n[0] % n[1], at / (n[0] * n[1]), l[0], l[1], l[2], b.bound);
   }
@@ -167,210 +186,92 @@ void print_explained(const Explained& e, const Scene& scene, const RenderOptions
              p.opacity);
 }
 
-/// What of it is written as the picture.
-struct Show {
-  std::string what;
-  bool slice = false, framed = false;
-  SliceFrame frame;
-  std::int64_t width = 0, height = 0;  ///< asked for; a slice in a frame is smaller
-};
-
-void write_picture(const Outputs& out, Show& show, CertifiedDrawing& made, const PictureBound& bound,
-                   const Scene& scene, const RenderOptions& o, const Overlay& overlay) {
-  if (show.what != "colour") {
-    write_shown(out, show.what, made.bounds, bound);
-    return;
-  }
-  const auto caption = caption_of(bound, made.bounds, *scene.certificate, show.slice);
-  if (show.framed) {
-    show.frame.caption = caption;
-    write_png(out.picture, framed_slice(show.frame, made.drawn.image, show.width, show.height));
-    return;
-  }
-  if (!show.slice) draw_overlay(made.drawn, scene, o, overlay, true, caption);
-  write_png(out.picture, made.drawn.image);
-}
-
-/// Prints what was found. Throws MismatchError where --picture-tolerance is not met.
-int say(const Arguments& args, const CommonOptions& common, Source& source, const RenderOptions& o,
-        const Outputs& out, const CertifiedDrawing& made, const PictureBound& bound, const Json& json) {
-  const Scene& scene = source.scene();
-  const auto why = explained(args, scene, source.certificate(), o, made.bounds.sampler);
-  const std::optional<PixelsBeyond> beyond = pixels_beyond(args, bound);
-  Json printed = json;
-  printed["output"] = out.picture.string();
-  printed["seconds"] = {{"draw", made.drawn.seconds}, {"certify", made.bounds.seconds}};
-  printed["paging"] = paging_json(source.paging());
-  if (beyond) printed["picture_tolerance"] = tolerance_json(*beyond);
-  if (why) printed["explain"] = explained_json(*why);
-  print_result(common, printed, [&] {
-    const bool slice = o.mode == RenderMode::slice;
-    fmt::print("{}\n", bound_line(bound, *scene.certificate, made.bounds.light));
-    fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", out.picture.string(), o.width, o.height,
-               slice ? "" : fmt::format(", light {}", text_of(made.bounds.light)), out.bound.string(),
-               out.certificate.string());
-    if (!slice)
-      fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n", bound.parts_mean,
-                 made.drawn.seconds, made.bounds.seconds,
-                 made.bounds.light == CertifiedLight::lit ? "the host" : source.device().info().name);
-    print_paging(source.paging());
-    if (why)
-      print_explained(
-          *why, scene, o,
-          static_cast<double>(bound.levels.values[static_cast<std::size_t>(why->y * o.width + why->x)]));
-    print_tolerance(beyond);
-  });
-  require_within(out.picture, beyond);
-  return 0;
-}
-
-void check_file(const Arguments& args, const Scene& scene, const RenderOptions& o) {
-  const std::string name = args.path("FILE").string();
-  if (!scene.certificate || !scene.verified)
-    throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
-  if (scene.certificate->comparison)
-    throw InputError(fmt::format("{}: is for comparison and certifies nothing; build it without", name));
-  const auto& window = scene.certificate->window;
-  if (window && asks_lit(args))
-    throw InputError(
-        fmt::format("{}: was certified within --window {:.6g},{:.6g}; differences of F across its ends are "
-                    "unknown, and so is "
-                    "its light: take --certify-light as-drawn, or build without --window",
-                    name, window->first, window->second));
-  if (window && o.mode == RenderMode::slice)
-    throw InputError(fmt::format(
-        "{}: was certified within --window {:.6g},{:.6g}; where F lies outside of it is unknown, so that no "
-        "pixel of a slice is known: build without --window",
-        name, window->first, window->second));
-  if (window && !is_clear_outside(o.transfer, *window))
-    throw InputError(fmt::format(
-        "{}: was certified within --window {:.6g},{:.6g}, outside of which F is unknown, and the transfer "
-        "function shows values there: name one by --tf whose opacity is 0 below and above the window, or "
-        "build "
-        "without --window",
-        name, window->first, window->second));
+/// Levels of what is shown, and how well the value of F behind it is known: `member` of the JSON.
+void print_known(const Json& json, const std::string& shown, const char* member, const char* what) {
+  const Json &known = json.at(member), &levels = json.at("levels");
+  fmt::print(
+      "  {:<12} {:.0f} % of the pixels certain to 4 levels of 255, {:.0f} % to 8; mean {:.1f}, worst "
+      "{:.1f}\n",
+      shown, 100 * json.at("within").at("4").get<double>(), 100 * json.at("within").at("8").get<double>(),
+      levels.at("mean").get<double>(), levels.at("max").get<double>());
+  fmt::print("  certain      the {} of F to +- {:.4g} in the mean, {:.4g} at most\n", what,
+             known.at("half_width_mean").get<double>(), known.at("half_width_max").get<double>());
 }
 
 }  // namespace
 
-const std::vector<std::string>& bound_outputs() { return kShown; }
-
-void add_certify(Arguments& args) {
-  args.group("Certified pictures")
-      .value_or_flag(
-          "certify", "exact|box|fast", "exact",
-          "for every pixel an interval that holds the colour of the ideal picture: writes beside "
-          "X.png also X.bound.png, in levels of 255, and X.certificate.json. Draws the covered "
-          "region alone. box: by steps that take opacity and colour apart, some per cent wider; fast: in one "
-          "pass, 1.4 to 3 times as "
-          "wide. Of slices, mip and integrals alike; of iso: where "
-          "F has the surface for sure, may have it (striped), or not")
-      .value("certify-parts", "K",
-             "cut rays until the field spreads by at most 2 K times the bound on a part (default 0.5)")
-      .value("explain", "X,Y",
-             "what makes the bound of this pixel: bricks, and points of the transfer function")
-      .value("picture-tolerance", "N", "exit with 1 where a pixel is not certain to N levels of 255");
-  add_picture_light(args);
-}
-
-bool asks_certify(const Arguments& args) { return args.has("certify") || args.has("picture-tolerance"); }
-
-void check_certify(const Arguments& args, const RenderOptions& o) {
-  check_picture_light(args, o);
-  const std::string show = args.text_or("show", "colour");
-  const bool of_bounds = std::find(kShown.begin(), kShown.end(), show) != kShown.end();
-  if (!asks_certify(args)) {
-    refuse(args, {"certify-parts", "explain"}, "goes with --certify");
-    if (of_bounds) throw InputError(fmt::format("--show {} goes with --certify", show));
-    return;
-  }
-  if (is_certified_by_ray(o.mode)) {  // ray_certificate.hpp
-    refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
-    if (o.mode == RenderMode::iso)
-      refuse(args, {"picture-tolerance"}, "is of colours, in levels of 255; a surface has a band of depth");
-    check_tolerance(args);
-    if (const std::string form = form_of(args); form != "exact")
-      throw InputError(
-          fmt::format("--certify {} is of --mode dvr; iso, mip and integral have the exact one alone", form));
-    return;
-  }
-  if (o.mode == RenderMode::error)
-    throw InputError(
-        "--certify: pictures of --mode dvr, iso, mip, integral and slice are certified, not of error");
-  if (o.mode == RenderMode::slice) {
-    refuse(args, {"certify-parts", "explain"}, "is of --mode dvr");
-    refuse(args, {"colorbar", "caption"}, "is part of a certified slice, but for --plain");
-    if (const std::string form = form_of(args); form != "exact")
-      throw InputError(fmt::format("--certify {} is of --mode dvr; slices have the exact one alone", form));
-  }
-  if (show != "colour" && !of_bounds)
-    throw InputError(fmt::format("--certify: --show {} is not certified; colours are", show));
-  if (of_bounds) refuse(args, {"axes", "box", "colorbar", "caption"}, "is not drawn over bounds");
-  if (args.has("turntable"))
-    throw InputError("--certify: one picture at a time; give each its --azimuth instead of --turntable");
-  if (args.text_or("method", "vdvr") != "vdvr")
-    throw InputError("--certify: the certificate is of --method vdvr");
-  if (o.gradient == GradientKind::stored)
-    throw InputError("--gradient stored: a certified picture takes central or analytic");
-  refuse(args, {"unverified"}, "excludes --certify");
-  check_tolerance(args);
-  if (args.path("output").extension() == ".npy" && !of_bounds)
-    throw InputError("--certify: as .npy there are --show bound, lo, hi and middle");
-}
-
-int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions o,
-                   const Overlay& overlay, const std::filesystem::path& output, const Progress& progress) {
+CertifiedRender certify_render(const Arguments& args, const CommonOptions& common, Source& source,
+                               const RenderOptions& options, const Overlay& overlay, const fs::path& output,
+                               const Progress& progress) {
   const Scene& scene = source.scene();
-  check_file(args, scene, o);
-  check_pixel(args, o);
-  const Certificate& certificate = source.certificate();
-  const Outputs out = outputs_of(output);
-  for (const auto& path : {out.bound, out.certificate}) check_output(path, common.force, {});
-  const Clip covered = covered_clip(args, scene, progress);
-  const bool lit = asks_lit(args);
-  const CertifyPictureOptions options = certify_options(args, certificate, o);
-  Show show;
-  show.what = args.text_or("show", "colour");
-  show.slice = o.mode == RenderMode::slice;
-  show.width = o.width;
-  show.height = o.height;
-  show.framed = show.slice && !overlay.plain && show.what == "colour";
-  if (show.slice) {
-    show.frame = set_slice(o, scene, !show.framed);
-  } else {
-    o.clip = certified_clip(args, scene, o, progress);
-    if (lit) cut_to_differences(*o.clip, covered, scene.volume.grid);
-    prepare_drawing(args, o, options.theta);
+  const std::string name = args.path("FILE").string(), show = args.text_or("show", "colour");
+  if (!scene.certificate || !scene.verified)
+    throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
+  check_pixel(args, options);
+  for (const auto& path : beside_picture(output, options.mode)) check_output(path, common.force, {});
+  PictureRequest request = picture_request(args, options, covered_of(args, scene, progress));
+  const bool values = output.extension() == ".npy";
+  std::optional<Framed> framed;
+  if (options.mode == RenderMode::slice && !overlay.plain && show == "colour")
+    framed = set_slice(request.options, scene);
+  CertifiedRender made;
+  try {
+    made.picture = certify_picture(source.volume(), source.certificate(), request, progress);
+  } catch (InputError& e) {
+    e.add_context(name);
+    throw;
   }
-  const Asked asked{options, lit ? std::optional(covered) : std::nullopt, args.number("picture-tolerance")};
-  CertifiedDrawing made = draw_and_certify(source, o, asked, progress);
-  if (!show.slice && !chose_steps(args)) draw_finer(source, o, asked, made, progress);
-  o.sampler = made.drawn.sampler;
-  const PictureBound bound = bound_of_picture(made.bounds, made.drawn.image);
-  CertifiedPicture picture{
-      o,
-      options,
-      lit,
-      {covered.radius, {covered.low[2], covered.high[2]}},
-      certificate.content_sha256,
-      output.filename().string(),
-      sha256_of_pixels(made.drawn.image),
-      "",
-      source.device().info().name,
-      source.device().info().driver,
-      test_of(source.device()).names(),
-      // Slices and light of F are certified on the host.
-      sampler_term_json(certificate, !show.slice && !lit && made.bounds.sampler == SamplerKind::image3d),
-      show.framed ? std::vector<std::string>{"frame"} : overlay_names(overlay)};
-  io::AtomicFiles files;
-  const Outputs parts{files.add(out.picture), files.add(out.bound), files.add(out.certificate), out.values};
-  write_picture(parts, show, made, bound, scene, o, overlay);
-  write_png(parts.bound, picture_of_bound(bound, made.bounds));
-  picture.file_sha256 = sha256_of_file(parts.picture);
-  const Json json = picture_certificate_json(picture, made.bounds, bound, certificate);
-  io::write_file(parts.certificate, json.dump(2) + "\n");
-  files.commit();
-  return say(args, common, source, o, out, made, bound, json);
+  made.json = Json::parse(write_certified_picture(
+      output, made.picture, file_of(show, made.picture, scene, overlay, framed, values)));
+  if (options.mode != RenderMode::iso) made.beyond = pixels_beyond(args, made.picture.bound);
+  return made;
+}
+
+void say_certified(const Arguments& args, const CommonOptions& common, Source& source,
+                   const CertifiedRender& made, const fs::path& output) {
+  const CertifiedPicture& picture = made.picture;
+  const RenderOptions& o = picture.record.options;
+  const auto why = explained(args, source, picture);
+  Json printed = made.json;
+  printed["output"] = output.string();
+  printed["seconds"] = {{"draw", picture.drawn.seconds}, {"certify", picture.bounds.seconds}};
+  printed["paging"] = paging_json(source.paging());
+  if (made.beyond) printed["picture_tolerance"] = tolerance_json(*made.beyond);
+  if (why) printed["explain"] = explained_json(*why);
+  print_result(common, printed, [&] {
+    const bool slice = o.mode == RenderMode::slice;
+    const auto beside = beside_picture(output, o.mode);
+    fmt::print("{}\n", line_of(picture));
+    fmt::print("  {}: {} x {}{}; bound in {}, certificate in {}\n", output.string(), o.width, o.height,
+               slice ? "" : fmt::format(", light {}", text_of(picture.bounds.light)), beside.back().string(),
+               beside.front().string());
+    if (!slice)
+      fmt::print("  {:.1f} parts a ray; drawn in {:.3f} s, certified in {:.3f} s on {}\n",
+                 picture.bound.parts_mean, picture.drawn.seconds, picture.bounds.seconds,
+                 picture.bounds.light == CertifiedLight::lit ? "the host" : source.device().info().name);
+    print_paging(source.paging());
+    if (why) print_explained(*why, source.scene().volume, picture);
+    print_tolerance(made.beyond);
+  });
+  require_within(output, made.beyond);
+}
+
+void print_certain(const CertifiedRender& made) {
+  const Json& json = made.json;
+  const RenderMode mode = made.picture.record.options.mode;
+  if (mode == RenderMode::iso) {
+    const Json& iso = json.at("iso");
+    fmt::print(
+        "  certain      {:.1f} % of the pixels show the surface for sure, {:.1f} % may, {:.1f} % do not; its "
+        "depth to {:.3g} in the median, {:.3g} in 99 % ({})\n",
+        100 * iso.at("sure").get<double>(), 100 * iso.at("possible").get<double>(),
+        100 * iso.at("none").get<double>(), iso.at("band_median").get<double>(),
+        iso.at("band_p99").get<double>(), iso.at("unit").get<std::string>());
+    return;
+  }
+  if (mode == RenderMode::mip) print_known(json, "colours", "mip", "maximum");
+  else print_known(json, "greys", "integral", "integral");
+  print_tolerance(made.beyond);
 }
 
 }  // namespace vdvr::cli

@@ -1,28 +1,33 @@
-// render --certify: a picture, the bound of its pixels and its certificate. Called by: the render command.
+// render --certify: a picture, the bound of its pixels and its certificate.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 
 #include "apps/vdvr/overlay.hpp"
-#include "vdvr/progress.hpp"
+#include "apps/vdvr/picture_tolerance.hpp"
+#include "vdvr/certified_picture.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::cli {
 
-void add_certify(Arguments& args);
-/// Whether the options ask for it.
-/// Modes of which each ray is certified on the host.
-inline bool is_certified_by_ray(RenderMode mode) {
-  return mode == RenderMode::iso || mode == RenderMode::mip || mode == RenderMode::integral;
-}
-bool asks_certify(const Arguments& args);
-/// Throws InputError for options that it does not take.
-void check_certify(const Arguments& args, const RenderOptions& options);
-/// What --show says of the bounds: bound, lo, hi, middle.
-const std::vector<std::string>& bound_outputs();
+/// What is written, and shown of it.
+struct CertifiedRender {
+  CertifiedPicture picture;
+  Json json;  ///< the certificate, as it lies beside the picture
+  std::optional<PixelsBeyond> beyond;
+};
 
-/// Draws, certifies, writes, prints. Returns the exit code: 1 where --picture-tolerance is not met.
-int certify_render(const Arguments& args, const CommonOptions& common, Source& source, RenderOptions options,
-                   const Overlay& overlay, const std::filesystem::path& output, const Progress& progress);
+/// Draws, certifies and writes what --show asks for. Throws InputError for what is not certified; else as
+/// certify_picture().
+CertifiedRender certify_render(const Arguments& args, const CommonOptions& common, Source& source,
+                               const RenderOptions& options, const Overlay& overlay,
+                               const std::filesystem::path& output, const Progress& progress);
+/// Modes dvr and slice: all of what the command prints. Throws MismatchError where --picture-tolerance is not
+/// met.
+void say_certified(const Arguments& args, const CommonOptions& common, Source& source,
+                   const CertifiedRender& made, const std::filesystem::path& output);
+/// Other modes: what is certain.
+void print_certain(const CertifiedRender& made);
 
 }  // namespace vdvr::cli

@@ -2,24 +2,26 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
-
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/certified_picture.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
 namespace {
 
-std::string name_of(const Arguments& args) { return args.path("FILE").string(); }
-
-CoveredCylinder covered_from(const Arguments& args, const Certificate& certificate,
-                             const Progress& progress) {
-  const auto path = args.path("covered-from");
-  const ProjectionSet scan = load_certified_scan(path, args, certificate, progress);
-  check_projections(path, scan, certificate);
-  return CertifiedRegion(scan, certificate.field).cylinder();
+Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& progress) {
+  const std::string name = args.path("FILE").string();
+  if (!scene.certificate)
+    throw InputError(fmt::format("{}: has no certificate, so nothing in it is covered", name));
+  const auto named = covered_of(args, scene, progress);
+  const auto& covered = named ? named : scene.certificate->covered;
+  if (!covered)
+    throw InputError(
+        fmt::format("{}: does not say where it is covered, since an earlier version wrote it; "
+                    "name its scan by --covered-from, or build it again",
+                    name));
+  return certified_part(*covered, *scene.certificate);
 }
 
 }  // namespace
@@ -31,68 +33,29 @@ void add_clip(Arguments& args) {
       .value("covered-from", "IN", "the scan, which says where a file of an earlier version is covered");
 }
 
-void cut(Clip& clip, const Vec3& low, const Vec3& high) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    clip.low[a] = std::max(clip.low[a], low[a]);
-    clip.high[a] = std::min(clip.high[a], high[a]);
-  }
-}
-
-Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& progress) {
-  if (!scene.certificate)
-    throw InputError(fmt::format("{}: has no certificate, so nothing in it is covered", name_of(args)));
-  const Certificate& c = *scene.certificate;
-  const std::optional<CoveredCylinder> covered =
-      args.has("covered-from") ? covered_from(args, c, progress) : c.covered;
-  if (!covered)
-    throw InputError(
-        fmt::format("{}: does not say where it is covered, since an earlier version wrote it; "
-                    "name its scan by --covered-from, or build it again",
-                    name_of(args)));
-  return known_clip(*covered, c);
-}
-
-Clip known_clip(const CoveredCylinder& covered, const Certificate& certificate) {
-  Clip clip;
-  clip.radius = covered.radius;
-  clip.low[2] = covered.z.first;
-  clip.high[2] = covered.z.second;
-  if (certificate.roi) {
-    const std::array<double, 6>& r = *certificate.roi;
-    cut(clip, {r[0], r[1], r[2]}, {r[3], r[4], r[5]});
-  }
-  return clip;
+std::optional<CoveredCylinder> covered_of(const Arguments& args, const Scene& scene,
+                                          const Progress& progress) {
+  if (!args.has("covered-from")) return std::nullopt;
+  const auto path = args.path("covered-from");
+  const ProjectionSet scan = load_certified_scan(path, args, *scene.certificate, progress);
+  check_projections(path, scan, *scene.certificate);
+  return CertifiedRegion(scan, scene.certificate->field).cylinder();
 }
 
 std::optional<Clip> clip_for(const Arguments& args, const Scene& scene, const Progress& progress) {
   const auto box = args.numbers("clip", 6);
   if (!box && !args.has("clip-covered")) return std::nullopt;
-  Clip clip = args.has("clip-covered") ? covered_clip(args, scene, progress) : Clip{};
-  if (box) {
-    const std::vector<double>& b = *box;
-    for (std::size_t a = 0; a < 3; ++a)
-      if (!(b[a] < b[a + 3]))
-        throw InputError(fmt::format("--clip: {} is not below {} along {}", b[a], b[a + 3], "xyz"[a]));
-    cut(clip, {b[0], b[1], b[2]}, {b[3], b[4], b[5]});
-  }
-  require_some(clip);
+  Clip clip = args.has("clip-covered") ? covered_clip(args, scene, progress) : Clip{}, asked;
+  if (box)
+    for (std::size_t a = 0; a < 3; ++a) {
+      asked.low[a] = (*box)[a];
+      asked.high[a] = (*box)[a + 3];
+      if (!(asked.low[a] < asked.high[a]))
+        throw InputError(
+            fmt::format("--clip: {} is not below {} along {}", asked.low[a], asked.high[a], "xyz"[a]));
+    }
+  cut_to(clip, asked);
   return clip;
-}
-
-Clip certified_clip(const Arguments& args, const Scene& scene, const RenderOptions& options,
-                    const Progress& progress) {
-  Clip clip = covered_clip(args, scene, progress);
-  if (options.clip) cut(clip, options.clip->low, options.clip->high);
-  require_some(clip);
-  return clip;
-}
-
-void require_some(const Clip& clip) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double reach = a < 2 ? clip.radius : std::numeric_limits<double>::infinity();
-    if (!(std::max(clip.low[a], -reach) < std::min(clip.high[a], reach)))
-      throw InputError(fmt::format("--clip: the box holds nothing of the covered region along {}", "xyz"[a]));
-  }
 }
 
 }  // namespace vdvr::cli

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "vdvr/error.hpp"
-#include "vdvr/rtk_geometry.hpp"
+#include "vdvr/expert/rtk_geometry.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "apps/common/progress.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/crew.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/crew.hpp"
 
 namespace vdvr::cli {
 

@@ -13,9 +13,9 @@
 #include <sstream>
 #include <vector>
 
-#include "apps/vdvr/crew.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/stop.hpp"
+#include "apps/vdvr/expert/crew.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace fs = std::filesystem;
 

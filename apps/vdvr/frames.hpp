@@ -9,7 +9,7 @@
 #include <string>
 
 #include "apps/common/output_folder.hpp"
-#include "vdvr/crew.hpp"
+#include "vdvr/expert/crew.hpp"
 
 namespace vdvr::cli {
 

@@ -4,14 +4,13 @@
 
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/crew.hpp"
-#include "vdvr/certify.hpp"
+#include "apps/vdvr/expert/crew.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
 #include "vdvr/read_scan.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/verify_file.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace fs = std::filesystem;
 

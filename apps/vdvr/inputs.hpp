@@ -7,13 +7,13 @@
 #include <string>
 
 #include "apps/vdvr/options.hpp"
-#include "vdvr/input_statement.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/input_statement.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
 #include "vdvr/read_scan.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/expert/understood.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {

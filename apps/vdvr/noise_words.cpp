@@ -37,17 +37,18 @@ void print_noise(const NoiseFound& found) {
 
 std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Wanted* compared,
                                         const Progress& progress) {
-  if (!planned.noise.noise || !planned.sigma) return std::nullopt;
-  const Plan& plan = planned.plan;
+  if (!planned.noise.noise || !planned.made.sigma) return std::nullopt;
+  const Plan& plan = planned.made.plan;
   FieldNoise out;
-  out.sigma = planned.sigma->range;
-  out.sigmas = planned.sigmas;
+  out.sigma = planned.made.sigma->range;
+  out.sigmas = planned.made.asked.sigmas;
   out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
-  out.forecasts = foresee_in_sigma(plan, *planned.sigma, multiples);
+  out.forecasts = foresee_in_sigma(plan, *planned.made.sigma, multiples);
   out.rings = ring_noise(planned.scan, planned.understood.flats);
   if (compared)
-    out.filters = foresee_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.sigmas,
-                                  *planned.noise.noise, compared->options, progress);
+    out.filters =
+        foresee_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.made.asked.sigmas,
+                        *planned.noise.noise, compared->options, progress);
   return out;
 }
 

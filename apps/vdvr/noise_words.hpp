@@ -6,9 +6,10 @@
 #include <vector>
 
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/noise_forecast.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
 
 namespace vdvr::cli {
 

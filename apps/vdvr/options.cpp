@@ -8,6 +8,7 @@
 #include <map>
 
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {

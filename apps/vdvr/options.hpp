@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/plan.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/plan.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {

@@ -9,8 +9,9 @@
 #include <cstdio>
 
 #include "apps/common/messages.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace fs = std::filesystem;
 

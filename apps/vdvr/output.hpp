@@ -12,12 +12,12 @@
 #include "apps/common/output_folder.hpp"
 #include "apps/common/volume_json.hpp"
 #include "apps/vdvr/options.hpp"
-#include "apps/vdvr/understood.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/plan.hpp"
-#include "vdvr/projections.hpp"
+#include "apps/vdvr/expert/understood.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/plan.hpp"
+#include "vdvr/expert/projections.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/decorate.hpp"
+#include "vdvr/expert/decorate.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/vdvr/source.hpp"
-#include "vdvr/slice_frame.hpp"
+#include "vdvr/expert/slice_frame.hpp"
 
 namespace vdvr::cli {
 

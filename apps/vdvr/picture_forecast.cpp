@@ -8,9 +8,9 @@ namespace vdvr::cli {
 
 std::optional<PictureForecast> picture_forecast(Device& device, const Planned& planned, const Wanted& wanted,
                                                 const Progress& progress) {
-  if (!planned.pictures) return std::nullopt;
-  return foresee_pictures(device, planned.scan, planned.plan, wanted.pictures->views,
-                          refinement_options(planned, wanted), everywhere_of(planned, wanted),
+  if (!planned.made.pictures) return std::nullopt;
+  return foresee_pictures(device, planned.scan, planned.made.plan, planned.made.asked.pictures->views,
+                          planned.made.refinement_options(), planned.made.everywhere_abs(),
                           wanted.options.build.storage, progress);
 }
 

@@ -31,11 +31,6 @@ void print_tolerance(const std::optional<PixelsBeyond>& beyond) {
     fmt::print("  every pixel is certain to {:g} levels\n", beyond->tolerance);
 }
 
-void check_tolerance(const Arguments& args) {
-  if (const auto levels = args.number("picture-tolerance"); levels && !(*levels >= 0 && *levels <= 255))
-    throw InputError(fmt::format("--picture-tolerance: {:g} is not within 0 and 255 levels", *levels));
-}
-
 void require_within(const std::filesystem::path& output, const std::optional<PixelsBeyond>& beyond) {
   if (!beyond || beyond->count == 0) return;
   throw MismatchError(fmt::format("{}: {} pixels are not certain to {:g} levels: {}", output.string(),

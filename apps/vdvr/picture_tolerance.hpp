@@ -1,5 +1,4 @@
-// --picture-tolerance N of render: which pixels are not certain to N levels of 255. Called by
-// certify_render.cpp and ray_certificate.cpp.
+// --picture-tolerance N of render: which pixels are not certain to N levels of 255.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,7 @@
 #include <string>
 
 #include "apps/vdvr/output.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr::cli {
 
@@ -22,8 +21,6 @@ std::optional<PixelsBeyond> pixels_beyond(const Arguments& args, const PictureBo
 Json tolerance_json(const PixelsBeyond& beyond);
 /// Prints that all are certain, where they are.
 void print_tolerance(const std::optional<PixelsBeyond>& beyond);
-/// Throws InputError for what is no number of levels.
-void check_tolerance(const Arguments& args);
 /// Throws MismatchError, which names the pixels, where there are some.
 void require_within(const std::filesystem::path& output, const std::optional<PixelsBeyond>& beyond);
 

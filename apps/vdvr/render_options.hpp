@@ -7,7 +7,7 @@
 
 #include "apps/common/arguments.hpp"
 #include "apps/vdvr/view.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {

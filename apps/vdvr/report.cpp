@@ -11,6 +11,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/report_chart.hpp"
 #include "apps/vdvr/report_storage.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr::cli {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 
 namespace vdvr::cli {
 

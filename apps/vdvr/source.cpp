@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -71,40 +71,12 @@ Source::Source(const Arguments& args, const CommonOptions& common, const std::st
     selectors = {selectors[static_cast<std::size_t>(place_here()) % selectors.size()]};
   const std::uint64_t memory =
       common.max_memory / (selectors.size() * static_cast<std::uint64_t>(processes_here()));
-  device_.emplace(selectors.front(), memory);
-  // A volume without tiles has nothing that could come brick by brick: what it lacks, its own error says.
-  if (scene_->volume.tiles.empty() || fits(*device_, scene_->volume)) {
-    resident_.emplace(*device_, scene_->volume);
-    renderer_.emplace(*device_, *resident_);
-  } else {
-    report(progress, "find ranges", 0);
-    paged_.emplace(*device_, scene_->volume);
-  }
-  if (paged_ || selectors.size() > 1) open_others({selectors.begin() + 1, selectors.end()}, memory, progress);
-}
-
-void Source::open_others(const std::vector<std::string>& selectors, std::uint64_t memory,
-                         const Progress& progress) {
-  std::vector<RenderCrew::Member> members{
-      {&*device_, resident_ ? &*resident_ : nullptr, paged_ ? &*paged_ : nullptr}};
+  std::vector<Device*> devices;
   for (const std::string& selector : selectors) {
-    others_.push_back(
-        std::unique_ptr<Other>(new Other{Device(selector, memory), std::nullopt, std::nullopt}));
-    Other& other = *others_.back();
-    const DeviceInfo &a = device_->info(), &b = other.device.info();
-    if (a.name != b.name || a.driver != b.driver)
-      throw InputError(
-          fmt::format("--device: '{}' ({}) and '{}' ({}) may round differently, and pictures are those of "
-                      "one device: name "
-                      "devices of one kind",
-                      a.name, a.driver, b.name, b.driver));
-    report(progress, "open devices", 0);
-    if (resident_) other.resident.emplace(other.device, scene_->volume);
-    else other.paged.emplace(other.device, scene_->volume);
-    members.push_back(
-        {&other.device, other.resident ? &*other.resident : nullptr, other.paged ? &*other.paged : nullptr});
+    devices_.push_back(std::make_unique<Device>(selector, memory));
+    devices.push_back(devices_.back().get());
   }
-  crew_.emplace(members);
+  drawn_.emplace(devices, scene_->volume, progress);
 }
 
 void Source::open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress) {
@@ -118,29 +90,26 @@ void Source::open_projections(const Arguments& args, const CommonOptions& common
     throw InputError("--device: --method d2vr draws on one device; volumes are drawn on several");
   // --size is the picture's.
   const Grid grid = make_grid(geometry, grid_options(args, "cells"));
-  device_.emplace(open_device(common));
-  field_.emplace(*device_, scan, options, progress);
-  projections_.emplace(*device_, *field_, grid, progress);
-  renderer_.emplace(*device_, *projections_);
+  devices_.push_back(std::make_unique<Device>(open_device(common)));
+  field_.emplace(device(), scan, options, progress);
+  projections_.emplace(device(), *field_, grid, progress);
+  renderer_.emplace(device(), *projections_);
   scene_ = Scene{as_mixed(projections_->samples()), std::nullopt, false};
 }
 
 bool Source::trusted() {
-  return test_of(*device_).passed() && std::all_of(others_.begin(), others_.end(), [](const auto& other) {
-           return test_of(other->device).passed();
-         });
+  return std::all_of(devices_.begin(), devices_.end(),
+                     [](const auto& device) { return test_of(*device).passed(); });
 }
 
 void Source::require_trusted(const std::string& what) {
-  vdvr::require_trusted(*device_, what);
-  for (const auto& other : others_) vdvr::require_trusted(other->device, what);
+  for (const auto& device : devices_) vdvr::require_trusted(*device, what);
 }
 
 SafeSampler Source::take_sampler(SamplerKind asked, bool unverified) {
-  // By bricks it is always the buffer.
-  if (paged_ && asked == SamplerKind::automatic) asked = SamplerKind::buffer;
+  if (drawn_ && drawn_->by_bricks()) asked = drawn_->sampler(asked);
   // Further devices are of the first one's kind.
-  SafeSampler safe = safe_sampler(*device_, scene_->volume, scene_->certificate, asked, unverified);
+  SafeSampler safe = safe_sampler(device(), scene_->volume, scene_->certificate, asked, unverified);
   here_ = safe.certificate;
   return safe;
 }
@@ -153,34 +122,19 @@ const Certificate& Source::certificate() const {
 }
 
 RenderResult Source::draw(const RenderOptions& options, const Progress& progress) {
+  if (!drawn_) return renderer_->render(options);
   if (options.output == RenderOutput::error && shown_.values.empty()) {
-    const bool image3d = renderer_ && renderer_->sampler(options.sampler) == SamplerKind::image3d;
+    const bool image3d = drawn_->sampler(options.sampler) == SamplerKind::image3d;
     shown_ = brick_values(scene_->volume, certificate(), image3d, shown_.quantity);
-    if (crew_) crew_->set_bounds(shown_.values);
-    else renderer_->set_bounds(shown_.values);
+    drawn_->set_bounds(shown_.values);
   }
-  return crew_ ? crew_->render(options, progress) : renderer_->render(options);
+  return drawn_->draw(options, progress);
 }
 
-PixelBounds Source::certify(const RenderOptions& options, const CertifyPictureOptions& certify,
-                            const Progress& progress) {
-  if (paged_)
-    return certify_pixels(*device_, *paged_, brick_bounds(certificate(), false), options, certify, progress);
-  const bool image3d = renderer_->sampler(options.sampler) == SamplerKind::image3d;
-  return certify_pixels(*device_, *resident_, brick_bounds(certificate(), image3d), options, certify,
-                        progress);
-}
+std::pair<float, float> Source::value_range() const { return drawn_->value_range(); }
 
-std::pair<float, float> Source::value_range() const {
-  return paged_ ? paged_->value_range() : resident_->value_range();
-}
+std::uint64_t Source::bytes() const { return drawn_ ? drawn_->bytes() : field_->bytes(); }
 
-std::uint64_t Source::bytes() const {
-  return field_ ? field_->bytes() : paged_ ? device_->peak_memory() : resident_->bytes();
-}
-
-std::optional<PagingCounts> Source::paging() const {
-  return paged_ ? std::optional(paged_->counts()) : std::nullopt;
-}
+std::optional<PagingCounts> Source::paging() const { return drawn_ ? drawn_->paging() : std::nullopt; }
 
 }  // namespace vdvr::cli

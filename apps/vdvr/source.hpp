@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/d2vr.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/paged_volume.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/render_crew.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/d2vr.hpp"
+#include "vdvr/expert/drawn_volume.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/paged_volume.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/render_crew.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr::cli {
 
@@ -38,10 +39,10 @@ class Source {
 
   /// Of projections the field on the grid's samples, without a certificate.
   [[nodiscard]] const Scene& scene() const { return *scene_; }
-  [[nodiscard]] Device& device() { return *device_; }
+  [[nodiscard]] Device& device() { return *devices_.front(); }
   /// Of all devices that draw: they passed their test when they were opened.
   [[nodiscard]] bool trusted();
-  /// As of vdvr/trust.hpp, of each of them.
+  /// As of vdvr/expert/trust.hpp, of each of them.
   void require_trusted(const std::string& what);
   /// What safe_sampler() says of the device that draws. Bounds are afterwards those of its certificate.
   SafeSampler take_sampler(SamplerKind asked, bool unverified);
@@ -53,9 +54,8 @@ class Source {
   [[nodiscard]] const BrickValues& shown() const { return shown_; }
   /// `progress` hears of pictures by several devices, or by bricks.
   [[nodiscard]] RenderResult draw(const RenderOptions& options, const Progress& progress = {});
-  /// Intervals of the pixels that draw() gives, by the certificate's bounds by brick.
-  [[nodiscard]] PixelBounds certify(const RenderOptions& options, const CertifyPictureOptions& certify,
-                                    const Progress& progress);
+  /// What certified pictures are drawn of; not of projections.
+  [[nodiscard]] DrawnVolume& volume() { return *drawn_; }
   /// Of a volume's samples.
   [[nodiscard]] std::pair<float, float> value_range() const;
   /// On the device beside what a frame needs: volume, or projections; of a volume by bricks the most
@@ -67,20 +67,9 @@ class Source {
  private:
   void open_projections(const Arguments& args, const CommonOptions& common, const Progress& progress);
 
-  /// A further device of --device, with the volume on it.
-  struct Other {
-    Device device;
-    std::optional<ResidentVolume> resident;  ///< or
-    std::optional<PagedVolume> paged;
-  };
-  void open_others(const std::vector<std::string>& selectors, std::uint64_t memory, const Progress& progress);
-
   std::optional<Scene> scene_;
-  std::optional<Device> device_;
-  std::optional<ResidentVolume> resident_;  ///< or
-  std::optional<PagedVolume> paged_;        ///< or
-  std::vector<std::unique_ptr<Other>> others_;
-  std::optional<RenderCrew> crew_;  ///< of all devices, where there are several, or of one by bricks
+  std::vector<std::unique_ptr<Device>> devices_;  ///< all that draw
+  std::optional<DrawnVolume> drawn_;              ///< or, of projections:
   std::optional<D2vrField> field_;
   std::optional<D2vrScene> projections_;
   std::optional<Renderer> renderer_;

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "apps/common/common_options.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr::cli {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/vdvr/output.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr::cli {
 

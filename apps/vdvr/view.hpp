@@ -7,7 +7,7 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {

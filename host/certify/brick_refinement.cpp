@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "host/bounds/result_units.hpp"
+#include "host/volume/result_units.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

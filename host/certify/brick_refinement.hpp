@@ -1,12 +1,12 @@
-// Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of vdvr/build.hpp).
-// Called by build.cpp.
+// Tolerances brick by brick, as whoever looks at a volume asks for them (Refinement of
+// vdvr/expert/build.hpp).
 #pragma once
 
 #include <vector>
 
-#include "host/gold/node_tolerance.hpp"
+#include "host/certify/gold/node_tolerance.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 namespace vdvr {
 

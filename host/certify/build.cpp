@@ -1,6 +1,6 @@
 // Builds the certified volume: classify, extract, close, pack, then measure the packed field and repair until
 // it holds (docs/error-bounds.md). Calls gold_stream.cpp and close_boundaries.cpp.
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 #include <fmt/format.h>
 
@@ -8,24 +8,25 @@
 #include <cmath>
 #include <utility>
 
-#include "host/bounds/result_units.hpp"
 #include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/certify/fill_certificate.hpp"
+#include "host/certify/plan_units.hpp"
 #include "host/certify/sampler_share.hpp"
-#include "host/closing/raise_levels.hpp"
-#include "host/crew/crew.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/prepared_scan.hpp"
-#include "host/opencl/host_memory.hpp"
-#include "host/system/casts.hpp"
+#include "host/certify/closing/raise_levels.hpp"
+#include "host/certify/crew/crew.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/trust.hpp"
+#include "host/volume/result_units.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {
@@ -81,15 +82,16 @@ IntegerLattice lattice_of(const std::vector<float>& base, const Plan& plan, cons
                         units.density(), filters);
 }
 
-Room room_for(const opencl::State& state, const ProjectionSet& scan, const BuildOptions& options) {
+MemoryBudget memory_budget_of(const opencl::State& state, const ProjectionSet& scan,
+                              const BuildOptions& options) {
   const std::uint64_t share = state.memory.limit() / 8;
   if (share == 0 && !options.in_memory_bytes) return {};
-  Room room{scan.data.scratch(), options.in_memory_bytes.value_or(share)};
-  if (!room.scratch)
-    room.scratch =
+  MemoryBudget budget{scan.data.scratch(), options.in_memory_bytes.value_or(share)};
+  if (!budget.scratch)
+    budget.scratch =
         std::make_shared<Scratch>(options.scratch.empty() ? default_scratch_folder() : options.scratch,
                                   std::max(share, least_resident));
-  return room;
+  return budget;
 }
 
 GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const IntegerLattice& lattice,
@@ -111,7 +113,7 @@ GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const 
 }
 
 OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const IntegerLattice& lattice,
-                       const Room& room) {
+                       const MemoryBudget& budget) {
   OpenBricks bricks;
   bricks.grid = plan.grid;
   bricks.granularity = plan.layout.granularity;
@@ -124,7 +126,7 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const I
   const auto count = at(Bricks(plan.grid, plan.layout.granularity).size());
   bricks.level.assign(count, LevelTriple{0, 0, 0});
   bricks.involved.assign(count, 0);
-  bricks.samples = TileStore(room);
+  bricks.samples = TileStore(budget);
   bricks.samples.resize(count);
   return bricks;
 }
@@ -197,7 +199,7 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
   keep_share(in, share, near);
   const MixedVolume level0 = as_mixed(bricks.base, in.gold.fine.gold().settings());
   const DeviceField base(in.state, level0);
-  if (in.crew) in.crew->use(level0, in.room);
+  if (in.crew) in.crew->use(level0, in.budget);
   test.classify(base, tolerance, near);
   in.watch.lap("classify");
 }
@@ -256,7 +258,7 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
   MixedVolume before;
   HostMemory closed(in.state);
   std::uint64_t closed_bytes = 0;
-  CloseBoundaries close(bricks, in.plan.settings.comparison.closing, in.room);
+  CloseBoundaries close(bricks, in.plan.settings.comparison.closing, in.budget);
   std::vector<std::uint8_t> raised;
   for (int round = 0;; ++round) {
     MixedVolume volume = round > 0 ? close.again(before, raised) : close.first();
@@ -270,8 +272,8 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
     closed.count(memory_bytes(volume), "the closed volume");
     closed_bytes = memory_bytes(volume);
     in.watch.lap("close");
-    const DeviceField field(in.state, volume, in.room.for_bytes(sample_buffer_bytes(volume)));
-    if (in.crew) in.crew->use(volume, in.room);
+    const DeviceField field(in.state, volume, in.budget.for_bytes(sample_buffer_bytes(volume)));
+    if (in.crew) in.crew->use(volume, in.budget);
     test.measure(field, volume.level, tolerance, pending, round == 0 ? "verify" : "repair");
     in.watch.lap("verify");
     for (;;) {
@@ -302,7 +304,7 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
                          const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
-  OpenBricks bricks = open_bricks(in.plan, base, lattice, in.room);
+  OpenBricks bricks = open_bricks(in.plan, base, lattice, in.budget);
   std::optional<ClassifyBricks> test;
   test.emplace(in.gold, bricks, tiles, in.progress,
                [&](float slack, double strict) { refuse_slack(in, test->bounds(), slack, strict); });
@@ -364,10 +366,11 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   JournalledRates journalled(gold, &records, others);
   watch.lap("bounds");
 
-  const Room room = room_for(state, scan, options);
+  const MemoryBudget budget = memory_budget_of(state, scan, options);
   double arithmetic = gold.arithmetic();
   for (const Crew::Kind& kind : kinds) arithmetic = std::max(arithmetic, kind.arithmetic);
-  const Inputs in{state, units, plan, selected, journalled, gold, others, arithmetic, room, progress, watch};
+  const Inputs in{state,  units,      plan,   selected, journalled, gold,
+                  others, arithmetic, budget, progress, watch};
   std::optional<BrickRefinement> refinement;
   if (options.refinement) refinement.emplace(*options.refinement, units);
   const double epsilon_abs = refinement ? refinement->everywhere() : plan.epsilon_abs;

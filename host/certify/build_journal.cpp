@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {

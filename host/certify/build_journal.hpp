@@ -1,11 +1,11 @@
-// What a build depends on, as its journal says it. Called by build.cpp and certify.cpp.
+// What a build depends on, as its journal says it.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host/crew/crew.hpp"
-#include "vdvr/build.hpp"
+#include "host/certify/crew/crew.hpp"
+#include "vdvr/expert/build.hpp"
 
 namespace vdvr {
 

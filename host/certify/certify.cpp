@@ -1,6 +1,5 @@
-// What a program over the library needs to certify: plan, build and the certificate completed. Called by
-// programs; calls plan.cpp and build.cpp.
-#include "vdvr/certify.hpp"
+// What a program over the library needs to certify: plan, build and the certificate completed.
+#include "vdvr/expert/certify.hpp"
 
 #include <fmt/format.h>
 
@@ -10,13 +9,13 @@
 #include <utility>
 
 #include "host/certify/build_journal.hpp"
-#include "host/bounds/covered_range.hpp"
-#include "host/fdk/filter_cone.hpp"
-#include "host/gold/gold_settings.hpp"
-#include "vdvr/certified_region.hpp"
+#include "host/certify/gold/gold_settings.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/volume/covered_range.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "host/scan/input_statement_json.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {
@@ -157,47 +156,6 @@ BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan, const 
   c.options_json = std::move(noted);
   c.content_sha256 = content_sha256(result.volume);
   return result;
-}
-
-std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
-  const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
-  if (!options.is_object() || !options.contains("geometry")) return std::nullopt;
-  try {
-    const auto& g = options.at("geometry");
-    ProjectionSet scan;
-    ParallelGeometry& geometry = scan.geometry;
-    geometry.columns = g.at("columns").get<std::int64_t>();
-    geometry.rows = g.at("rows").get<std::int64_t>();
-    geometry.pitch_u = g.at("pitch_u").get<double>();
-    geometry.pitch_v = g.at("pitch_v").get<double>();
-    geometry.center = g.at("center").get<double>();
-    geometry.unit = g.at("unit").get<std::string>();
-    geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
-    if (g.contains("cone")) {
-      const auto& cone = g.at("cone");
-      const auto redundancy = redundancy_of(cone.at("redundancy").get<std::string>());
-      if (!redundancy) throw FileError("certificate, options.geometry.cone: an unknown redundancy");
-      const auto numbers = cone.at("matrices").get<std::vector<double>>();
-      if (numbers.size() != 12 * geometry.theta_rad.size())
-        throw FileError("certificate, options.geometry.cone: 12 numbers are needed for each view");
-      scan.cone = ConeGeometry{std::vector<ViewMatrix>(geometry.theta_rad.size()), *redundancy};
-      for (std::size_t i = 0; i < numbers.size(); ++i)
-        scan.cone->views[i / 12][i % 12 / 4][i % 4] = numbers[i];
-    }
-    return scan;
-  } catch (const nlohmann::json::exception& e) {
-    throw FileError(fmt::format("certificate, options.geometry: {}", e.what()));
-  }
-}
-
-InputStatement noted_input(const Certificate& certificate) {
-  const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
-  if (!options.is_object() || !options.contains("input")) return {};
-  try {
-    return input_statement_of(options.at("input"));
-  } catch (const InputError& e) {
-    throw FileError(fmt::format("certificate, options: {}", e.what()));
-  }
 }
 
 }  // namespace vdvr

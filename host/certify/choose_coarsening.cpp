@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "host/volume/validate_volume.hpp"
 
 namespace vdvr {
 namespace {

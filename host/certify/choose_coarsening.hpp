@@ -1,11 +1,11 @@
 // How much coarser than the grid the stored base is, per axis (docs/error-bounds.md, section on levels per
-// axis). Called by plan.cpp; build.cpp asks whether a plan's base is possible.
+// axis).
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

@@ -1,17 +1,17 @@
 // The rates of a plan: what a trial of some blocks of gold shows of each, and which of them leave room for
-// the grid. All numbers in units of computation. Called by plan.cpp.
+// the grid. All numbers in units of computation.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <vector>
 
-#include "host/crew/gold_rates.hpp"
+#include "host/certify/crew/gold_rates.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/plan.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/plan.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

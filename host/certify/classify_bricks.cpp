@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 

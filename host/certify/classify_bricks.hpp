@@ -1,5 +1,5 @@
 // Levels of bricks by the node test, and the measure of stored fields, at two rates of gold
-// (docs/error-bounds.md, section 14). Called by build.cpp, foresee.cpp and verify_terms.cpp.
+// (docs/error-bounds.md, section 14).
 #pragma once
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "host/closing/open_bricks.hpp"
-#include "host/crew/journalled_gold.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/opencl/host_memory.hpp"
+#include "host/certify/closing/open_bricks.hpp"
+#include "host/certify/crew/journalled_gold.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/base/opencl/host_memory.hpp"
 
 namespace vdvr {
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <optional>
 
-#include "host/bounds/covered_range.hpp"
-#include "host/gold/worst_node.hpp"
-#include "host/system/casts.hpp"
+#include "host/certify/gold/worst_node.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/trust.hpp"
+#include "host/volume/covered_range.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-// What the steps of a build share, and the certificate of what they made. Called by build.cpp.
+// What the steps of a build share, and the certificate of what they made.
 #pragma once
 
 #include <chrono>
@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "host/certify/classify_bricks.hpp"
-#include "host/crew/journalled_gold.hpp"
-#include "host/gold/prepared_scan.hpp"
-#include "vdvr/build.hpp"
+#include "host/certify/crew/journalled_gold.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
+#include "vdvr/expert/build.hpp"
 
 namespace vdvr {
 
@@ -36,9 +36,9 @@ struct Inputs {
   const std::vector<std::uint8_t>& selected;  // by brick: in the region of interest
   JournalledRates& gold;
   GoldRates& rates;
-  Crew* crew;             // none: the device alone
-  double arithmetic = 0;  // fp32 error bound of any gold sample
-  const Room& room;       // for what is made of the bricks
+  Crew* crew;                  // none: the device alone
+  double arithmetic = 0;       // fp32 error bound of any gold sample
+  const MemoryBudget& budget;  // for what is made of the bricks
   const Progress& progress;
   Stopwatch& watch;
 };

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "host/opencl/host_memory.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

@@ -1,5 +1,4 @@
-// What a build will store and how long it will take, from a sample of its bricks. Called by plan.cpp and
-// foresee_pictures.cpp.
+// What a build will store and how long it will take, from a sample of its bricks.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +6,7 @@
 #include <vector>
 
 #include "host/certify/classify_bricks.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
 
 namespace vdvr {
 

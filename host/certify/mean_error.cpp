@@ -1,16 +1,16 @@
 // What interpolation errs by on average, in units of the scan's own noise: V against F reconstructed at
 // points between samples. An estimate from some ten thousand points, beside the largest error, which is
-// proved. Declared in vdvr/noise_forecast.hpp.
+// proved. Declared in vdvr/expert/noise_forecast.hpp.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "host/system/casts.hpp"
-#include "vdvr/certified_region.hpp"
+#include "host/base/system/casts.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noise_forecast.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,17 +1,17 @@
 // Bounds against a finer gold, on the bricks where bounds or chance say to look.
-#include "vdvr/measure_tightness.hpp"
+#include "vdvr/expert/measure_tightness.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <random>
 
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/base_of_gold.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/prepared_scan.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
 #include "host/scan/units.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

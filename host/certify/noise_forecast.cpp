@@ -1,5 +1,5 @@
-// Tolerances in sigma; see vdvr/noise_forecast.hpp.
-#include "vdvr/noise_forecast.hpp"
+// Tolerances in sigma; see vdvr/expert/noise_forecast.hpp.
+#include "vdvr/expert/noise_forecast.hpp"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "host/certify/foresee.hpp"
-#include "host/gold/gold_settings.hpp"
-#include "host/system/casts.hpp"
+#include "host/certify/gold/gold_settings.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -147,16 +147,6 @@ Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   }
   out.digest = fmt::format("{} sigma of {}", multiple, sigma_sha256(sigma.of_brick));
   return out;
-}
-
-BuildResult certify_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
-                             const ScanNoise& noise, CertifyOptions options, const Progress& progress) {
-  options.plan.foresee = false;
-  PlanInSigma made = make_plan_in_sigma(device, scan, multiple, noise, options, progress);
-  options.build.refinement = refinement_in_sigma(made.sigma, multiple);
-  BuildResult result = certify(device, scan, std::move(made.plan), options, progress);
-  note_noise(device, scan, result, noise, made.sigma, multiple, progress);
-  return result;
 }
 
 void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,

@@ -1,6 +1,5 @@
-// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md). Called by
-// the command line.
-#include "vdvr/plan.hpp"
+// Bounds side by side; rates, tolerance, base and what a build will take (docs/error-bounds.md).
+#include "vdvr/expert/plan.hpp"
 
 #include <fmt/format.h>
 
@@ -13,23 +12,23 @@
 #include <numbers>
 #include <utility>
 
-#include "host/bounds/amplitude_bounds.hpp"
-#include "host/bounds/covered_range.hpp"
-#include "host/bounds/paper_bounds.hpp"
+#include "host/certify/bounds/amplitude_bounds.hpp"
+#include "host/certify/bounds/paper_bounds.hpp"
+#include "host/volume/covered_range.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
 #include "host/certify/foresee.hpp"
-#include "host/gold/base_of_gold.hpp"
-#include "host/gold/prepared_scan.hpp"
-#include "host/bounds/result_units.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/opencl/host_memory.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/gold/prepared_scan.hpp"
+#include "host/certify/plan_units.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/row_window.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

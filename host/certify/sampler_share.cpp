@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "host/bounds/result_units.hpp"
-
 namespace vdvr {
 namespace {
 

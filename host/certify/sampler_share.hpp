@@ -1,19 +1,19 @@
 // What a build leaves of epsilon for the samplers of its devices (docs/error-bounds.md, section 8). What they
 // take is known only of a volume that is stored; the texture unit's part can be many times the buffer's. It
-// is each brick's own, and falls as bricks with steep samples are refined. Called by build.cpp.
+// is each brick's own, and falls as bricks with steep samples are refined.
 #pragma once
 
 #include <optional>
 #include <vector>
 
-#include "host/crew/crew.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/node_tolerance.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/certify/crew/crew.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/node_tolerance.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
 

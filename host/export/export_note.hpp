@@ -1,5 +1,5 @@
 // What an exported file says about itself beside its samples: where they lie, what they stand for, and what
-// the certificate promises of them. Called by the sinks, ome_zarr.cpp and export_vtk.cpp.
+// the certificate promises of them.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
-// Sigma of F beside an exported volume. Declared in vdvr/export_volume.hpp; called by `vdvr export --sigma`.
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+// Sigma of F beside an exported volume. Declared in vdvr/export_volume.hpp.
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/export_volume.hpp"
 

@@ -1,5 +1,5 @@
 // Slab by slab: V is sampled on all cores, turned into the file's type, and handed to the format's sink. What
-// was exported is never whole in memory. Called by `vdvr export` and `vdvr reconstruct`.
+// was exported is never whole in memory.
 #include "vdvr/export_volume.hpp"
 
 #include <fmt/format.h>
@@ -15,15 +15,15 @@
 
 #include "host/export/hdf5_sink.hpp"
 #include "host/export/ome_zarr.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "host/export/tiff_sink.hpp"
 #include "host/export/volume_sink.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/parallel.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/parallel.hpp"
+#include "host/base/system/lower.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/export_vtk.hpp"
+#include "vdvr/expert/export_vtk.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,6 +1,5 @@
-// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them. Called by
-// export_volume.cpp, and by whoever wants blocks in memory.
-#include "vdvr/export_vtk.hpp"
+// VTK's XML files: a .vti per block, written on all cores, and the .vtm that lists them.
+#include "vdvr/expert/export_vtk.hpp"
 
 #include <fmt/format.h>
 
@@ -15,12 +14,12 @@
 
 #include "host/export/export_note.hpp"
 #include "host/export/pack.hpp"
-#include "host/export/sample_box.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "host/export/vtk_partition.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "host/export/pack.hpp"
-#include "host/hdf5/hdf5_writer.hpp"
-#include "host/system/length_unit.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/parallel.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
+#include "host/base/system/length_unit.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-// HDF5: one dataset, its chunks packed on all cores. Called by export_volume.cpp.
+// HDF5: one dataset, its chunks packed on all cores.
 #pragma once
 
 #include "host/export/volume_sink.hpp"

@@ -1,6 +1,6 @@
 // Bricks that a lattice touches, the chunks of the file that hold their samples, and these in memory that
-// takes room only where it is written. Called by the Python module.
-#include "vdvr/lazy_volume.hpp"
+// takes room only where it is written.
+#include "vdvr/expert/lazy_volume.hpp"
 
 #include <fmt/format.h>
 #include <sys/mman.h>
@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "host/export/sample_box.hpp"
-#include "host/hdf5/hdf5_chunks.hpp"
-#include "host/system/casts.hpp"
+#include "host/volume/sampler/sample_box.hpp"
+#include "host/files/hdf5/hdf5_chunks.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/vdvr_file.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -12,12 +12,12 @@
 #include <map>
 
 #include "host/export/pack.hpp"
-#include "host/export/sample_box.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/parallel.hpp"
+#include "host/volume/sampler/sample_box.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

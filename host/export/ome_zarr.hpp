@@ -1,10 +1,10 @@
-// OME-Zarr 0.5: a Zarr v3 group of arrays, one a level, each a folder of chunks. Called by export_volume.cpp.
+// OME-Zarr 0.5: a Zarr v3 group of arrays, one a level, each a folder of chunks.
 #pragma once
 
 #include <filesystem>
 
 #include "host/export/volume_sink.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "vdvr/error.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr {
 

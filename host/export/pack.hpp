@@ -1,5 +1,4 @@
-// Bytes as zlib packs them, for the formats whose readers unpack them by themselves. Called by hdf5_sink.cpp,
-// ome_zarr.cpp and export_vtk.cpp.
+// Bytes as zlib packs them, for the formats whose readers unpack them by themselves.
 #pragma once
 
 #include <cstddef>

@@ -8,11 +8,11 @@
 #include <cstdio>
 #include <fstream>
 
-#include "host/io/tiff_messages.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/parallel.hpp"
+#include "host/files/io/tiff_messages.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-// TIFF by libtiff: one file of pages, or a folder of slices. Called by export_volume.cpp.
+// TIFF by libtiff: one file of pages, or a folder of slices.
 #pragma once
 
 #include "host/export/volume_sink.hpp"

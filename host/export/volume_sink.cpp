@@ -6,10 +6,10 @@
 #include <bit>
 #include <fstream>
 
-#include "host/system/limits.hpp"
+#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr {
 namespace {

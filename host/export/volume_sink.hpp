@@ -1,5 +1,5 @@
 // Where planes of a uniform volume go, one slab after the other: the interface of the formats' writers, and
-// those that are a header and samples. Called by export_volume.cpp.
+// those that are a header and samples.
 #pragma once
 
 #include <cstdint>

@@ -8,7 +8,7 @@
 #include <limits>
 #include <tuple>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,9 +1,9 @@
-// Which bricks share a vtkImageData. Called by export_vtk.cpp.
+// Which bricks share a vtkImageData.
 #pragma once
 
 #include <vector>
 
-#include "vdvr/export_vtk.hpp"
+#include "vdvr/expert/export_vtk.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,7 @@
 // Moving pictures: APNG (the chunks of the PNG specification, third edition, around frames that are PNG
-// already) and GIF through giflib, with our own palette. Called by the render command.
+// already) and GIF through giflib, with our own palette.
+#include "vdvr/expert/animation.hpp"
+
 #include <fmt/format.h>
 #include <gif_lib.h>
 #include <zlib.h>
@@ -10,9 +12,9 @@
 #include <string>
 
 #include "host/picture/palette.hpp"
-#include "host/picture/png.hpp"
+#include "host/base/system/png.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-// Pixels, rectangles and smooth lines on a picture. Called by what draws in this room.
+// Pixels, rectangles and smooth lines on a picture.
 #pragma once
 
 #include <array>
@@ -6,7 +6,7 @@
 #include <functional>
 #include <glm/vec2.hpp>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

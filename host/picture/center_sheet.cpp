@@ -1,6 +1,5 @@
-// The sheet of `vdvr center`: scans of one row with other centres, reconstructed and drawn. Called by
-// programs; calls reconstruct.
-#include "vdvr/center_sheet.hpp"
+// The sheet of `vdvr center`: scans of one row with other centres, reconstructed and drawn.
+#include "vdvr/expert/center_sheet.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +11,7 @@
 #include "host/picture/canvas.hpp"
 #include "host/picture/text.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {

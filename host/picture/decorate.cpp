@@ -1,4 +1,4 @@
-#include "vdvr/decorate.hpp"
+#include "vdvr/expert/decorate.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include "host/picture/canvas.hpp"
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
-#include "host/render/glm_vectors.hpp"
+#include "host/picture/render/glm_vectors.hpp"
 
 namespace vdvr {
 namespace {

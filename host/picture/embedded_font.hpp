@@ -1,4 +1,4 @@
-// DejaVu Sans as it lies in its file, put into the library by cmake/EmbedFont.cmake. Called by text.cpp.
+// DejaVu Sans as it lies in its file, put into the library by cmake/EmbedFont.cmake.
 #pragma once
 
 #include <string_view>

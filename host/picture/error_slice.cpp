@@ -1,5 +1,5 @@
-#include "vdvr/certified_region.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/error_slice.hpp"
 
 #include <fmt/format.h>
 
@@ -11,10 +11,10 @@
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/region_of_interest.hpp"
-#include "vdvr/slice_frame.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
+#include "vdvr/expert/slice_frame.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,5 @@
 // Figures for the page: false-colour panels with a colour bar, and panels of curves, with axes in cycles per
-// sample, titles and captions. Called by plan_pictures.cpp.
+// sample, titles and captions.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr::figure {
 

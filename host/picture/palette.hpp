@@ -1,12 +1,12 @@
 // A palette for pictures of 8 bits a pixel: median cut (P. Heckbert, Color Image Quantization for Frame
-// Buffer Display, 1982) and an ordered dither. Called by animation.cpp.
+// Buffer Display, 1982) and an ordered dither.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

@@ -1,6 +1,5 @@
-// The pictures of `vdvr plan --pictures`. Called by programs; calls spectral_error.cpp, cosine_spectrum.cpp
-// and figure.cpp.
-#include "vdvr/plan_pictures.hpp"
+// The pictures of `vdvr plan --pictures`.
+#include "vdvr/expert/plan_pictures.hpp"
 
 #include <fmt/format.h>
 
@@ -10,9 +9,9 @@
 #include <numbers>
 
 #include "host/picture/figure.hpp"
-#include "vdvr/cosine_spectrum.hpp"
-#include "vdvr/error_map.hpp"
-#include "vdvr/spectral_error.hpp"
+#include "vdvr/expert/cosine_spectrum.hpp"
+#include "vdvr/expert/error_map.hpp"
+#include "vdvr/expert/spectral_error.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,5 +1,6 @@
-// A row's residuals as a sinogram between a scale, the rms of each view and that of each column. Called by
-// the command residual.
+// A row's residuals as a sinogram between a scale, the rms of each view and that of each column.
+#include "vdvr/expert/residual_picture.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +11,6 @@
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/residual.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,4 +1,4 @@
-#include "vdvr/slice_frame.hpp"
+#include "vdvr/expert/slice_frame.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "vdvr/surface_picture.hpp"
+#include "vdvr/expert/surface_picture.hpp"
 
 #include <algorithm>
 #include <array>

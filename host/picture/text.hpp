@@ -1,5 +1,5 @@
 // Text in pictures: DejaVu Sans, anti-aliased, kerned, placed to a quarter of a pixel. The same bits on every
-// machine: the font lies in the library. Called by everything in this room that writes.
+// machine: the font lies in the library.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 namespace vdvr {
 

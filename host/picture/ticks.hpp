@@ -1,4 +1,4 @@
-// Round numbers along an axis, and units as people read them. Called by slice_frame.cpp and decorate.cpp.
+// Round numbers along an axis, and units as people read them.
 #pragma once
 
 #include <string>

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 

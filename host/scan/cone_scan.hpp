@@ -1,10 +1,9 @@
-// The geometry of a cone-beam scan as it is read: where its axis lies, which rays it measures twice. Called
-// by read_scan.cpp.
+// The geometry of a cone-beam scan as it is read: where its axis lies, which rays it measures twice.
 #pragma once
 
 #include <filesystem>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "vdvr/read_scan.hpp"
 
 namespace vdvr {

@@ -1,10 +1,9 @@
-// An InputStatement as it stands in the certificate's `options` (docs/file-format.md). Called by
-// certify.cpp.
+// An InputStatement as it stands in the certificate's `options` (docs/file-format.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "vdvr/input_statement.hpp"
+#include "vdvr/expert/input_statement.hpp"
 
 namespace vdvr {
 

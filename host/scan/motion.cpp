@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "host/system/length_unit.hpp"
+#include "host/base/system/length_unit.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

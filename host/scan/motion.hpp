@@ -1,9 +1,9 @@
-// Whether the sample stood still. Called by read_scan.cpp, once views are chosen and lengths known.
+// Whether the sample stood still. Called once views are chosen and lengths known.
 #pragma once
 
 #include <string>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 
 namespace vdvr {
 namespace {

@@ -1,12 +1,11 @@
-// What repeated flats and darks say of a pixel's noise (photon transfer: Janesick, SPIE Press 2007). Called
-// by read_scan.cpp.
+// What repeated flats and darks say of a pixel's noise (photon transfer: Janesick, SPIE Press 2007).
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
-#include "host/raw/raw_scan.hpp"
-#include "vdvr/line_noise.hpp"
+#include "host/scan/raw/raw_scan.hpp"
+#include "vdvr/expert/line_noise.hpp"
 
 namespace vdvr {
 

@@ -1,4 +1,4 @@
-// Pre-processing of one projection at a time; see preprocess.hpp. Called by host/scan/read_scan.cpp.
+// Pre-processing of one projection at a time; see preprocess.hpp.
 #include "host/scan/preprocess.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // From counts to line integrals: p = -log((raw - dark) / (flat - dark)), dead pixels replaced, air background
-// taken off. Everything in double; the caller rounds to float once. Called by host/scan/read_scan.cpp.
+// taken off. Everything in double; the caller rounds to float once.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr {
 

@@ -1,6 +1,5 @@
 // A scan from whatever file holds it: told apart by content, read block by block, pre-processed in double,
-// rounded to float once; then the centre. Layout float data[view][v][u]. Called by every command that takes a
-// scan; calls host/io readers, host/scan/preprocess.cpp and host/center/find_center.cpp.
+// rounded to float once; then the centre. Layout float data[view][v][u].
 #include "vdvr/read_scan.hpp"
 
 #include <fmt/format.h>
@@ -13,31 +12,23 @@
 #include <numbers>
 #include <thread>
 
-#include "host/prepare/prepare.hpp"
+#include "host/scan/prepare/prepare.hpp"
 #include "host/scan/motion.hpp"
 #include "host/scan/photon_transfer.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/values.hpp"
-#include "host/raw/open_scan.hpp"
+#include "host/scan/raw/open_scan.hpp"
 #include "host/scan/cone_scan.hpp"
 #include "host/scan/scan_report.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/rehearsal.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/read_in_child.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/find_center.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/find_center.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
-
-const char* text_of(Beam beam) { return beam == Beam::cone ? "cone" : "parallel"; }
-
-std::optional<Beam> beam_of(const std::string& text) {
-  for (const Beam beam : {Beam::parallel, Beam::cone})
-    if (text == text_of(beam)) return beam;
-  return {};
-}
-
 namespace {
 
 namespace fs = std::filesystem;
@@ -268,7 +259,7 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
   const io::RawScan raw = open_described(path, options, folder);
   std::uint64_t bytes = 0;
   for (const auto& stamp : stamps_of(raw)) bytes += stamp.first;
-  io::extend_rehearsal(bytes);
+  io::extend_child(bytes);
   static_cast<void>(geometry_of(raw, path.string()));
   require_room(raw, options, path.string());
   const std::int64_t step = block_views(raw, options.max_memory_bytes);
@@ -280,7 +271,8 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
 
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
                          Understood& understood) {
-  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  if (io::holds_hdf5(path))
+    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
@@ -336,7 +328,8 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
 }
 
 std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const ScanOptions& options) {
-  if (io::holds_hdf5(path)) io::rehearse(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  if (io::holds_hdf5(path))
+    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
   bool folder = false;
   const io::RawScan raw = open_described(path, options, folder);
   if (!raw.counts) return std::nullopt;

@@ -1,11 +1,10 @@
-// Some rows of a scan, taken for a scan of their own: what a plan of a large scan judges from. Called by
-// plan.cpp.
+// Some rows of a scan, taken for a scan of their own: what a plan of a large scan judges from.
 #pragma once
 
 #include <optional>
 
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -1,11 +1,10 @@
-// What reading a scan reports: what was understood, what is doubtful, what cannot be used. Called by
-// read_scan.cpp.
+// What reading a scan reports: what was understood, what is doubtful, what cannot be used.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/values.hpp"
 #include "vdvr/read_scan.hpp"

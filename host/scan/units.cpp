@@ -7,7 +7,7 @@
 #include <limits>
 #include <mutex>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -2,8 +2,7 @@
 // bound is made of (fourth derivatives go with the fifth power of 1 / pitch) leaves the range of fp32,
 // whatever the user's units. Powers of two round nothing: wherever world units would have done, results are
 // theirs to the bit. World units come back, in double precision, where something is reported, thrown, stored
-// or drawn (docs/error-bounds.md, section 7). Called by plan.cpp, build.cpp, reconstruct.cpp, verify.cpp,
-// measure_tightness.cpp.
+// or drawn (docs/error-bounds.md, section 7).
 #pragma once
 
 #include <array>
@@ -11,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 

@@ -1,4 +1,4 @@
-// What the frames of a scan hold, and what turns counts into line integrals. Called by read_scan.cpp.
+// What the frames of a scan hold, and what turns counts into line integrals.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "host/raw/raw_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 
 namespace vdvr::io {
 

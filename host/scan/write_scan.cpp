@@ -10,11 +10,11 @@
 #include <random>
 #include <span>
 
-#include "host/hdf5/hdf5_writer.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/limits.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 #include "vdvr/read_scan.hpp"
 
 namespace vdvr {

@@ -1,6 +1,6 @@
 // Measures a stored certificate again (docs/error-bounds.md, "What verify does"). Shares with build only the
 // sampler header and what describes the scan: view weights, ramp kernel, covered region.
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 #include <fmt/format.h>
 
@@ -11,23 +11,23 @@
 #include <random>
 #include <utility>
 
-#include "host/opencl/host_memory.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/verify/claims/verify_scope.hpp"
+#include "host/verify/claims/verify_terms.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/verify/seams.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/verify/verify_scope.hpp"
-#include "host/volume/seams.hpp"
-#include "host/verify/verify_terms.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
 namespace {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <set>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

@@ -1,5 +1,5 @@
 // Points inside cells where |V - F| is evaluated, because verify's bound there is above the certificate's
-// (docs/error-bounds.md, "What verify compares"). Called by verify.cpp.
+// (docs/error-bounds.md, "What verify compares").
 #pragma once
 
 #include <cstdint>
@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "host/verify/verify_field.hpp"
-#include "vdvr/certificate.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/bounds/result_units.hpp"
-#include "host/opencl/host_memory.hpp"
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
+#include "host/volume/result_units.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -208,8 +208,9 @@ void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int
   const std::int64_t per_block = s.nx * s.nx * s.z_padded,
                      per_item =
                          (s.cells + 1) * (s.cells + 1) * s.error_padded + s.cells * s.cells * (4 + s.words);
-  const std::int64_t bytes = 4 * (per_block + nodes_.floats_per_block(s.rate, s.nx, s.z_padded) +
-                                  s.width * s.width * s.height * per_item);
+  const std::int64_t bytes =
+      4 * (per_block + nodes_.floats_per_block(static_cast<int>(s.rate), s.nx, s.z_padded) +
+           s.width * s.width * s.height * per_item);
   const std::uint64_t budget = std::min<std::uint64_t>(state_.memory.left() / 2, 96 << 20);
   const std::size_t together = at(std::clamp<std::int64_t>(static_cast<std::int64_t>(budget) / bytes, 1,
                                                            static_cast<std::int64_t>(blocks.size())));

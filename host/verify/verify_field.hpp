@@ -1,6 +1,6 @@
 // The bound on |V - F| as `verify` computes it, gold cell by gold cell, at every rate that is asked for
-// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Called by
-// verify.cpp. Calls verify_parts.cpp and verify_pieces.cpp; F is verify_nodes', of either beam.
+// (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Calls
+// verify_parts.cpp and verify_pieces.cpp; F is verify_nodes', of either beam.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include "host/fbp/coverage.hpp"
-#include "host/opencl/array.hpp"
-#include "host/sampler/device_field.hpp"
-#include "host/witness/verify_cone_bounds.hpp"
-#include "host/witness/verify_nodes.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "host/field/fbp/coverage.hpp"
+#include "host/base/opencl/array.hpp"
+#include "host/volume/sampler/device_field.hpp"
+#include "host/verify/witness/verify_cone_bounds.hpp"
+#include "host/verify/witness/verify_nodes.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

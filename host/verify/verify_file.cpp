@@ -1,10 +1,11 @@
-// Files held to their projections. Called by programs; calls vdvr_file.cpp and verify.cpp.
+// Files held to their projections.
 #include "vdvr/verify_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr {
 namespace {
@@ -18,6 +19,13 @@ void check_consistency(const std::filesystem::path& path, const Certificate& c) 
 
 VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   VdvrFile file = read_vdvr(path, max_memory_bytes, Altered::refuse);
+  check_consistency(path, file.certificate);
+  return file;
+}
+
+VdvrFile read_large_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                              const std::filesystem::path& scratch) {
+  VdvrFile file = read_large_vdvr(path, max_memory_bytes, scratch, Altered::refuse);
   check_consistency(path, file.certificate);
   return file;
 }

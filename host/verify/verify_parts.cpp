@@ -1,5 +1,4 @@
-// How the bricks that are asked for are cut: by the nodes that memory holds, and into slabs of blocks. Called
-// by verify_field.cpp.
+// How the bricks that are asked for are cut: by the nodes that memory holds, and into slabs of blocks.
 #include "host/verify/verify_parts.hpp"
 
 #include <algorithm>

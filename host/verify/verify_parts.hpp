@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/opencl/array.hpp"
-#include "host/system/casts.hpp"
+#include "host/base/opencl/array.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/verify/verify_field.hpp"
 
 namespace vdvr {

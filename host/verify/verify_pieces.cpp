@@ -1,11 +1,11 @@
-// Pieces of bricks on the device: which cells of gold are tested, and their bounds. Called by
-// verify_field.cpp. Launches kernels/verify/verify_pieces.cl.
+// Pieces of bricks on the device: which cells of gold are tested, and their bounds. Launches
+// kernels/verify/verify_pieces.cl.
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
-#include "host/opencl/work_groups.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/verify/verify_parts.hpp"
 #include "shared/verify_pieces.h"
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

@@ -1,6 +1,5 @@
 // Nodes drawn by chance at which verify's F is held to F in double precision: it would tell of a wrong
 // weight, halo or mirror that build and verify had in common (docs/error-bounds.md, "What verify does").
-// Called by verify.cpp.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +8,10 @@
 #include <vector>
 
 #include "host/verify/verify_field.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "host/system/casts.hpp"
+#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

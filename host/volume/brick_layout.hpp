@@ -1,13 +1,11 @@
 // Where each brick's samples lie: on the host in its own arrays, on the device in one sample buffer. That has
 // the base first, then the tiles of each triple and type in map order, each block at a multiple of 4 bytes.
-// Called by mixed_volume.cpp, device_field.cpp, resident_volume.cpp and whatever reads stored samples on the
-// host.
 #pragma once
 
 #include <map>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 #define VDVR_DIALECT_HOST
 #define VDVR_SAMPLE_TYPES 7

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 

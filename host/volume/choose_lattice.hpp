@@ -1,5 +1,5 @@
 // The lattice of integer samples that suits a base and, beside it, the texture units that will read it
-// (quantise.hpp). Called by build.cpp and foresee_pictures.cpp.
+// (quantise.hpp).
 #pragma once
 
 #include "host/volume/quantise.hpp"

@@ -1,14 +1,14 @@
-// The hash of a volume's content (docs/file-format.md). Called by build, verify, render.
+// The hash of a volume's content (docs/file-format.md).
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <span>
 
-#include "host/system/scratch_pass.hpp"
+#include "host/base/system/scratch_pass.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/volume_problem.hpp"
-#include "vdvr/hash.hpp"
+#include "host/volume/validate_volume.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {
@@ -42,7 +42,7 @@ void add_grid(Sha256& hash, const MixedVolume& v) {
 std::string content_sha256(const MixedVolume& v) {
   Sha256 hash;
   ScratchPass pass;
-  pass.add(v);
+  pass.add_all(v);
   const auto add_samples = [&](const SampleBlock& block) {
     const auto* from = static_cast<const std::byte*>(block.data());
     for (std::uint64_t at = 0; at < block.bytes(); at += ScratchPass::at_once) {

@@ -1,13 +1,13 @@
 // The certified volume on the host: sampling by the shared header, and storage figures.
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "host/system/casts.hpp"
-#include "host/system/parallel.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "vdvr/error.hpp"
 

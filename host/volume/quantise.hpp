@@ -1,5 +1,5 @@
 // Integer samples: which lattice a file takes, rounding to it, and packing tiles into 8 or 16 bits
-// (docs/file-format.md, storage). Called by build.cpp (base) and close_boundaries.cpp (tiles).
+// (docs/file-format.md, storage).
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

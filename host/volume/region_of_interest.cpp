@@ -1,4 +1,4 @@
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 #include <fmt/format.h>
 

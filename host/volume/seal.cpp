@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <tuple>
 
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {

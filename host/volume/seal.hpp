@@ -1,12 +1,12 @@
 // The seal of a .vdvr file: one hash over its certificate, the totals by brick and every attribute
-// (docs/file-format.md). Called by vdvr_file.cpp and write_vdvr.cpp.
+// (docs/file-format.md).
 #pragma once
 
 #include <span>
 #include <string>
 #include <vector>
 
-#include "host/hdf5/hdf5.hpp"
+#include "host/files/hdf5/hdf5.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,4 @@
-// Reads the .vdvr file (docs/file-format.md), only after everything in it has been checked. Called by verify,
-// render, probe, export, info.
+// Reads the .vdvr file (docs/file-format.md), only after everything in it has been checked.
 #include "host/volume/vdvr_file.hpp"
 
 #include <fmt/format.h>
@@ -14,15 +13,14 @@
 #include <optional>
 #include <span>
 
-#include "host/hdf5/hdf5_reader.hpp"
-#include "host/system/limits.hpp"
-#include "host/system/rehearsal.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
+#include "host/base/system/limits.hpp"
+#include "host/base/system/read_in_child.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/read_large.hpp"
+#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {
@@ -429,8 +427,8 @@ namespace {
 VdvrFile read_checked(const std::filesystem::path& path, const Reading& reading, Altered altered) {
   if (io::metadata_unchecked(path))
     // Scratch files take addresses, not memory.
-    io::rehearse(path, reading.scratch_folder ? 0 : reading.max_memory_bytes,
-                 [&] { static_cast<void>(read_whole(path, reading)); });
+    io::read_in_child(path, reading.scratch_folder ? 0 : reading.max_memory_bytes,
+                      [&] { static_cast<void>(read_whole(path, reading)); });
   VdvrFile file = read_whole(path, reading);
   if (altered == Altered::refuse && !file.altered.empty())
     throw MismatchError(fmt::format("{}: {}; build it again", path.string(), file.altered));
@@ -450,7 +448,7 @@ VdvrFile read_large_vdvr(const std::filesystem::path& path, std::uint64_t max_me
 
 VdvrParts open_parts(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
   if (io::metadata_unchecked(path))
-    io::rehearse(path, max_memory_bytes, [&] {
+    io::read_in_child(path, max_memory_bytes, [&] {
       static_cast<void>(read_whole(path, {max_memory_bytes, std::nullopt, nullptr}));
     });
   VdvrParts parts;
@@ -485,7 +483,7 @@ bool is_vdvr(const std::filesystem::path& path) {
     return file.has_attribute("/", "format") && file.text_attribute("/", "format") == "vdvr";
   };
   try {
-    if (io::metadata_unchecked(path)) io::rehearse(path, 0, [&] { static_cast<void>(says_so()); });
+    if (io::metadata_unchecked(path)) io::read_in_child(path, 0, [&] { static_cast<void>(says_so()); });
     return says_so();
   } catch (const Error&) {
     return false;

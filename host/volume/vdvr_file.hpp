@@ -1,12 +1,11 @@
-// A .vdvr file opened to be read in parts: everything but samples is there. Called by
-// host/export/lazy_volume.cpp.
+// A .vdvr file opened to be read in parts: everything but samples is there.
 #pragma once
 
 #include <filesystem>
 #include <map>
 #include <memory>
 
-#include "host/hdf5/hdf5_reader.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {

@@ -1,14 +1,13 @@
 // Names, shapes and versions of the .vdvr file (docs/file-format.md). Datasets are [z][y][x] and triples
-// "ZYX", as MixedVolume holds them; grid attributes are turned from x,y,z to z,y,x. Called by read_vdvr,
-// write_vdvr and content_hash.
+// "ZYX", as MixedVolume holds them; grid attributes are turned from x,y,z to z,y,x.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <initializer_list>
 
-#include "host/hdf5/hdf5_reader.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 

@@ -1,15 +1,15 @@
-// Writes the .vdvr file (docs/file-format.md), whole or not at all. Called by build.
+// Writes the .vdvr file (docs/file-format.md), whole or not at all.
 #include <fmt/format.h>
 
 #include <span>
 
-#include "host/hdf5/hdf5_writer.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {
@@ -66,7 +66,7 @@ void write_by_brick(h5::Writer& file, const char* name, const MixedVolume& v,
 
 void write_vdvr(const std::filesystem::path& path, const MixedVolume& v, const Certificate& certificate,
                 Compression compression) {
-  if (const auto p = volume_problem(v))
+  if (const auto p = validate_volume(v))
     throw InputError(fmt::format("{}: not written: {}: {}", path.string(), p->where, p->what));
   Certificate stored = certificate;
   if (stored.content_sha256.empty()) stored.content_sha256 = content_sha256(v);

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/certificate.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr {

@@ -1,4 +1,4 @@
-// Choice of an OpenCL device. No OpenCL type is visible here; host/opencl holds them.
+// Choice of an OpenCL device. No OpenCL type is visible here; host/base/opencl holds them.
 #pragma once
 
 #include <cstdint>
@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/export.hpp"
+#include "vdvr/api.hpp"
 
 namespace vdvr {
 
 namespace opencl {
-struct State;  // host/opencl/state.hpp
+struct State;  // host/base/opencl/state.hpp
 }
 
 struct DeviceInfo {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "vdvr/export.hpp"
+#include "vdvr/api.hpp"
 
 namespace vdvr {
 

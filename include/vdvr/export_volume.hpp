@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/export.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/progress.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/progress.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {

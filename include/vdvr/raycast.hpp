@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/camera.hpp"
+#include "vdvr/expert/camera.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/image.hpp"
-#include "vdvr/probe_sampler.hpp"
-#include "vdvr/resident_volume.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/image.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
+#include "vdvr/expert/resident_volume.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace vdvr {
 

@@ -5,39 +5,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string>
 
-#include "vdvr/export.hpp"
-#include "vdvr/line_noise.hpp"
-#include "vdvr/preparation.hpp"
-#include "vdvr/progress.hpp"
-#include "vdvr/projections.hpp"
-#include "vdvr/understood.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/line_noise.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/scan_options.hpp"
+#include "vdvr/expert/understood.hpp"
 
 namespace vdvr {
-
-/// How the rays of a scan run that says so only by its distances.
-enum class Beam { parallel, cone };
-VDVR_API const char* text_of(Beam beam);
-VDVR_API std::optional<Beam> beam_of(const std::string& text);
-
-struct ScanOptions {
-  std::optional<std::filesystem::path> angles_file;  ///< for stacks and HDF5 files; degrees, one per view
-  /// Overrides the file's; in columns of the projections as they are prepared, binned ones where they are.
-  std::optional<double> center;
-  Preparation preparation;  ///< what is done to the projections
-  InputStatement input;     ///< wins over what the files say
-  /// Cone: by the distances of an NXtomo file, which is read as parallel beam otherwise. Refused where there
-  /// are none, and beside another description of the geometry.
-  std::optional<Beam> beam;
-  std::uint64_t max_memory_bytes = 0;  ///< 0: no limit
-  /// Folder of the scratch files that hold a scan of more than an eighth of the limit, and what is made of it
-  /// as a whole; empty: default_scratch_folder().
-  std::filesystem::path scratch;
-  /// External links and virtual datasets of an HDF5 file may lead out of the scan's folder. What they lead to
-  /// is hashed either way.
-  bool follow_links = false;
-};
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'
 /// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre:

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/certificate.hpp"
-#include "vdvr/export.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {
 
@@ -53,6 +53,12 @@ VDVR_API void write_vdvr(const std::filesystem::path& path, const MixedVolume& v
 /// MismatchError for a file that was altered, unless it is to be reported. `max_memory_bytes` 0: no limit.
 VDVR_API VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0,
                             Altered altered = Altered::refuse);
+
+/// read_vdvr, but that samples of more than a quarter of the limit lie in scratch files in `scratch` (empty:
+/// the default folder of scratch.hpp), of which an eighth of the limit may be resident. Whoever reads them
+/// needs not know. Throws as read_vdvr, and ResourceError naming the folder where it has no room.
+VDVR_API VdvrFile read_large_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                                  const std::filesystem::path& scratch, Altered altered = Altered::refuse);
 
 /// True when the file begins like HDF5 and says format = "vdvr".
 VDVR_API bool is_vdvr(const std::filesystem::path& path);

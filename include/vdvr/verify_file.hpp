@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/export.hpp"
+#include "vdvr/api.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr {
 
@@ -15,9 +15,13 @@ namespace vdvr {
 /// numbers do not follow from each other. Throws as read_vdvr, MismatchError naming the path.
 VDVR_API VdvrFile read_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
-/// The same for verify_file: altered samples stay in VdvrFile::altered, since they can be measured. Throws
-/// MismatchError for a broken seal over samples that are whole, since a certificate that is not the one
-/// written has nothing to compare with, for one that contradicts itself, and for a volume for comparison,
+/// The same by read_large_vdvr.
+VDVR_API VdvrFile read_large_certified(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                                       const std::filesystem::path& scratch);
+
+/// read_certified for verify_file: altered samples stay in VdvrFile::altered, since they can be measured.
+/// Throws MismatchError for a broken seal over samples that are whole, since a certificate that is not the
+/// one written has nothing to compare with, for one that contradicts itself, and for a volume for comparison,
 /// which promises nothing.
 VDVR_API VdvrFile read_to_verify(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 

@@ -1,5 +1,5 @@
 // A product along one axis of a block, in the one form that the kernel has for all axes. Passed by value from
-// host/fbp/axis_product.cpp to axis_product.cl.
+// host/field/fbp/axis_product.cpp to axis_product.cl.
 #ifndef VDVR_AXIS_PRODUCT_H
 #define VDVR_AXIS_PRODUCT_H
 

@@ -1,5 +1,5 @@
 // Blocks of sample columns that are back-projected together, and the filtered projections under them. Passed
-// by value from host/fbp/back_project.cpp to back_project.cl.
+// by value from host/field/fbp/back_project.cpp to back_project.cl.
 #ifndef VDVR_BACK_PROJECT_H
 #define VDVR_BACK_PROJECT_H
 

@@ -1,5 +1,5 @@
 // Dense products a v of a batch, and where their matrices lie. Passed by value from
-// host/fbp/batched_product.cpp to batched_product.cl.
+// host/field/fbp/batched_product.cpp to batched_product.cl.
 #ifndef VDVR_BATCHED_PRODUCT_H
 #define VDVR_BATCHED_PRODUCT_H
 

@@ -1,5 +1,5 @@
 // What the test of gold cells is told beside gold's layout (gold_shape.h). Passed by value from
-// host/gold/cell_test.cpp.
+// host/certify/gold/cell_test.cpp.
 #ifndef VDVR_CELL_TEST_H
 #define VDVR_CELL_TEST_H
 

@@ -1,5 +1,5 @@
-// What the kernels of kernels/pixel need besides a frame's (raycast_params.h). Filled by
-// host/pixel/pixel_bounds.cpp; compiled by both sides.
+// What the kernels of kernels/picture/pixel need besides a frame's (raycast_params.h). Filled by
+// host/picture/pixel/pixel_bounds.cpp; compiled by both sides.
 #ifndef VDVR_CERTIFY_PARAMS_H
 #define VDVR_CERTIFY_PARAMS_H
 
@@ -33,7 +33,7 @@ typedef struct {
   float range_lo, range_scale;  // bin = (value - lo) * scale
   int bins;
   int or_clear;                // beside the values of a part there may be others, which show nothing
-  int first_edge, first_bend;  // rows of the table of ranges (host/pixel/range_table.hpp)
+  int first_edge, first_bend;  // rows of the table of ranges (host/picture/pixel/range_table.hpp)
   // By what extinctions there are off; H0 then, and for each unit of extinction of the part's largest.
   float extinction_error, joint_error, joint_rounding;
   float parts_per_spread;  // 3 / (2 kappa): parts = this times the largest step of coefficients over e

@@ -1,5 +1,5 @@
 // A band of sample columns that is back-projected from cone-beam views. Passed by value from
-// host/fdk/cone_back_project.cpp to cone_back_project.cl.
+// host/field/fdk/cone_back_project.cpp to cone_back_project.cl.
 #ifndef VDVR_CONE_BACK_PROJECT_H
 #define VDVR_CONE_BACK_PROJECT_H
 

@@ -1,5 +1,5 @@
 // Tiles of kept nodes that are back-projected from cone-beam views. Passed by value from
-// host/kept/cone_tiles.cpp to cone_nodes.cl.
+// host/certify/kept/cone_tiles.cpp to cone_nodes.cl.
 #ifndef VDVR_CONE_NODES_H
 #define VDVR_CONE_NODES_H
 

@@ -1,4 +1,4 @@
-// The filtered projections as kernels of D2VR address them. Filled by host/render/d2vr.cpp, read by
+// The filtered projections as kernels of D2VR address them. Filled by host/picture/render/d2vr.cpp, read by
 // d2vr_field.h; compiled by both sides. Columns and rows are those stored: of upsampled projections the finer
 // ones.
 #ifndef VDVR_D2VR_PARAMS_H

@@ -1,5 +1,5 @@
 // A grid of frequencies on which the error of interpolation is mapped. Passed by value from
-// host/bounds/error_map.cpp to error_map.cl.
+// host/certify/bounds/error_map.cpp to error_map.cl.
 #ifndef VDVR_ERROR_MAP_H
 #define VDVR_ERROR_MAP_H
 

@@ -1,5 +1,5 @@
 // Detector rows that are filtered together, and where their columns go. Passed by value from
-// host/fbp/filter_rows.cpp to filter_rows.cl.
+// host/field/fbp/filter_rows.cpp to filter_rows.cl.
 #ifndef VDVR_FILTER_ROWS_H
 #define VDVR_FILTER_ROWS_H
 

@@ -1,5 +1,5 @@
 // Blocks of kept gold whose fourth differences are looked at, brick by brick (fourth_differences.cl). Passed
-// by value from host/kept/brick_remainder.cpp.
+// by value from host/certify/kept/brick_remainder.cpp.
 #ifndef VDVR_FOURTH_DIFFERENCES_H
 #define VDVR_FOURTH_DIFFERENCES_H
 

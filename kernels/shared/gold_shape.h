@@ -2,7 +2,7 @@
 #ifndef VDVR_GOLD_SHAPE_H
 #define VDVR_GOLD_SHAPE_H
 
-// With the bricks under them. Passed by value from host/gold/gold_batch.cpp to classify.cl and measure.cl. 48
+// With the bricks under them. Passed by value from host/certify/gold/gold_batch.cpp to classify.cl and measure.cl. 48
 // bytes.
 typedef struct {
   int nx, ny, nz;                    // nodes of a block, without its halo
@@ -14,7 +14,7 @@ typedef struct {
   float lowest;  // columns of a smaller coverage margin are not tested
 } VdvrGoldShape;
 
-// Alone. Passed by value from host/gold/fit_coefficients.cpp to fit_coefficients.cl. 36 bytes.
+// Alone. Passed by value from host/certify/gold/fit_coefficients.cpp to fit_coefficients.cl. 36 bytes.
 typedef struct {
   int nx, ny, nz;   // nodes of a block, without its halo
   int halo;         // nodes on every side

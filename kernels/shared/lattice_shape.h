@@ -1,5 +1,5 @@
 // A lattice of every spacing-th gold node of a block, per axis: node n of an axis has index n / spacing +
-// reach. Passed by value from host/gold/fit_coefficients.cpp and host/gold/gold_batch.cpp to
+// reach. Passed by value from host/certify/gold/fit_coefficients.cpp and host/certify/gold/gold_batch.cpp to
 // fit_coefficients.cl and classify.cl.
 #ifndef VDVR_LATTICE_SHAPE_H
 #define VDVR_LATTICE_SHAPE_H

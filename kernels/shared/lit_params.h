@@ -1,5 +1,5 @@
 // One block of lit samples: the base, or the tiles of one level triple. Filled by
-// host/sampler/lit_samples.cpp, read by lit_samples.cl; compiled by both sides.
+// host/volume/sampler/lit_samples.cpp, read by lit_samples.cl; compiled by both sides.
 #ifndef VDVR_LIT_PARAMS_H
 #define VDVR_LIT_PARAMS_H
 

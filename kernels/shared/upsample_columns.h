@@ -1,4 +1,4 @@
-// Columns of a detector and the finer ones made of them. Passed by value from host/fbp/upsample_columns.cpp
+// Columns of a detector and the finer ones made of them. Passed by value from host/field/fbp/upsample_columns.cpp
 // to upsample_columns.cl.
 #ifndef VDVR_UPSAMPLE_COLUMNS_H
 #define VDVR_UPSAMPLE_COLUMNS_H

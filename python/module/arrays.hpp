@@ -9,7 +9,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
-#include "vdvr/grid.hpp"
+#include "vdvr/expert/grid.hpp"
 
 namespace vdvr::python {
 

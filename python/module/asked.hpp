@@ -8,7 +8,7 @@
 
 #include "long_work.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noise_forecast.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
 
 namespace vdvr::python {
 

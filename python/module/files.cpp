@@ -11,7 +11,7 @@
 #include "arrays.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
-#include "vdvr/lazy_volume.hpp"
+#include "vdvr/expert/lazy_volume.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/certified_points.hpp"
+#include "vdvr/certified_picture.hpp"
+#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/drawn_volume.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/raycast.hpp"
-#include "vdvr/resident_volume.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::python {
@@ -31,21 +32,29 @@ class HeldVolume {
   /// `quantity`: what RenderOutput::error shows.
   RenderResult render(const std::shared_ptr<Device>& device, const RenderOptions& options,
                       BrickQuantity quantity);
+  /// A picture and what is certain of it, by the same sampler. Throws InputError for a file that was altered;
+  /// else as certify_picture.
+  CertifiedPicture certified(const std::shared_ptr<Device>& device, const PictureRequest& request,
+                             const Progress& progress);
   /// None of a comparison, which certifies nothing.
   [[nodiscard]] std::optional<Certificate> certificate() const;
   /// Gives back what pictures keep on the device.
   void release();
 
  private:
+  /// Where pictures are drawn from now on.
+  DrawnVolume& drawn_on(const std::shared_ptr<Device>& device);
+  /// Of what is drawn.
+  const SafeSampler& safe(SamplerKind asked);
+
   VdvrFile file_;
   std::mutex lock_;
   std::optional<Brightness> brightness_;
   std::optional<CertifiedPoints> points_;
   std::shared_ptr<Device> device_;
-  std::optional<ResidentVolume> resident_;  // before the renderer, which uses it
-  std::optional<Renderer> renderer_;
+  std::optional<DrawnVolume> drawn_;
   std::map<SamplerKind, SafeSampler> safe_;                         // by what was asked for, on the device
-  std::optional<std::pair<SamplerKind, BrickQuantity>> bounds_of_;  // that the renderer has
+  std::optional<std::pair<SamplerKind, BrickQuantity>> bounds_of_;  // as drawn_ has them
 };
 
 }  // namespace vdvr::python

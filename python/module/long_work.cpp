@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace nb = nanobind;
 

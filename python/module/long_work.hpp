@@ -7,7 +7,7 @@
 
 #include <nanobind/nanobind.h>
 
-#include "vdvr/progress.hpp"
+#include "vdvr/expert/progress.hpp"
 
 namespace vdvr::python {
 

@@ -9,6 +9,7 @@ void add_errors(nanobind::module_& m);
 void add_scans(nanobind::module_& m);
 void add_pictures(nanobind::module_& m);
 void add_volumes(nanobind::module_& m);
+void add_certified_pictures(nanobind::module_& m);
 void add_viewers(nanobind::module_& m);
 void add_files(nanobind::module_& m);
 

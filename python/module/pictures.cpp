@@ -9,12 +9,12 @@
 
 #include "parts.hpp"
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/camera.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/framing.hpp"
-#include "vdvr/image.hpp"
+#include "vdvr/expert/camera.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/framing.hpp"
+#include "vdvr/expert/image.hpp"
 #include "vdvr/raycast.hpp"
-#include "vdvr/transfer_function.hpp"
+#include "vdvr/expert/transfer_function.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

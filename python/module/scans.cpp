@@ -19,13 +19,13 @@
 #include "asked.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/find_center.hpp"
+#include "vdvr/expert/find_center.hpp"
 #include "vdvr/read_scan.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/scan_of_array.hpp"
-#include "vdvr/scratch.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/scan_of_array.hpp"
+#include "vdvr/expert/scratch.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -13,9 +13,9 @@
 #include "held_volume.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
-#include "vdvr/live_events.hpp"
-#include "vdvr/live_json.hpp"
-#include "vdvr/live_renderer.hpp"
+#include "vdvr/expert/live_events.hpp"
+#include "vdvr/expert/live_json.hpp"
+#include "vdvr/expert/live_renderer.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

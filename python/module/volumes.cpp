@@ -18,11 +18,11 @@
 #include "held_volume.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
-#include "vdvr/certify.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/export_vtk.hpp"
-#include "vdvr/framing.hpp"
-#include "vdvr/journal.hpp"
+#include "vdvr/certify_scan.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/export_vtk.hpp"
+#include "vdvr/expert/framing.hpp"
+#include "vdvr/expert/journal.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -48,9 +48,10 @@ Held held_of(BuildResult&& built) {
 
 BuildResult certified(Device& device, const ProjectionSet& scan, const Asked& asked,
                       const CertifyOptions& options, const Progress& report) {
-  if (asked.sigmas)
-    return certify_in_sigma(device, scan, *asked.sigmas, known_noise(scan, asked), options, report);
-  return certify(device, scan, asked.tolerance, options, report);
+  std::string why;
+  const auto noise = asked.sigmas ? std::optional(known_noise(scan, asked))
+                                  : find_noise(scan, asked.noise, asked.source, why);
+  return certify_scan(device, scan, {asked.tolerance, asked.sigmas}, noise, options, report);
 }
 
 Held build(Device& device, const ProjectionSet& scan, const Asked& asked, const CertifyOptions& options,

@@ -20,6 +20,7 @@ from ._core import (
     Grid,
     InputError,
     MismatchError,
+    PictureVerification,
     Plan,
     ResourceError,
     ToleranceError,
@@ -27,16 +28,16 @@ from ._core import (
     Verification,
     __version__,
 )
-from ._certify import build, plan, verify
+from ._certify import build, plan, verify, verify_picture
 from ._devices import device, devices
 from ._scans import Scan, find_center, read_scan, recon
-from ._volume import Volume, open, transfer_presets
+from ._volume import CertifiedPicture, Volume, open, transfer_presets
 
 __all__ = [
-    "BuildError", "CenterEstimate", "DeviceError", "Error", "FileError", "Grid", "InputError", "MismatchError",
-    "Plan", "ResourceError", "Scan", "ToleranceError", "TransferFunction", "Verification", "Viewer", "Volume",
-    "__version__", "build", "device", "devices", "find_center", "open", "plan", "read_scan", "recon",
-    "transfer_presets", "verify",
+    "BuildError", "CenterEstimate", "CertifiedPicture", "DeviceError", "Error", "FileError", "Grid", "InputError",
+    "MismatchError", "PictureVerification", "Plan", "ResourceError", "Scan", "ToleranceError", "TransferFunction",
+    "Verification", "Viewer", "Volume", "__version__", "build", "device", "devices", "find_center", "open", "plan",
+    "read_scan", "recon", "transfer_presets", "verify", "verify_picture",
 ]
 
 

@@ -10,7 +10,7 @@ from . import _core
 from ._choices import Path, choice, number, numbers, tolerance
 from ._devices import DeviceLike, device as open_device
 from ._scans import Progress, Scan
-from ._volume import Volume, compressed, path_or_volume
+from ._volume import Volume, compressed, open as open_volume, path_or_volume
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -225,3 +225,33 @@ def verify(
     where: Any = path_or_volume(volume)
     work = _core.verify_held if isinstance(where, _core.HeldVolume) else _core.verify_path
     return work(open_device(device), where, _checked(scan), options, progress)
+
+
+def verify_picture(
+    certificate: Path,
+    volume: Union[Volume, Path],
+    scan: Optional[Scan] = None,
+    *,
+    rays: int = 16,
+    device: DeviceLike = None,
+    progress: Optional[Progress] = None,
+) -> "_core.PictureVerification":
+    """Draws and certifies again what X.certificate.json describes, and compares.
+
+    Parameters
+    ----------
+    volume : that it is a picture of: a Volume, or the path of a .vdvr file.
+    scan : the projections that the volume was built from: then F itself is evaluated along random rays.
+    rays : how many.
+
+    Returns
+    -------
+    PictureVerification : true where all of it holds; `failures` says what does not.
+
+    Raises
+    ------
+    FileError : it is no certificate of a picture. MismatchError : it is of another volume, or the scan is.
+    """
+    held = volume if isinstance(volume, Volume) else open_volume(volume)
+    return _core.verify_picture(
+        open_device(device), held._held, certificate, None if scan is None else _checked(scan), int(rays), progress)

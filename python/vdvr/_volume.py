@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -179,19 +179,100 @@ class Volume:
         values : float32 [y, x] of what lies behind the pixels instead, NaN where nothing does
             (docs/rendering.md); of `show="normal"` [y, x, 3].
         """
+        in_sigma = {"sigma": _core.BrickQuantity.sigma, "error-in-sigma": _core.BrickQuantity.bound_in_sigma}
+        quantity = in_sigma.get(show, _core.BrickQuantity.bound)
+        if mode == "error":
+            return self._held.error_picture(self._slice(size, slice_axis, slice_position), quantity, values)
+        o = self._view(size, mode, transfer, azimuth=azimuth, elevation=elevation, zoom=zoom, frame=frame, camera=camera,
+                       transfer_range=transfer_range, iso=iso, iso_opacity=iso_opacity, slice_axis=slice_axis,
+                       slice_position=slice_position, clip=clip, step=step, step_mode=step_mode,
+                       classification=classification, gradient=gradient, shading=shading, lights=lights,
+                       background=background, sampler=sampler)
+        o.output = choice(_core.RenderOutput, "error" if show in in_sigma else show, "show")
+        return self._held.render(self._open_device(device), o, quantity, values)
+
+    def certify_picture(
+        self,
+        size: Tuple[int, int] = (512, 512),
+        mode: str = "dvr",
+        transfer: TransferLike = None,
+        *,
+        form: str = "exact",
+        light: str = "as-drawn",
+        parts: Optional[float] = None,
+        tolerance: Optional[float] = None,
+        device: DeviceLike = None,
+        progress: Optional[Callable[[str, float], object]] = None,
+        **view: Any,
+    ) -> "CertifiedPicture":
+        """A picture, and for every pixel an interval that holds what F itself would show: that of
+        `vdvr render --certify`.
+
+        Parameters
+        ----------
+        size, mode, transfer, **view : as of `render`, of modes "dvr", "iso" (one surface), "mip", "integral" and
+            "slice". Only what is covered is drawn. Of "dvr" steps are chosen, and shortened while that narrows the
+            bound much, unless `step`, `step_mode` or `classification` is given.
+        form : of mode "dvr": "exact", "box" (some per cent wider) or "fast" (in one pass, 1.4 to 3 times as wide).
+        light : of mode "dvr": "as-drawn" (colour and opacity of F under V's light) or "lit" (F's own).
+        parts : of mode "dvr": smaller is narrower and slower (default 0.5).
+        tolerance : levels of 255 that every pixel shall be certain to; drawn finer for it. `worst` says whether it is.
+        """
+        request = _core.PictureRequest()
+        request.keep_steps = any(view.get(name) is not None for name in ("step", "step_mode", "classification"))
+        request.options = self._view(size, mode, transfer, **view)
+        _one_of(form, ("exact", "box", "fast"), "form")
+        _one_of(light, ("as-drawn", "lit"), "light")
+        request.certify.fast = form == "fast"
+        request.certify.box = form == "box"
+        if parts is not None:
+            request.certify.kappa = number(parts, "parts")
+        request.lit = light == "lit"
+        request.tolerance = None if tolerance is None else number(tolerance, "tolerance")
+        return CertifiedPicture(_core.certify_picture(self._held, self._open_device(device), request, progress))
+
+    def _slice(self, size: Tuple[int, int], slice_axis: str, slice_position: Optional[float]) -> "_core.RenderOptions":
+        """Of mode "error", which has a position in any case."""
+        o = _core.RenderOptions()
+        o.width, o.height = sizes(size)
+        o.mode = _core.RenderMode.error
+        o.slice_axis = axis(slice_axis)
+        g, a = self.grid, o.slice_axis
+        middle = g.origin[a] + 0.5 * g.cells[a] * g.spacing[a]
+        o.slice_position = middle if slice_position is None else number(slice_position, "slice_position")
+        return o
+
+    def _view(
+        self,
+        size: Tuple[int, int],
+        mode: str,
+        transfer: TransferLike,
+        *,
+        azimuth: float = 30.0,
+        elevation: float = 20.0,
+        zoom: float = 1.0,
+        frame: str = "shown",
+        camera: Optional[Dict[str, Any]] = None,
+        transfer_range: Optional[Tuple[float, float]] = None,
+        iso: Union[float, Sequence[float], None] = None,
+        iso_opacity: Optional[Sequence[float]] = None,
+        slice_axis: str = "z",
+        slice_position: Optional[float] = None,
+        clip: Optional[Sequence[float]] = None,
+        step: float = 1.0,
+        step_mode: Optional[str] = None,
+        classification: str = "post",
+        gradient: str = "auto",
+        shading: bool = True,
+        lights: Optional[Sequence[Union[str, Sequence[float]]]] = None,
+        background: Optional[Sequence[float]] = None,
+        sampler: str = "auto",
+    ) -> "_core.RenderOptions":
         o = _core.RenderOptions()
         o.width, o.height = sizes(size)
         o.mode = choice(_core.RenderMode, mode, "mode")
-        in_sigma = {"sigma": _core.BrickQuantity.sigma, "error-in-sigma": _core.BrickQuantity.bound_in_sigma}
-        quantity = in_sigma.get(show, _core.BrickQuantity.bound)
-        o.output = choice(_core.RenderOutput, "error" if show in in_sigma else show, "show")
         o.slice_axis = axis(slice_axis)
         o.slice_position = None if slice_position is None else number(slice_position, "slice_position")
-        if mode == "error":
-            if o.slice_position is None:
-                g, a = self.grid, o.slice_axis
-                o.slice_position = g.origin[a] + 0.5 * g.cells[a] * g.spacing[a]
-            return self._held.error_picture(o, quantity, values)
         bright = self._held.brightness
         window = None if transfer_range is None else _window(transfer_range)
         integral = mode == "integral"
@@ -218,7 +299,7 @@ class Volume:
                 raise _core.InputError(f"background: {background}; give three or six numbers from 0 to 1")
             o.background_top, o.background_bottom = given[:3], given[-3:]
         o.sampler = choice(_core.SamplerKind, sampler, "sampler")
-        return self._held.render(self._open_device(device), o, quantity, values)
+        return o
 
     def _transfer(self, transfer: TransferLike, window: Optional[Tuple[float, float]]) -> "_core.TransferFunction":
         if isinstance(transfer, str) and transfer in _core.transfer_presets():
@@ -244,8 +325,7 @@ class Volume:
     def _camera(self, options: "_core.RenderOptions", azimuth: float, elevation: float, zoom: float, frame: str,
                 free: Optional[Dict[str, Any]]) -> "_core.Camera":
         angles = number(azimuth, "azimuth"), number(elevation, "elevation")
-        if frame not in ("shown", "grid"):
-            raise _core.InputError(f"frame: {frame!r} is none of shown, grid")
+        _one_of(frame, ("shown", "grid"), "frame")
         # A slice has no camera.
         whole = frame == "grid" or options.mode == _core.RenderMode.slice
         about = _core.frame_grid(self.grid) if whole else self._held.frame_view(options, *angles)
@@ -302,6 +382,71 @@ class Volume:
         self.close()
 
 
+class CertifiedPicture:
+    """A picture of V, and what is certain of the one that F would give. Made by `Volume.certify_picture`."""
+
+    def __init__(self, picture: "_core.CertifiedPicture") -> None:
+        self._picture = picture
+
+    @property
+    def image(self) -> "NDArray[np.uint8]":
+        """uint8 [y, x, 3], sRGB: what was drawn."""
+        return self._picture.image
+
+    @property
+    def levels(self) -> Optional["NDArray[np.float32]"]:
+        """float32 [y, x]: how far the ideal picture may lie from `image`, in levels of 255, of the worst channel;
+        infinite where nothing is known. None of surfaces."""
+        return self._picture.levels
+
+    @property
+    def low(self) -> "NDArray[np.float32]":
+        """The lower ends of what is certain, float32. Of "dvr" and "slice" of the colour, [y, x, 3], 0 to 1. Of
+        "mip" of the largest F on the ray, of "integral" of its integral, of "iso" of the distance from the eye at
+        which F passes the value first: [y, x], NaN where there is none."""
+        return self._picture.low
+
+    @property
+    def high(self) -> "NDArray[np.float32]":
+        """The upper ends."""
+        return self._picture.high
+
+    @property
+    def classes(self) -> Optional["NDArray[np.uint8]"]:
+        """Of surfaces uint8 [y, x]: 2 where F passes the value for sure, 1 where it may, 0 where it does not. None
+        of other modes."""
+        return self._picture.classes
+
+    @property
+    def worst(self) -> float:
+        """The largest of `levels`."""
+        return self._picture.worst
+
+    @property
+    def mean(self) -> float:
+        """Of `levels`."""
+        return self._picture.mean
+
+    def save(self, path: Path, *, overwrite: bool = False) -> Dict[str, Any]:
+        """Writes X.png, X.certificate.json and, but for surfaces, X.bound.png: all of them, or none. Returns the
+        certificate.
+
+        Parameters
+        ----------
+        overwrite : without it files that exist are refused.
+        """
+        if not overwrite:
+            for file in self._picture.files(path):
+                if os.path.exists(file):
+                    raise _core.InputError(f"{os.fspath(file)}: exists already; overwrite=True replaces it")
+        return json.loads(self._picture.write(path))
+
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        of = "surface" if self.levels is None else f"worst pixel to {self.worst:.1f} levels"
+        return f"<vdvr.CertifiedPicture {width} x {height}, {of}>"
+
+
 def _points(points: "ArrayLike") -> Tuple["NDArray[np.float64]", Tuple[int, ...]]:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim < 1 or array.shape[-1] != 3:
@@ -323,10 +468,14 @@ def _window(given: Sequence[float]) -> Tuple[float, float]:
     return lo, hi
 
 
+def _one_of(word: str, known: Sequence[str], name: str) -> None:
+    if word not in known:
+        raise _core.InputError(f"{name}: '{word}' is none of {', '.join(known)}")
+
+
 def compressed(compression: str) -> bool:
     """Whether a word asks for compression."""
-    if compression not in ("deflate", "none"):
-        raise _core.InputError(f"compression: '{compression}' is none of deflate, none")
+    _one_of(compression, ("deflate", "none"), "compression")
     return compression == "deflate"
 
 

@@ -3,15 +3,15 @@
 
 #include <random>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 // Attacks on what comes after gold: the sampler's term, the rim of the covered region, and stored fields
 // measured end to end. Without slack.

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "host/bounds/amplitude_bounds.hpp"
-#include "host/fbp/view_weights.hpp"
+#include "host/certify/bounds/amplitude_bounds.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/exact_columns.hpp"

@@ -5,15 +5,15 @@
 #include <numbers>
 #include <random>
 
-#include "host/bounds/amplitude_bounds.hpp"
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/sampler/sampler_terms.hpp"
+#include "host/certify/bounds/amplitude_bounds.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 // Every bound of the certificate against F in double precision, without slack: measured <= certified, at

@@ -11,7 +11,7 @@
 #include "tests/support/cone_attacks.hpp"
 #include "tests/support/scan_chain.hpp"
 #include "tests/support/seed_arguments.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;

@@ -7,11 +7,11 @@
 #include <iostream>
 #include <numeric>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/lit_pictures.hpp"
 #include "tests/support/pixel_attack.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;

@@ -14,7 +14,7 @@
 
 #include "tests/support/photons.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/noise.hpp"
+#include "vdvr/expert/noise.hpp"
 
 using namespace vdvr;
 

@@ -10,10 +10,10 @@
 #include <cstdlib>
 #include <string>
 
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/levels.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/device.hpp"
 
 using namespace vdvr;

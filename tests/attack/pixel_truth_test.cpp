@@ -6,12 +6,12 @@
 
 #include <iostream>
 
-#include "host/rays/crossings.hpp"
-#include "host/system/parallel.hpp"
+#include "host/picture/rays/crossings.hpp"
+#include "host/base/system/parallel.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/pixel_attack.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 using support::AnalyticField;

@@ -10,13 +10,13 @@
 #include <cstdlib>
 #include <random>
 
-#include "host/fdk/filter_cone.hpp"
-#include "host/rays/crossings.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/picture/rays/crossings.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/pixel_attack.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/vdvr_file.hpp"
 

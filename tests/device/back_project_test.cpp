@@ -1,11 +1,11 @@
 #define BOOST_TEST_MODULE back_project
-#include "host/fbp/back_project.hpp"
+#include "host/field/fbp/back_project.hpp"
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/bounds/projection_bounds.hpp"
-#include "host/bounds/six_taps.hpp"
-#include "host/opencl/kernel.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/base/opencl/kernel.hpp"
 #include "tests/reference/back_project.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"

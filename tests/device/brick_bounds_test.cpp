@@ -4,14 +4,14 @@
 
 #include <cmath>
 
-#include "host/render/raycast.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/certificates.hpp"
 #include "tests/support/rendering.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

@@ -8,11 +8,11 @@
 #include <random>
 
 #include "tests/support/scans.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 using namespace vdvr;
 namespace support = vdvr::testing;

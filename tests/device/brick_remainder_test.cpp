@@ -1,6 +1,6 @@
 // What T leaves out, by brick, against derivatives of the field from its cosine series.
 #define BOOST_TEST_MODULE brick_remainder
-#include "host/kept/brick_remainder.hpp"
+#include "host/certify/kept/brick_remainder.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <span>
 #include <string>
 
-#include "host/gold/gold_source.hpp"
+#include "host/certify/gold/gold_source.hpp"
 #include "host/volume/bricks.hpp"
 #include "tests/reference/field_derivatives.hpp"
 #include "tests/support/attack_chain.hpp"

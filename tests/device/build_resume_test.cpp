@@ -9,7 +9,7 @@
 
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
 

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE build
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -7,15 +7,15 @@
 #include <set>
 #include <string>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using vdvr::testing::grid_of;

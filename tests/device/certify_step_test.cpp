@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "host/opencl/embedded.hpp"
-#include "host/render/raycast.hpp"
+#include "host/base/opencl/embedded.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "shared/certify_params.h"
 #include "tests/support/device.hpp"
 #include "tests/support/fields.hpp"

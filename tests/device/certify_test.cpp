@@ -11,9 +11,9 @@
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 #include "vdvr/verify_file.hpp"
 
 using namespace vdvr;

@@ -8,11 +8,11 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "host/closing/close_boundaries.hpp"
-#include "host/fbp/reconstruct.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr {
 namespace {

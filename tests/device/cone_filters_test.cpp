@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "host/kept/cone_tiles.hpp"
+#include "host/certify/kept/cone_tiles.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/cone_attacks.hpp"
 #include "tests/support/cone_scans.hpp"

@@ -1,7 +1,7 @@
 // Gold of cone beam from kept nodes against F in double precision: orbits, cone angles, lattices, and nodes
 // around the covered region.
 #define BOOST_TEST_MODULE cone_tiles
-#include "host/kept/cone_tiles.hpp"
+#include "host/certify/kept/cone_tiles.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -9,9 +9,9 @@
 #include <random>
 #include <string>
 
-#include "host/fbp/back_project.hpp"
-#include "host/kept/kept_gold.hpp"
-#include "host/system/casts.hpp"
+#include "host/field/fbp/back_project.hpp"
+#include "host/certify/kept/kept_gold.hpp"
+#include "host/base/system/casts.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/cone_scans.hpp"
 

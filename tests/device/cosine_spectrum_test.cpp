@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE cosine_spectrum
-#include "vdvr/cosine_spectrum.hpp"
+#include "vdvr/expert/cosine_spectrum.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <random>

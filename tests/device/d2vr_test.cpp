@@ -5,9 +5,9 @@
 #include <cstring>
 #include <random>
 
-#include "host/fbp/cosine_series.hpp"
-#include "host/fbp/filter_projections.hpp"
-#include "host/render/d2vr.hpp"
+#include "host/field/fbp/cosine_series.hpp"
+#include "host/field/fbp/filter_projections.hpp"
+#include "host/picture/render/d2vr.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/d2vr.hpp"
 #include "tests/reference/ramp_filter.hpp"
@@ -16,8 +16,8 @@
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/mixed_volume.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 

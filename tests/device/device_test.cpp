@@ -1,7 +1,7 @@
 #define BOOST_TEST_MODULE device
 #include <boost/test/unit_test.hpp>
 
-#include "host/opencl/kernel.hpp"
+#include "host/base/opencl/kernel.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/error.hpp"
 

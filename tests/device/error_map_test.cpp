@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE error_map
-#include "vdvr/error_map.hpp"
+#include "vdvr/expert/error_map.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <numbers>

@@ -1,12 +1,12 @@
 #define BOOST_TEST_MODULE filter_projections
-#include "host/fbp/filter_projections.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <limits>
 
-#include "host/fbp/ramp_kernel.hpp"
-#include "host/fbp/view_weights.hpp"
-#include "host/opencl/fft.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fbp/view_weights.hpp"
+#include "host/base/opencl/fft.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/scans.hpp"

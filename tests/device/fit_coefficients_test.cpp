@@ -1,11 +1,11 @@
 // LatticeFit against the fit written down once in double precision, node by node.
 #define BOOST_TEST_MODULE fit_coefficients
-#include "host/gold/fit_coefficients.hpp"
+#include "host/certify/gold/fit_coefficients.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "host/opencl/state.hpp"
+#include "host/base/opencl/state.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
 

@@ -9,10 +9,10 @@
 
 #include "host/verify/verify_attack.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using vdvr::testing::noise_scan;

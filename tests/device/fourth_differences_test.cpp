@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "host/opencl/kernel.hpp"
-#include "host/opencl/work_groups.hpp"
+#include "host/base/opencl/kernel.hpp"
+#include "host/base/opencl/work_groups.hpp"
 #include "vdvr/device.hpp"
 
 namespace vdvr {
@@ -107,7 +107,7 @@ BOOST_AUTO_TEST_CASE(bricks_have_the_hosts_whatever_shares_them) {
   for (const int lanes : {1, 4, 8})
     for (const std::uint64_t along : {1u, 2u, 32u}) {
       opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences, cl::LocalSpaceArg> kernel(
-          state, "kept/fourth_differences", "fourth_differences",
+          state, "certify/kept/fourth_differences", "fourth_differences",
           {{"VDVR_LANES", std::to_string(lanes)}, {"VDVR_ALONG", std::to_string(along)}});
       // Groups of a few threads meet seldom.
       for (int round = 0; round < (along > 1 ? 20 : 1); ++round) {

@@ -1,6 +1,6 @@
 // Gold from kept nodes against F in double precision, wherever the lattice, its boxes and the detector lie.
 #define BOOST_TEST_MODULE kept_gold
-#include "host/kept/kept_gold.hpp"
+#include "host/certify/kept/kept_gold.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -8,8 +8,8 @@
 #include <random>
 #include <string>
 
-#include "host/fbp/back_project.hpp"
-#include "host/system/casts.hpp"
+#include "host/field/fbp/back_project.hpp"
+#include "host/base/system/casts.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"

@@ -5,9 +5,9 @@
 #include <bit>
 #include <cmath>
 
-#include "host/render/raycast.hpp"
-#include "host/sampler/lit_samples.hpp"
-#include "host/sampler/resident_volume.hpp"
+#include "host/picture/render/raycast.hpp"
+#include "host/volume/sampler/lit_samples.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/rendering.hpp"

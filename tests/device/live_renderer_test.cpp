@@ -6,9 +6,9 @@
 
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/live_renderer.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/live_renderer.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;

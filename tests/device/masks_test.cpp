@@ -6,9 +6,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "host/opencl/array.hpp"
-#include "host/opencl/embedded.hpp"
-#include "host/opencl/state.hpp"
+#include "host/base/opencl/array.hpp"
+#include "host/base/opencl/embedded.hpp"
+#include "host/base/opencl/state.hpp"
 #include "tests/support/device.hpp"
 
 using namespace vdvr;

@@ -1,10 +1,10 @@
 #define BOOST_TEST_MODULE measure_tightness
-#include "vdvr/measure_tightness.hpp"
+#include "vdvr/expert/measure_tightness.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 

@@ -1,13 +1,13 @@
 // The standard deviation of F: against its definition, against repeated scans; and what is found of a scan's
 // noise, against what was put in.
 #define BOOST_TEST_MODULE noise
-#include "vdvr/noise.hpp"
+#include "vdvr/expert/noise.hpp"
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/view_weights.hpp"
-#include "host/noise/field_variance.hpp"
-#include "host/noise/split_of_views.hpp"
+#include "host/field/fbp/view_weights.hpp"
+#include "host/field/noise/field_variance.hpp"
+#include "host/field/noise/split_of_views.hpp"
 #include "tests/reference/field_variance.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
@@ -15,7 +15,7 @@
 #include "tests/support/repeated_scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

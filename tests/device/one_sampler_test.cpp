@@ -11,9 +11,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "host/opencl/embedded.hpp"
-#include "host/render/raycast.hpp"
-#include "host/volume/volume_problem.hpp"
+#include "host/base/opencl/embedded.hpp"
+#include "host/picture/render/raycast.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/mixed_volumes.hpp"
 
@@ -360,7 +360,7 @@ BOOST_AUTO_TEST_CASE(rays_sample_what_sample_at_returns_to_the_bit) {
     for (Kind kind : kinds()) {
       kind.granularity = granularities[(seed + seed / 4) % 4];
       const MixedVolume v = random_volume(kind, seed);
-      const auto problem = volume_problem(v);
+      const auto problem = validate_volume(v);
       BOOST_TEST_REQUIRE(!problem.has_value(), problem.value_or(Problem{}).what);
       BOOST_TEST_CONTEXT("volume " << seed << ", types " << kind.types << ", granularity " << v.granularity
                                    << ", coarsening (z, y, x) " << int{v.coarsening[0]}
@@ -384,7 +384,7 @@ BOOST_AUTO_TEST_CASE(rays_sample_what_sample_at_returns_to_the_bit) {
 BOOST_AUTO_TEST_CASE(every_triple_of_levels_is_sampled_to_the_bit) {
   for (const int lanes : {1, 4, 8, 16}) {
     const MixedVolume v = volume_of_all_triples(static_cast<unsigned>(lanes));
-    BOOST_TEST_REQUIRE(!volume_problem(v).has_value());
+    BOOST_TEST_REQUIRE(!validate_volume(v).has_value());
     BOOST_TEST((std::set<LevelTriple>(v.level.begin(), v.level.end()).size() == 64));
     Sampled(v, static_cast<unsigned>(lanes)).check_by(lanes, false);
   }

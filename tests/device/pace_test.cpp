@@ -2,16 +2,16 @@
 #define BOOST_TEST_MODULE pace
 #include <boost/test/unit_test.hpp>
 
-#include "host/opencl/pace.hpp"
-#include "host/opencl/state.hpp"
+#include "host/base/opencl/pace.hpp"
+#include "host/base/opencl/state.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/resident_volume.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/resident_volume.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -7,10 +7,10 @@
 
 #include "tests/support/paged_cases.hpp"
 #include "tests/support/rendering.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/paged_volume.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/paged_volume.hpp"
+#include "vdvr/expert/stop.hpp"
 
 using namespace vdvr;
 using support::budget_for;

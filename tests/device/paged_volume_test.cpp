@@ -7,8 +7,8 @@
 #include "tests/support/paged_cases.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/paged_volume.hpp"
-#include "vdvr/render_crew.hpp"
+#include "vdvr/expert/paged_volume.hpp"
+#include "vdvr/expert/render_crew.hpp"
 
 using namespace vdvr;
 using support::budget_for;

@@ -3,7 +3,7 @@
 #define BOOST_TEST_MODULE pixel_bounds
 #include <boost/test/unit_test.hpp>
 
-#include "host/pixel/range_table.hpp"
+#include "host/picture/pixel/range_table.hpp"
 #include "tests/support/pixel_attack.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"

@@ -2,9 +2,9 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "vdvr/certify.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 

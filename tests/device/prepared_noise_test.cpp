@@ -3,10 +3,11 @@
 #define BOOST_TEST_MODULE prepared_noise
 #include <boost/test/unit_test.hpp>
 
-#include "host/noise/field_variance.hpp"
-#include "host/noise/passed_noise.hpp"
-#include "host/prepare/prepare.hpp"
+#include "host/field/noise/field_variance.hpp"
+#include "host/field/noise/passed_noise.hpp"
+#include "host/scan/prepare/prepare.hpp"
 #include "tests/support/repeated_scans.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

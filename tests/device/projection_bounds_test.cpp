@@ -1,23 +1,23 @@
 #define BOOST_TEST_MODULE projection_bounds
-#include "host/bounds/projection_bounds.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <functional>
 #include <numbers>
 #include <random>
 
-#include "host/bounds/amplitude_bounds.hpp"
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/reconstruct.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/certify/bounds/amplitude_bounds.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/gold_stream.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 using vdvr::testing::empty_scan;

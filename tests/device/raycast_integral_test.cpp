@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/rays/line_integral.hpp"
-#include "host/render/raycast.hpp"
+#include "host/picture/rays/line_integral.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/charged.hpp"
 #include "tests/support/rendering.hpp"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "host/render/raycast.hpp"
-#include "host/sampler/resident_volume.hpp"
+#include "host/picture/render/raycast.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "tests/reference/first_root.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/rendering.hpp"

@@ -2,8 +2,8 @@
 #define BOOST_TEST_MODULE raycast_samplers
 #include <boost/test/unit_test.hpp>
 
-#include "host/render/raycast.hpp"
-#include "host/sampler/resident_volume.hpp"
+#include "host/picture/render/raycast.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "tests/support/blob_pictures.hpp"
 #include "tests/support/charged.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "host/render/raycast.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/rendering.hpp"

@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include "host/render/raycast.hpp"
-#include "host/sampler/resident_volume.hpp"
+#include "host/picture/render/raycast.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "shared/raycast_params.h"
 #include "tests/reference/raycast.hpp"
 #include "tests/support/blob_pictures.hpp"

@@ -1,20 +1,20 @@
 // FDK on the device against its formulas and against F in double precision.
 #define BOOST_TEST_MODULE reconstruct_cone
-#include "host/fdk/reconstruct_cone.hpp"
+#include "host/field/fdk/reconstruct_cone.hpp"
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/cosine_series.hpp"
-#include "host/fdk/cone_back_project.hpp"
-#include "host/fdk/filter_cone.hpp"
+#include "host/field/fbp/cosine_series.hpp"
+#include "host/field/fdk/cone_back_project.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "tests/reference/fdk.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/d2vr.hpp"
+#include "vdvr/expert/d2vr.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -1,16 +1,16 @@
 #define BOOST_TEST_MODULE reconstruct
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/filter_projections.hpp"
-#include "host/fbp/ramp_kernel.hpp"
-#include "host/fbp/view_weights.hpp"
+#include "host/field/fbp/filter_projections.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 using vdvr::testing::noise_scan;

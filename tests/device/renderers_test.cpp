@@ -8,7 +8,7 @@
 #include <cmath>
 #include <future>
 
-#include "host/render/raycast.hpp"
+#include "host/picture/render/raycast.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/error.hpp"
 

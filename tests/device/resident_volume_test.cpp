@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "host/sampler/resident_volume.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "vdvr/error.hpp"

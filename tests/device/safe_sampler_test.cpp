@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_renderer.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/live_renderer.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 using namespace vdvr;
 using support::device;

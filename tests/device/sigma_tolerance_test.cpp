@@ -15,13 +15,14 @@
 #include "tests/support/photons.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/certified_points.hpp"
+#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/noise_forecast.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/certify_scan.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/simulate.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;
@@ -50,8 +51,8 @@ const BuildResult& built(double multiple) {
   static std::map<double, BuildResult> all;
   auto found = all.find(multiple);
   if (found == all.end())
-    found = all.emplace(multiple,
-                        certify_in_sigma(vdvr::support::device(), noisy_scan(), multiple, stated_noise()))
+    found = all.emplace(multiple, certify_scan(vdvr::support::device(), noisy_scan(), {{}, multiple, {}},
+                                               stated_noise()))
                 .first;
   return found->second;
 }

@@ -1,22 +1,22 @@
 // Certificates do not depend on the units of a scan: the same scan in other units, by powers of two, gives
 // the same volume to the bit; what fp32 cannot hold is refused; what is no number is no bound.
 #define BOOST_TEST_MODULE units
-#include "host/bounds/result_units.hpp"
+#include "host/volume/result_units.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "host/sampler/sampler_terms.hpp"
-#include "host/system/round_up.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
+#include "host/base/system/round_up.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr {
 namespace {

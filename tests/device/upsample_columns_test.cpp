@@ -1,12 +1,12 @@
 #define BOOST_TEST_MODULE upsample_columns
-#include "host/fbp/upsample_columns.hpp"
+#include "host/field/fbp/upsample_columns.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <numeric>
 
-#include "host/bounds/projection_bounds.hpp"
-#include "host/fbp/filter_projections.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "tests/support/tolerance.hpp"
 
 using namespace vdvr;

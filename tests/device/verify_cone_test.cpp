@@ -9,20 +9,20 @@
 #include <random>
 #include <string>
 
-#include "host/fdk/filter_cone.hpp"
-#include "host/fdk/view_derivatives.hpp"
-#include "host/system/casts.hpp"
-#include "host/witness/verify_cone_bounds.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/field/fdk/view_derivatives.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/verify/witness/verify_cone_bounds.hpp"
 #include "host/verify/verify_field.hpp"
-#include "host/witness/verify_nodes.hpp"
+#include "host/verify/witness/verify_nodes.hpp"
 #include "host/verify/verify_points.hpp"
 #include "host/volume/bricks.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/certify.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
 using vdvr::testing::ConeShape;

@@ -1,6 +1,6 @@
 // Small arrays that are written without waiting, and small buffers that are used again.
 #define BOOST_TEST_MODULE write_later
-#include "host/opencl/write_later.hpp"
+#include "host/base/opencl/write_later.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <numeric>

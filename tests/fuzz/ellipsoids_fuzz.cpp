@@ -1,6 +1,6 @@
 // The JSON of ellipsoid phantoms.
 #include "tests/fuzz/target.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::fuzz {
 namespace {

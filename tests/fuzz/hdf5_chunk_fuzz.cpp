@@ -2,7 +2,7 @@
 // first byte says how it is packed, the rest is what lies under the checksum.
 #include <zlib.h>
 
-#include "host/hdf5/hdf5_chunks.hpp"
+#include "host/files/hdf5/hdf5_chunks.hpp"
 #include "tests/fuzz/target.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"

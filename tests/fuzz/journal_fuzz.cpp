@@ -5,7 +5,7 @@
 #include "tests/fuzz/target.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/journal.hpp"
+#include "vdvr/expert/journal.hpp"
 
 namespace vdvr::fuzz {
 namespace {

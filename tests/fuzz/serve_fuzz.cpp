@@ -5,7 +5,7 @@
 #include "tests/fuzz/target.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_json.hpp"
+#include "vdvr/expert/live_json.hpp"
 
 namespace vdvr::fuzz {
 namespace {

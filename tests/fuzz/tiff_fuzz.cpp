@@ -3,7 +3,7 @@
 #include "tests/fuzz/seeds.hpp"
 #include "tests/fuzz/target.hpp"
 #include "tests/support/scan_files.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 namespace vdvr::fuzz {
 namespace {

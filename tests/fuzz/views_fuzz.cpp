@@ -1,6 +1,6 @@
 // VIEWS.json: the pictures that a build is refined for.
 #include "tests/fuzz/target.hpp"
-#include "vdvr/picture_refinement.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 
 namespace vdvr::fuzz {
 namespace {

@@ -2,7 +2,7 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "host/views/brick_outlook.hpp"
+#include "host/picture/refine/brick_outlook.hpp"
 #include "host/volume/bricks.hpp"
 
 using namespace vdvr;

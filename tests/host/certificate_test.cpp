@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/certificates.hpp"
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;

@@ -7,14 +7,14 @@
 #include <limits>
 #include <numbers>
 
-#include "host/rays/crossings.hpp"
-#include "host/rays/emission.hpp"
-#include "host/rays/line_integral.hpp"
+#include "host/picture/rays/crossings.hpp"
+#include "host/picture/rays/emission.hpp"
+#include "host/picture/rays/line_integral.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certified_rays.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 

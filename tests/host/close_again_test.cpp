@@ -6,7 +6,7 @@
 #include <random>
 #include <utility>
 
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/support/open_bricks.hpp"
 
@@ -90,7 +90,7 @@ BOOST_AUTO_TEST_CASE(tiles_keep_their_samples_wherever_they_lie) {
   const auto scratch = std::make_shared<Scratch>(".", 1 << 16);
   // Parts of 2^16 samples and more: the second begins within these tiles, the third takes one alone.
   for (const std::uint64_t in_memory : {std::uint64_t{0}, std::uint64_t{1} << 19, UINT64_MAX}) {
-    TileStore store(Room{scratch, in_memory});
+    TileStore store(MemoryBudget{scratch, in_memory});
     std::vector<std::vector<float>> expected(40);
     store.resize(expected.size());
     std::mt19937 random(7);
@@ -119,12 +119,12 @@ BOOST_AUTO_TEST_CASE(tiles_keep_their_samples_wherever_they_lie) {
 BOOST_AUTO_TEST_CASE(bricks_close_alike_wherever_their_tiles_lie) {
   OpenBricks open = random_bricks({{10, 7, 6}, 4, 4, anisotropic, .9, 4});
   const MixedVolume in_memory = close_boundaries(open);
-  const Room room{std::make_shared<Scratch>(".", 1 << 16), 0};
-  TileStore store(room);
+  const MemoryBudget budget{std::make_shared<Scratch>(".", 1 << 16), 0};
+  TileStore store(budget);
   store.resize(open.samples.size());
   for (std::size_t i = 0; i < store.size(); ++i) store.put(i, std::as_const(open).samples[i]);
   open.samples = std::move(store);
-  const MixedVolume in_scratch = CloseBoundaries(open, Closing::coarse, room).first();
+  const MixedVolume in_scratch = CloseBoundaries(open, Closing::coarse, budget).first();
   BOOST_TEST(same(in_scratch, in_memory));
-  BOOST_TEST((in_scratch.tiles.begin()->second.f32.scratch() == room.scratch));
+  BOOST_TEST((in_scratch.tiles.begin()->second.f32.scratch() == budget.scratch));
 }

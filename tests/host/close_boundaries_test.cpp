@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE close_boundaries
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -7,7 +7,7 @@
 #include <optional>
 #include <random>
 
-#include "host/volume/seams.hpp"
+#include "host/verify/seams.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/open_bricks.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 
-#include "host/closing/close_boundaries.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "tests/support/open_bricks.hpp"
 #include "tests/support/tolerance.hpp"

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE common_gold
-#include "host/kept/common_gold.hpp"
+#include "host/certify/kept/common_gold.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "tests/support/cone_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

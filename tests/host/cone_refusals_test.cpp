@@ -4,8 +4,8 @@
 #include <optional>
 #include <sstream>
 
-#include "host/geometry/rtk_geometry.hpp"
-#include "host/io/npy_file.hpp"
+#include "host/files/io/npy_file.hpp"
+#include "host/scan/geometry/rtk_geometry.hpp"
 #include "tests/support/cone_files.hpp"
 
 using namespace vdvr;

@@ -9,7 +9,7 @@
 #include <iostream>
 #include <random>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 using namespace vdvr;
 

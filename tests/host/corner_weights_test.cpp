@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE corner_weights
-#include "host/sampler/corner_weights.hpp"
+#include "host/volume/sampler/corner_weights.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 using namespace vdvr;
 

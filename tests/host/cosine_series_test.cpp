@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE cosine_series
-#include "host/fbp/cosine_series.hpp"
+#include "host/field/fbp/cosine_series.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <random>

@@ -1,6 +1,6 @@
 // What processes of a crew say comes back as it was, and journal records keep their bytes.
 #define BOOST_TEST_MODULE crew_messages
-#include "host/crew/crew_messages.hpp"
+#include "host/certify/crew/crew_messages.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

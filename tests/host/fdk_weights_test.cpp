@@ -1,6 +1,6 @@
 // Weights of rays that are measured twice add up to two, whatever the geometry.
 #define BOOST_TEST_MODULE fdk_weights
-#include "host/fdk/fdk_weights.hpp"
+#include "host/field/fdk/fdk_weights.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE find_center
-#include "vdvr/find_center.hpp"
+#include "vdvr/expert/find_center.hpp"
 
 #include <array>
 #include <boost/test/unit_test.hpp>

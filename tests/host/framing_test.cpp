@@ -9,7 +9,7 @@
 #include "tests/support/tolerance.hpp"
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/framing.hpp"
+#include "vdvr/expert/framing.hpp"
 
 using namespace vdvr;
 using fields::centred_grid;

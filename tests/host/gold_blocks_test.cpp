@@ -1,6 +1,6 @@
 // Covers of selected bricks by boxes.
 #define BOOST_TEST_MODULE gold_blocks
-#include "host/gold/gold_blocks.hpp"
+#include "host/certify/gold/gold_blocks.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <random>

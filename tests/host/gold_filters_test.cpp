@@ -1,7 +1,7 @@
 // Filters between nodes: what they promise is never exceeded by waves, flat functions and sign patterns, and
 // is not far above what these reach.
 #define BOOST_TEST_MODULE gold_filters
-#include "host/kept/gold_filters.hpp"
+#include "host/certify/kept/gold_filters.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/bounds/node_functional.hpp"
+#include "host/certify/bounds/node_functional.hpp"
 #include "tests/support/band_attack.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"

@@ -1,13 +1,13 @@
 // What is stored of a chunk: packed by HDF5 and unpacked here, and what no honest program writes.
 #define BOOST_TEST_MODULE hdf5_chunks
-#include "host/hdf5/hdf5_chunks.hpp"
+#include "host/files/hdf5/hdf5_chunks.hpp"
 
 #include <zlib.h>
 
 #include <limits>
 #include <numeric>
 
-#include "host/hdf5/hdf5_reader.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "tests/support/vdvr_files.hpp"
 
 using namespace vdvr;

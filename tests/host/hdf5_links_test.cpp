@@ -2,8 +2,8 @@
 #include <boost/test/unit_test.hpp>
 
 #include "tests/support/hdf5_sources.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/volume_file.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 // Scans in several HDF5 files: what is read, what is hashed, what is refused. The files of other writers are
 // those of tests/program/hdf5_files.py.

@@ -1,6 +1,6 @@
 // NumPy files, moving pictures, and what is drawn over a picture.
 #define BOOST_TEST_MODULE image
-#include "vdvr/image.hpp"
+#include "vdvr/expert/image.hpp"
 
 #include <gif_lib.h>
 
@@ -12,10 +12,11 @@
 #include <set>
 
 #include "host/picture/palette.hpp"
-#include "host/picture/png.hpp"
+#include "host/base/system/png.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/decorate.hpp"
+#include "vdvr/expert/animation.hpp"
+#include "vdvr/expert/decorate.hpp"
 #include "vdvr/error.hpp"
 
 using namespace vdvr;

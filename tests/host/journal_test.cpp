@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE journal
-#include "vdvr/journal.hpp"
+#include "vdvr/expert/journal.hpp"
 
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -1,8 +1,8 @@
 #define BOOST_TEST_MODULE lazy_volume
 #include "tests/support/vdvr_files.hpp"
 
-#include "vdvr/certified_points.hpp"
-#include "vdvr/lazy_volume.hpp"
+#include "vdvr/expert/certified_points.hpp"
+#include "vdvr/expert/lazy_volume.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

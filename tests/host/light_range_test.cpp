@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "host/rays/light_range.hpp"
+#include "host/picture/rays/light_range.hpp"
 #include "tests/reference/ideal_light.hpp"
 #include "tests/support/tolerance.hpp"
 

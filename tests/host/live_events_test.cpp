@@ -10,7 +10,7 @@
 #include "tests/support/fields.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_json.hpp"
+#include "vdvr/expert/live_json.hpp"
 
 using namespace vdvr;
 

@@ -9,7 +9,7 @@
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 using namespace vdvr;
 

@@ -4,9 +4,9 @@
 #include <optional>
 #include <sstream>
 
-#include "host/geometry/nikon_geometry.hpp"
+#include "host/scan/geometry/nikon_geometry.hpp"
 #include "tests/support/cone_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -9,8 +9,8 @@
 
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace fs = std::filesystem;
 using namespace vdvr;

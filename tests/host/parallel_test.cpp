@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE parallel
-#include "host/system/parallel.hpp"
+#include "host/base/system/parallel.hpp"
 
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -11,7 +11,7 @@
 #include "tests/reference/line_integral.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 

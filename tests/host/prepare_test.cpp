@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE prepare
-#include "host/prepare/prepare.hpp"
+#include "host/scan/prepare/prepare.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <algorithm>
@@ -8,11 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host/prepare/preparation_json.hpp"
+#include "host/scan/prepare/preparation_json.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 #include "vdvr/read_scan.hpp"
 
 using namespace vdvr;

@@ -1,6 +1,6 @@
 // What a filter errs on what a cone-beam view adds along a line of nodes, against waves evaluated directly.
 #define BOOST_TEST_MODULE projective_error
-#include "host/kept/projective_error.hpp"
+#include "host/certify/kept/projective_error.hpp"
 
 #include <algorithm>
 #include <array>

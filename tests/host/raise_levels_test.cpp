@@ -1,6 +1,6 @@
 // Which levels rise where a closed brick violates the node test.
 #define BOOST_TEST_MODULE raise_levels
-#include "host/closing/raise_levels.hpp"
+#include "host/certify/closing/raise_levels.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,10 +1,10 @@
 #define BOOST_TEST_MODULE read_scan
 #include "vdvr/read_scan.hpp"
 
-#include "host/system/length_unit.hpp"
-#include "host/system/text_encoding.hpp"
+#include "host/base/system/length_unit.hpp"
+#include "host/files/io/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE region_of_interest
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <string>

@@ -1,7 +1,7 @@
 // Fourth derivatives from fourth differences: the norms, and the theorem on waves whose derivatives are
 // exact.
 #define BOOST_TEST_MODULE remainder_norms
-#include "host/bounds/remainder_norms.hpp"
+#include "host/certify/bounds/remainder_norms.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "host/bounds/tap_design.hpp"
+#include "host/certify/bounds/tap_design.hpp"
 #include "tests/support/band_attack.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"

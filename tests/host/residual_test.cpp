@@ -7,15 +7,15 @@
 #include <numbers>
 #include <random>
 
-#include "host/residual/bounds_along.hpp"
-#include "host/residual/primitives.hpp"
-#include "host/residual/row_integrals.hpp"
+#include "host/verify/residual/bounds_along.hpp"
+#include "host/verify/residual/primitives.hpp"
+#include "host/verify/residual/row_integrals.hpp"
 #include "tests/reference/line_integral.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/residual.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/residual.hpp"
 
 using namespace vdvr;
 namespace support = vdvr::testing;

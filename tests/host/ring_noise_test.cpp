@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "tests/support/scans.hpp"
-#include "vdvr/noise.hpp"
+#include "vdvr/expert/noise.hpp"
 
 using namespace vdvr;
 

@@ -3,9 +3,9 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/fbp/reconstruct.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 using namespace vdvr;
 

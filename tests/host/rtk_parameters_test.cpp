@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "tests/support/cone_files.hpp"
-#include "vdvr/rtk_geometry.hpp"
+#include "vdvr/expert/rtk_geometry.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -2,10 +2,10 @@
 #define BOOST_TEST_MODULE scan_folder
 #include <boost/test/data/test_case.hpp>
 
-#include "host/io/natural_order.hpp"
-#include "host/raw/scan_folder.hpp"
+#include "host/files/io/natural_order.hpp"
+#include "host/scan/raw/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE scratch
-#include "vdvr/scratch.hpp"
+#include "vdvr/expert/scratch.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "vdvr/error.hpp"
-#include "vdvr/sample_array.hpp"
+#include "vdvr/expert/sample_array.hpp"
 
 using namespace vdvr;
 

@@ -1,6 +1,6 @@
 // Which level triples are tried, and in which order.
 #define BOOST_TEST_MODULE search_triples
-#include "host/gold/search_triples.hpp"
+#include "host/certify/gold/search_triples.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>

@@ -1,6 +1,6 @@
 // Cone-beam projections against quadrature, closed forms and the parallel limit.
 #define BOOST_TEST_MODULE simulate_cone
-#include "host/simulate/simulate_cone.hpp"
+#include "host/scan/simulate/simulate_cone.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

@@ -9,12 +9,12 @@
 #include <random>
 #include <thread>
 
-#include "host/simulate/simulate_band_limit.hpp"
-#include "host/simulate/simulate_detector.hpp"
+#include "host/scan/simulate/simulate_band_limit.hpp"
+#include "host/scan/simulate/simulate_detector.hpp"
 #include "tests/reference/band_limit.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;
 

@@ -1,6 +1,6 @@
 // Six weights between columns: their facts hold at every place, and are reached.
 #define BOOST_TEST_MODULE six_taps
-#include "host/bounds/six_taps.hpp"
+#include "host/certify/bounds/six_taps.hpp"
 
 #include <algorithm>
 #include <array>

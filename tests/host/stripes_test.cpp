@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE stripes
-#include "host/prepare/stripes.hpp"
+#include "host/scan/prepare/stripes.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 #include <random>
 
 #include "tests/support/scans.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/preparation.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 using namespace vdvr;
 

@@ -13,8 +13,8 @@
 #include "host/picture/ticks.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/hash.hpp"
-#include "vdvr/slice_frame.hpp"
+#include "vdvr/expert/hash.hpp"
+#include "vdvr/expert/slice_frame.hpp"
 
 using namespace vdvr;
 

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/hdf5/hdf5_reader.hpp"
-#include "host/hdf5/hdf5_writer.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "vdvr/hash.hpp"
+#include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
 using namespace vdvr::support;

@@ -1,6 +1,6 @@
 // Derivatives of a cone-beam view: the identity they rest on, and bounds that waves do not exceed but reach.
 #define BOOST_TEST_MODULE view_derivatives
-#include "host/fdk/view_derivatives.hpp"
+#include "host/field/fdk/view_derivatives.hpp"
 
 #include <algorithm>
 #include <boost/multiprecision/cpp_bin_float.hpp>

@@ -1,6 +1,6 @@
 #define BOOST_TEST_MODULE volume_file
-#include "host/io/tiff.hpp"
-#include "vdvr/volume_file.hpp"
+#include "host/files/io/tiff.hpp"
+#include "vdvr/expert/volume_file.hpp"
 
 #include <hdf5.h>
 #include <fmt/format.h>

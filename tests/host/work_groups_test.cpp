@@ -1,6 +1,6 @@
 // How kernels that carry heights are launched, by device class.
 #define BOOST_TEST_MODULE work_groups
-#include "host/opencl/work_groups.hpp"
+#include "host/base/opencl/work_groups.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -90,7 +90,7 @@ endforeach()
 expect("libvdvr" "${libvdvr${abi}_contents}" "/libvdvr\\.so\\.${abi} -> libvdvr\\.so\\.${VERSION}")
 expect_no("libvdvr" "${libvdvr${abi}_contents}" "/libvdvr\\.so( |\n)|/include/|\\.cmake")
 expect("libvdvr-dev" "${libvdvr-dev_contents}" "/libvdvr\\.so -> libvdvr\\.so\\.${abi}")
-foreach(file IN ITEMS include/vdvr/certify.hpp cmake/vdvr/vdvrConfig.cmake cmake/vdvr/vdvr_shared.cmake pkgconfig/vdvr.pc
+foreach(file IN ITEMS include/vdvr/expert/certify.hpp cmake/vdvr/vdvrConfig.cmake cmake/vdvr/vdvr_shared.cmake pkgconfig/vdvr.pc
         examples/certify.cpp examples/CMakeLists.txt)
   expect("libvdvr-dev" "${libvdvr-dev_contents}" "/${file}\n")
 endforeach()

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/program.hpp"
 #include "vdvr/vdvr_file.hpp"
 

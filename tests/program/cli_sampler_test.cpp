@@ -10,8 +10,8 @@
 
 #include "tests/support/charged.hpp"
 #include "tests/support/command_line.hpp"
-#include "vdvr/certify_picture.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/certify_picture.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/vdvr_file.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/read_scan.hpp"

@@ -1,6 +1,6 @@
 // Verify against the truth in double precision, against tampering, and through the program.
 #define BOOST_TEST_MODULE verify
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 #include <sys/wait.h>
 
@@ -13,14 +13,14 @@
 
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/volume/seams.hpp"
+#include "host/verify/seams.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/certified_region.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

@@ -153,6 +153,32 @@ window = volume.render(size=(9, 9), mode="integral", azimuth=0, elevation=0,
 assert np.array_equal(window, greys)
 raises(vdvr.InputError, "box", lambda: volume.to_numpy(box=(90, 90, 90, 99, 99, 99)))
 raises(vdvr.InputError, "[..., 3]", lambda: volume([1.0, 2.0]))
+# Certified pictures: those of `vdvr render --certify`, to the byte.
+os.makedirs("by-program", exist_ok=True)
+volume.save("pictured.vdvr")
+for mode, array in (("dvr", (24, 32, 3)), ("slice", (24, 32, 3)), ("mip", (24, 32)), ("iso", (24, 32))):
+    picture = volume.certify_picture(size=(32, 24), mode=mode, sampler="buffer")
+    assert picture.image.shape == (24, 32, 3) and picture.low.shape == picture.high.shape == array
+    assert (picture.levels is None) == (mode == "iso") and (picture.classes is None) == (mode != "iso")
+    certificate = picture.save(f"{mode}.png")
+    subprocess.run([sys.argv[1], "render", "pictured.vdvr", "--certify", "--mode", mode, "--size", "32x24", "--sampler", "buffer",
+                    "-o", f"by-program/{mode}.png", "--quiet"] + (["--plain"] if mode == "slice" else []), check=True)
+    for file in [f"{mode}.png", f"{mode}.certificate.json"] + ([] if mode == "iso" else [f"{mode}.bound.png"]):
+        assert open(file, "rb").read() == open(f"by-program/{file}", "rb").read(), f"{file} differs"
+    found = vdvr.verify_picture(f"{mode}.certificate.json", volume, scan, rays=3)
+    assert found and found.same_pixels and found.rays_outside == 0 and not found.failures
+    assert found.rays == (0 if certificate.get("light") == "as drawn" and certificate["picture"]["gradient"] != "central" else 3)
+assert 0 < picture.mean + 1 and "surface" in repr(picture)
+assert volume.certify_picture(size=(16, 16), shading=False, tolerance=0).worst <= volume.certify_picture(
+    size=(16, 16), shading=False, step=1.0).worst
+raises(vdvr.InputError, "exists already", lambda: picture.save("iso.png"))
+raises(vdvr.InputError, ".png", lambda: picture.save("iso.npy"))
+raises(vdvr.InputError, "none of exact", lambda: volume.certify_picture(form="quick"))
+raises(vdvr.InputError, "certified", lambda: volume.certify_picture(mode="error"))
+raises(vdvr.FileError, "no-such", lambda: vdvr.verify_picture("no-such.json", volume))
+with open("dvr.png", "ab") as changed:
+    changed.write(b"x")
+assert "is not the picture" in vdvr.verify_picture("dvr.certificate.json", "pictured.vdvr").failures[0]
 # Sigma: a build that is held to it, at points, in pictures.
 subprocess.run([sys.argv[1], "simulate", "--phantom", "sphere", "--detector", "33x5", "--angles", "40", "--photons", "2000",
                 "-o", "counts.h5", "--quiet"], check=True)

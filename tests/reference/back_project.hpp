@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/cosine_series.hpp"
-#include "vdvr/projections.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/cosine_series.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

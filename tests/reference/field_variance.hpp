@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "tests/reference/cosine_series.hpp"
-#include "vdvr/grid.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::reference {

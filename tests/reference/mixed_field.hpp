@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::reference {
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::reference {
 

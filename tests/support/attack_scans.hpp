@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "tests/reference/cosine_series.hpp"
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::attacks {
 

@@ -4,9 +4,9 @@
 
 #include <functional>
 
-#include "host/geometry/vectors.hpp"
+#include "host/scan/geometry/vectors.hpp"
 #include "tests/support/cone_files.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr::support {
 

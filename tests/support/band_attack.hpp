@@ -1,5 +1,5 @@
 // Attacks on bounds of sums over nodes: waves, and functions of a band that are as flat as they can be for
-// what the sum errs on them. Direct sums; shares nothing with host/bounds/node_functional.cpp.
+// what the sum errs on them. Direct sums; shares nothing with host/certify/bounds/node_functional.cpp.
 #pragma once
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "host/opencl/cl.hpp"
+#include "host/base/opencl/cl.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/rendering.hpp"
 #include "vdvr/raycast.hpp"

@@ -1,7 +1,7 @@
 // A certificate with every member set, with values that need all 17 digits.
 #pragma once
 
-#include "vdvr/certificate.hpp"
+#include "vdvr/expert/certificate.hpp"
 
 namespace vdvr::support {
 

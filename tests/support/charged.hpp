@@ -3,9 +3,9 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/sampler/sampler_terms.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/device.hpp"
-#include "vdvr/probe_sampler.hpp"
+#include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr::support {
 

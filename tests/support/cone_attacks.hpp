@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
-#include "host/fdk/fdk_weights.hpp"
-#include "host/fdk/filter_cone.hpp"
-#include "host/geometry/vectors.hpp"
+#include "host/field/fdk/fdk_weights.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/scan/geometry/vectors.hpp"
 #include "tests/support/attack_scans.hpp"
-#include "vdvr/rates.hpp"
+#include "vdvr/expert/rates.hpp"
 
 namespace vdvr::attacks {
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/fbp/coverage.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "tests/support/scans.hpp"
 
 namespace vdvr::testing {

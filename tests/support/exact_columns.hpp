@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "host/bounds/six_taps.hpp"
-#include "host/fbp/filter_projections.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "tests/support/attack_scans.hpp"
-#include "vdvr/rates.hpp"
+#include "vdvr/expert/rates.hpp"
 
 namespace vdvr::attacks {
 

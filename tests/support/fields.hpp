@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::fields {
 

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "host/hdf5/zstd_filter.hpp"
+#include "host/files/hdf5/zstd_filter.hpp"
 #include "tests/support/scan_files.hpp"
 
 namespace vdvr::support {

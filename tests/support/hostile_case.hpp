@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "tests/support/attack_scans.hpp"
-#include "vdvr/build.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/build.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::hostile {
 

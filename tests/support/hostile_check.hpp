@@ -11,11 +11,11 @@
 #include "tests/support/hostile_case.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/noise_forecast.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/region_of_interest.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/verify.hpp"
+#include "vdvr/expert/verify.hpp"
 
 namespace vdvr::hostile {
 

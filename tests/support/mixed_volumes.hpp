@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "vdvr/mixed_volume.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::support {
 

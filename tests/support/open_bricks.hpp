@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "host/closing/open_bricks.hpp"
-#include "vdvr/mixed_volume.hpp"
+#include "host/certify/closing/open_bricks.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::support {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "vdvr/projections.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::testing {
 

@@ -8,7 +8,7 @@
 #include "tests/reference/ideal_picture.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/certify_picture.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr::support {
 

@@ -13,9 +13,9 @@
 #include "tests/support/device.hpp"
 #include "tests/support/photons.hpp"
 #include "tests/support/scans.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/noise.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/noise.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::testing {
 

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <vector>
 
-#include "host/fdk/filter_cone.hpp"
-#include "host/gold/gold_batch.hpp"
-#include "host/gold/gold_stream.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/gold_stream.hpp"
 #include "vdvr/device.hpp"
-#include "vdvr/exact_field.hpp"
+#include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr::attacks {
 

@@ -1,5 +1,5 @@
-// Scans as files, written with the plain HDF5 and TIFF libraries, independent of host/io: Data Exchange,
-// NXtomo, TIFF, a folder with scan.json. Used by the tests of the scan readers.
+// Scans as files, written with the plain HDF5 and TIFF libraries, independent of host/files/io: Data
+// Exchange, NXtomo, TIFF, a folder with scan.json. Used by the tests of the scan readers.
 #pragma once
 
 #include <hdf5.h>
@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host/io/tiff.hpp"
+#include "host/files/io/tiff.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
@@ -44,7 +44,7 @@ inline bool has(const std::string& text, const std::string& part) {
   return found;
 }
 
-// --- an HDF5 file written with the plain C API, independent of host/io ---
+// --- an HDF5 file written with the plain C API, independent of host/files/io ---
 
 class Hdf5Writer {
  public:

@@ -7,9 +7,9 @@
 #include <optional>
 #include <random>
 
-#include "vdvr/projections.hpp"
-#include "vdvr/reconstruct.hpp"
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/projections.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 namespace vdvr::testing {
 

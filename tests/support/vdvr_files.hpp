@@ -1,5 +1,5 @@
 // Small .vdvr files and their damage: volumes compared by bits, and edits by raw HDF5 calls, independent of
-// host/io. Used by the tests of the .vdvr file.
+// host/files/io. Used by the tests of the .vdvr file.
 #pragma once
 
 #include <hdf5.h>

@@ -9,15 +9,16 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/certified_region.hpp"
-#include "vdvr/measure_tightness.hpp"
-#include "vdvr/simulate.hpp"
-#include "vdvr/tune.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/measure_tightness.hpp"
+#include "vdvr/expert/simulate.hpp"
+#include "vdvr/expert/tune.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -183,8 +184,8 @@ int bench_build(Arguments& args) {
     const auto start = Clock::now();
     planned.emplace(read_and_plan(device, args, wanted, progress.callback()));
     plan_seconds = since(start);
-    grid = planned->plan.grid;
-    field = planned->plan.field;
+    grid = planned->made.plan.grid;
+    field = planned->made.plan.field;
     built = build_planned(device, *planned, wanted, progress.callback());
     seconds.push_back(since(start));
   }

@@ -1,13 +1,13 @@
 // vdvr build: the certified volume.
-#include "vdvr/build.hpp"
+#include "vdvr/expert/build.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/output.hpp"
 
 namespace vdvr::cli {
@@ -60,8 +60,8 @@ int build_part(const Arguments& args, const CommonOptions& common, Wanted wanted
   ProgressLine progress(args.who(), common.quiet);
   wanted.noted_noise = false;
   Planned planned = read_and_plan(devices.first(), args, wanted, progress.callback());
-  if (planned.sigmas) wanted.options.build.refinement = refinement_in_sigma(*planned.sigma, *planned.sigmas);
-  build_share(devices.first(), planned.scan, std::move(planned.plan), wanted.options.build, share,
+  if (auto refinement = refinement_of(planned.made)) wanted.options.build.refinement = std::move(*refinement);
+  build_share(devices.first(), planned.scan, std::move(planned.made.plan), wanted.options.build, share,
               progress.callback());
   progress.clear();
   const Json json = {{"journal", journal.path().string()},

@@ -5,8 +5,8 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/rtk_geometry.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/rtk_geometry.hpp"
 
 namespace vdvr::cli {
 namespace {

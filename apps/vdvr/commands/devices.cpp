@@ -4,7 +4,7 @@
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/raycast.hpp"
 

@@ -9,7 +9,7 @@
 #include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_large.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 namespace {

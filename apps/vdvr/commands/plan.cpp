@@ -1,6 +1,6 @@
 // vdvr plan: bounds, rates, shares, storage, memory and time foreseen, and pictures of what interpolation
 // does to the scan's frequencies; builds nothing.
-#include "vdvr/plan.hpp"
+#include "vdvr/expert/plan.hpp"
 
 #include <fmt/format.h>
 
@@ -9,13 +9,13 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/noise_words.hpp"
-#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_forecast.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/plan_pictures.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/plan_pictures.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -35,7 +35,7 @@ struct Spread {
 };
 
 Spread spread_over(const Planned& p, std::int64_t ranks, std::int64_t machines) {
-  const Plan& plan = p.plan;
+  const Plan& plan = p.made.plan;
   Spread s{ranks, machines};
   // The scan and what is filtered of it are the leader's, and kept gold is a machine's: of that, no more is
   // taken to be spread than among ranks that are all on machines of their own.
@@ -80,7 +80,7 @@ void print_spread(const Spread& s) {
 
 // Of pictures, their own foreseen in place of what one tolerance for all bricks takes.
 Json foreseen_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
-  const Plan& plan = p.plan;
+  const Plan& plan = p.made.plan;
   Json json = {{"gold_samples", plan.gold_samples},
                {"memory_bytes", forecast ? forecast->memory_bytes : plan.memory_bytes},
                {"scratch_bytes", scratch_bytes(p.scan)},
@@ -91,7 +91,7 @@ Json foreseen_json(const Planned& p, const std::optional<PictureForecast>& forec
 }
 
 Json plan_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
-  const Plan& plan = p.plan;
+  const Plan& plan = p.made.plan;
   return {{"epsilon", plan.epsilon},
           {"epsilon_abs", plan.epsilon_abs},
           {"reference_range", plan.reference_range},
@@ -112,7 +112,7 @@ Json plan_json(const Planned& p, const std::optional<PictureForecast>& forecast)
 }
 
 void print_plan(const Planned& p, const std::optional<PictureForecast>& forecast) {
-  const Plan& plan = p.plan;
+  const Plan& plan = p.made.plan;
   print_scan(p.scan);
   print_grid(plan.grid);
   print_bounds(plan.bounds, plan.epsilon_abs);
@@ -151,7 +151,7 @@ std::vector<std::string> picture_names() {
 
 /// Draws and writes them; the content of pictures.json.
 Json write_pictures(Device& device, OutputFolder& folder, const Planned& p, const Progress& progress) {
-  const PlanPictures made = plan_pictures(device, p.scan, p.plan, progress);
+  const PlanPictures made = plan_pictures(device, p.scan, p.made.plan, progress);
   folder.begin();
   for (const auto& picture : made.pictures) write_png(folder.file(picture.file), picture.image);
   Json json = Json::parse(made.json);
@@ -212,7 +212,7 @@ int plan_command(Arguments& args) {
       noise_of_plan(device, planned, args.has("compare-filters") ? &wanted : nullptr, progress.callback());
   Json json = plan_json(planned, forecast), pictures;
   json["noise"] = noise_json(found);
-  if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.plan);
+  if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.made.plan);
   const std::optional<Spread> spread = spread_of(args, planned);
   if (spread) json["foreseen"]["spread"] = spread_json(*spread);
   if (folder) {
@@ -224,7 +224,7 @@ int plan_command(Arguments& args) {
   print_result(common, json, [&] {
     print_plan(planned, forecast);
     print_noise(found);
-    if (noise) print_field_noise(*noise, planned.plan);
+    if (noise) print_field_noise(*noise, planned.made.plan);
     if (spread) print_spread(*spread);
     if (folder) print_pictures(pictures);
   });

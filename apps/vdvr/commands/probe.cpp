@@ -10,13 +10,13 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/certified_points.hpp"
-#include "vdvr/certify.hpp"
-#include "vdvr/d2vr.hpp"
+#include "vdvr/expert/certified_points.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/d2vr.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/exact_field.hpp"
-#include "vdvr/output_file.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -1,5 +1,5 @@
 // vdvr reconstruct: uniform filtered back-projection.
-#include "vdvr/reconstruct.hpp"
+#include "vdvr/expert/reconstruct.hpp"
 
 #include <fmt/format.h>
 

@@ -2,24 +2,24 @@
 #include <fmt/format.h>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "apps/vdvr/integral_certificate.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/vdvr/ray_certificate.hpp"
 #include "apps/vdvr/render_options.hpp"
 #include "apps/vdvr/sampler_json.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
+#include "vdvr/expert/animation.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
+#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/vdvr_file.hpp"
-#include "vdvr/volume_file.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/volume_file.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -280,12 +280,10 @@ int render_command(Arguments& args) {
   give_up_option(args);
   if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
   const bool of_integrals = o.mode == RenderMode::integral;
-  if (of_integrals) check_integral_certificate(args, kind == OutputKind::values);
-  else check_ray_certificate(args, o.mode, kind == OutputKind::values);
   // Colours are certified by the device, surfaces, maxima and integrals ray by ray on the host.
   const bool certifies = asks_certify(args) && is_certified_by_ray(o.mode);
   if (certifies)
-    for (const auto& beside : ray_certificate_paths(output, o.mode))
+    for (const auto& beside : beside_picture(output, o.mode))
       check_output(beside, common.force, {file_of_volume(path)});
   if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
 
@@ -306,7 +304,6 @@ int render_command(Arguments& args) {
   const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
   o.camera = camera_for(args, frame, orbit);
   o.clip = clip_for(args, scene, progress.callback());
-  if (certifies) o.clip = certified_clip(args, scene, o, progress.callback());
   const bool comparison = scene.certificate && scene.certificate->comparison;
   std::vector<std::string> notes = notes_on(args, o, source);
   // The base samples alone are another field than the one certified.
@@ -314,10 +311,13 @@ int render_command(Arguments& args) {
   o.skip_empty = !args.has("no-skip");
   source.show(brick_quantity(args));
 
-  if (asks_certify(args) && !certifies) {
-    const int code = certify_render(args, common, source, o, overlay, output, progress.callback());
+  std::optional<CertifiedRender> made;
+  if (asks_certify(args))
+    made = certify_render(args, common, source, o, overlay, output, progress.callback());
+  if (made && !certifies) {
     progress.clear();
-    return code;
+    say_certified(args, common, source, *made, output);
+    return 0;
   }
   // All frames have the window of the first.
   if (of_integrals && turntable && !o.slice_range) o.slice_range = range_of_values(source.draw(o).values);
@@ -331,14 +331,9 @@ int render_command(Arguments& args) {
   const RenderResult result = kind == OutputKind::folder ? into_folder()
                               : turntable
                                   ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
-                              : certifies ? source.draw(o)
-                                          : draw_one(stage, o, output, kind);
-  RayCertificate ray_certificate;
+                              : made ? made->picture.drawn
+                                     : draw_one(stage, o, output, kind);
   if (of_integrals && !o.slice_range) o.slice_range = range_of_values(result.values);
-  if (certifies)
-    ray_certificate = of_integrals
-                          ? write_integral_certificate(args, source, o, result, output, progress.callback())
-                          : write_ray_certificate(args, source, o, result, output, progress.callback());
   progress.clear();
 
   const std::string& sampler_reason = safe.reason.empty() ? result.sampler_reason : safe.reason;
@@ -371,8 +366,8 @@ int render_command(Arguments& args) {
       {"window", of_integrals ? Json(*o.slice_range) : Json()},
       {"notes", notes},
       {"method", method},
-      {"certificate", ray_certificate.json},
-      {"picture_tolerance", ray_certificate.beyond ? tolerance_json(*ray_certificate.beyond) : Json()},
+      {"certificate", made ? made->json : Json()},
+      {"picture_tolerance", made && made->beyond ? tolerance_json(*made->beyond) : Json()},
       {"resident_bytes", source.bytes()},
       {"paging", paging_json(source.paging())},
       {"device", source.device().info().name},
@@ -394,8 +389,7 @@ int render_command(Arguments& args) {
     if (of_integrals)
       fmt::print("  grey         from {:.6g}, black, to {:.6g}, white\n", o.slice_range->first,
                  o.slice_range->second);
-    if (certifies && of_integrals) print_integral_certificate(ray_certificate);
-    else if (certifies) print_ray_certificate(ray_certificate);
+    if (made) print_certain(*made);
     fmt::print("  not covered  {}\n", outside_certificate(o));
     if (has_transfer)
       fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,
@@ -407,7 +401,7 @@ int render_command(Arguments& args) {
                result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,
                source.device().info().name);
   });
-  require_within(output, ray_certificate.beyond);
+  if (made) require_within(output, made->beyond);
   return 0;
 }
 

@@ -1,5 +1,5 @@
 // vdvr residual: what was measured less what F has along the ray, and which rays no interpolation explains.
-#include "vdvr/residual.hpp"
+#include "vdvr/expert/residual_picture.hpp"
 
 #include <fmt/format.h>
 

@@ -8,8 +8,8 @@
 #include <iterator>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/expert/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
@@ -17,10 +17,10 @@
 #include "apps/vdvr/verification.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/error_slice.hpp"
-#include "vdvr/framing.hpp"
-#include "vdvr/output_file.hpp"
-#include "vdvr/safe_sampler.hpp"
+#include "vdvr/expert/error_slice.hpp"
+#include "vdvr/expert/framing.hpp"
+#include "vdvr/expert/output_file.hpp"
+#include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr::cli {
 namespace {

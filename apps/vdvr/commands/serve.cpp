@@ -8,10 +8,10 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/serve/server.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_json.hpp"
-#include "vdvr/live_renderer.hpp"
-#include "vdvr/stop.hpp"
-#include "vdvr/trust.hpp"
+#include "vdvr/expert/live_json.hpp"
+#include "vdvr/expert/live_renderer.hpp"
+#include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -1,5 +1,5 @@
 // vdvr simulate: projections of a phantom or of a volume, as Data Exchange; of cone beam a folder.
-#include "vdvr/simulate.hpp"
+#include "vdvr/expert/simulate.hpp"
 
 #include <fmt/format.h>
 

@@ -10,6 +10,7 @@
 #include "apps/vdvr/verification.hpp"
 #include "apps/vdvr/verify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 
@@ -59,7 +60,7 @@ int verify_command(Arguments& args) {
   const CommonOptions common = common_options(args);
   if (args.has("picture")) {
     refuse(args, {"exhaustive"}, "does not apply to --picture");
-    return verify_picture(args, common);
+    return verify_picture_command(args, common);
   }
   refuse(args, {"rays"}, "goes with --picture");
   const auto path = args.path("FILE"), projections = args.path("projections");

@@ -9,8 +9,8 @@
 #include <string>
 #include <thread>
 
-#include "vdvr/live_events.hpp"
-#include "vdvr/live_renderer.hpp"
+#include "vdvr/expert/live_events.hpp"
+#include "vdvr/expert/live_renderer.hpp"
 
 namespace vdvr::cli {
 

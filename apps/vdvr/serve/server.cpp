@@ -14,8 +14,8 @@
 #include "apps/vdvr/serve/listener.hpp"
 #include "apps/vdvr/serve/page.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/live_json.hpp"
-#include "vdvr/stop.hpp"
+#include "vdvr/expert/live_json.hpp"
+#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::cli {
 namespace {

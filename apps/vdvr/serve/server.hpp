@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/live_renderer.hpp"
+#include "vdvr/expert/live_renderer.hpp"
 
 namespace vdvr::cli {
 
@@ -30,8 +30,8 @@ class Server {
   [[nodiscard]] int port() const;
   /// "http://127.0.0.1:PORT/TOKEN/"
   [[nodiscard]] std::string address() const;
-  /// Answers until a stop is requested (vdvr/stop.hpp); then no connection is left. Throws ResourceError if
-  /// the system ends it.
+  /// Answers until a stop is requested (vdvr/expert/stop.hpp); then no connection is left. Throws
+  /// ResourceError if the system ends it.
   void run();
 
  private:

@@ -1,0 +1,138 @@
+// Builds embedded kernel programs, once per set of defines. And the names of OpenCL's codes, for error
+// messages.
+//
+// Flags: -cl-std=CL1.2, and no relaxed arithmetic: what a certificate covers must round as the bound assumes.
+// For the same reason no product is joined with a sum unless a kernel says fma. Warnings are errors in tests,
+// which set VDVR_KERNEL_WARNINGS=error: one hid an uninitialised pointer that made certificates too good. In
+// the field a compiler that we never saw may warn of what is right.
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <set>
+#include <sstream>
+
+#include "host/base/opencl/embedded.hpp"
+#include "host/base/opencl/state.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/expert/stop.hpp"
+
+namespace vdvr::opencl {
+namespace {
+
+void append_resolved(const std::string& name, std::set<std::string>& seen, std::string& out) {
+  const auto& sources = embedded_sources();
+  const auto found = sources.find(name);
+  if (found == sources.end()) throw BuildError(fmt::format("kernel source '{}' is not embedded", name));
+  if (!seen.insert(name).second) return;
+  out += fmt::format("#line 1 \"kernels/{}\"\n", name);
+  std::istringstream lines{std::string(found->second)};
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const std::string key = "#include \"";
+    if (line.rfind(key, 0) == 0) {
+      append_resolved(line.substr(key.size(), line.find('"', key.size()) - key.size()), seen, out);
+      out += fmt::format("#line {} \"kernels/{}\"\n", number + 1, name);
+    } else {
+      out += line + '\n';
+    }
+  }
+}
+
+}  // namespace
+
+std::string resolve_source(const std::string& name) {
+  std::set<std::string> seen;
+  // How functions take vectors wider than the CPU's is the compiler's own affair, since all callers are its
+  // own: PoCL without AVX-512 warns of it.
+  std::string out =
+      "#pragma OPENCL FP_CONTRACT OFF\n#ifdef __has_warning\n#if __has_warning(\"-Wpsabi\")\n"
+      "#pragma clang diagnostic ignored \"-Wpsabi\"\n#endif\n#endif\n";
+  append_resolved(name, seen, out);
+  return out;
+}
+
+std::string build_options(const Defines& defines) {
+  const char* warnings = std::getenv("VDVR_KERNEL_WARNINGS");
+  const bool errors = warnings != nullptr && std::string_view(warnings) == "error";
+  std::string options = fmt::format("-cl-std=CL1.2{} -DVDVR_DIALECT_OPENCL", errors ? " -Werror" : "");
+  for (const auto& [key, value] : defines) options += fmt::format(" -D{}={}", key, value);
+  return options;
+}
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  const std::string options = build_options(defines);
+  const std::string cache_key = name + ' ' + options;
+  const std::lock_guard guard(state.programs_lock_);
+  if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
+    return found->second;
+
+  cl::Program built;
+  try {
+    built = cl::Program(state.context, resolve_source(name + ".cl"));
+    built.build({state.device}, options.c_str());
+  } catch (const cl::Error& e) {
+    // LLVM's own handler removes the files of a compilation that a signal interrupts, which then fails.
+    throw_if_stopped();
+    std::string log;
+    try {
+      log = built.getBuildInfo<CL_PROGRAM_BUILD_LOG>(state.device);
+    } catch (const cl::Error&) {
+      log = "(no log)";
+    }
+    throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
+                                 name, state.info.name, options, e.what(), code_name(e.err()), log));
+  }
+  if (state.on_program) state.on_program(name, defines);
+  return state.programs_.emplace(cache_key, std::move(built)).first->second;
+}
+
+std::string code_name(int code) {
+#define VDVR_CODE(name) \
+  case name:            \
+    return #name " (" + std::to_string(code) + ")"
+  switch (code) {
+    VDVR_CODE(CL_SUCCESS);
+    VDVR_CODE(CL_DEVICE_NOT_FOUND);
+    VDVR_CODE(CL_DEVICE_NOT_AVAILABLE);
+    VDVR_CODE(CL_COMPILER_NOT_AVAILABLE);
+    VDVR_CODE(CL_MEM_OBJECT_ALLOCATION_FAILURE);
+    VDVR_CODE(CL_OUT_OF_RESOURCES);
+    VDVR_CODE(CL_OUT_OF_HOST_MEMORY);
+    VDVR_CODE(CL_IMAGE_FORMAT_NOT_SUPPORTED);
+    VDVR_CODE(CL_BUILD_PROGRAM_FAILURE);
+    VDVR_CODE(CL_MAP_FAILURE);
+    VDVR_CODE(CL_INVALID_VALUE);
+    VDVR_CODE(CL_INVALID_DEVICE);
+    VDVR_CODE(CL_INVALID_CONTEXT);
+    VDVR_CODE(CL_INVALID_COMMAND_QUEUE);
+    VDVR_CODE(CL_INVALID_MEM_OBJECT);
+    VDVR_CODE(CL_INVALID_IMAGE_FORMAT_DESCRIPTOR);
+    VDVR_CODE(CL_INVALID_IMAGE_SIZE);
+    VDVR_CODE(CL_INVALID_SAMPLER);
+    VDVR_CODE(CL_INVALID_BINARY);
+    VDVR_CODE(CL_INVALID_BUILD_OPTIONS);
+    VDVR_CODE(CL_INVALID_PROGRAM);
+    VDVR_CODE(CL_INVALID_PROGRAM_EXECUTABLE);
+    VDVR_CODE(CL_INVALID_KERNEL_NAME);
+    VDVR_CODE(CL_INVALID_KERNEL);
+    VDVR_CODE(CL_INVALID_ARG_INDEX);
+    VDVR_CODE(CL_INVALID_ARG_VALUE);
+    VDVR_CODE(CL_INVALID_ARG_SIZE);
+    VDVR_CODE(CL_INVALID_KERNEL_ARGS);
+    VDVR_CODE(CL_INVALID_WORK_DIMENSION);
+    VDVR_CODE(CL_INVALID_WORK_GROUP_SIZE);
+    VDVR_CODE(CL_INVALID_WORK_ITEM_SIZE);
+    VDVR_CODE(CL_INVALID_GLOBAL_OFFSET);
+    VDVR_CODE(CL_INVALID_EVENT);
+    VDVR_CODE(CL_INVALID_OPERATION);
+    VDVR_CODE(CL_INVALID_BUFFER_SIZE);
+    VDVR_CODE(CL_INVALID_GLOBAL_WORK_SIZE);
+    case -1001:
+      return "CL_PLATFORM_NOT_FOUND_KHR (-1001)";
+    default:
+      return "OpenCL code " + std::to_string(code);
+  }
+#undef VDVR_CODE
+}
+
+}  // namespace vdvr::opencl

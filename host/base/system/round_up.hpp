@@ -1,0 +1,18 @@
+// Bounds that pass from double precision to fp32.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+namespace vdvr {
+
+/// A normal fp32 number that is not below x >= 0: no bound becomes 0 or is lost. What fp32 cannot hold
+/// becomes infinite, NaN too.
+inline float round_up(double x) {
+  using limits = std::numeric_limits<float>;
+  if (!(x <= static_cast<double>(limits::max()))) return limits::infinity();
+  const auto nearest = static_cast<float>(std::max(x, static_cast<double>(limits::min())));
+  return static_cast<double>(nearest) < x ? nearest * (1 + 0x1p-23f) : nearest;
+}
+
+}  // namespace vdvr

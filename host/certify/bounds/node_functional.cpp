@@ -1,0 +1,172 @@
+#include "host/certify/bounds/node_functional.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+#include "host/base/opencl/host_fft.hpp"
+
+namespace vdvr {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr std::size_t smoothness = 6;   // derivatives of e that the Fourier series' tail asks for
+constexpr std::size_t highest = 12;     // derivatives of e that are looked at between frequencies
+constexpr std::int64_t samples = 1024;  // of a period of the Fourier series
+using Derivatives = std::array<double, highest + 1>;
+
+double factorial_ratio(int n, int m) {  // n! / (n - m)!, 0 for m > n
+  double product = 1;
+  for (int i = 0; i < m; ++i) product *= n - i;
+  return product;
+}
+
+// sum |taps| |place|^m + |(kappa^order)^(m)|: at least the m-th derivative of e at |kappa| and below.
+double magnitude(const NodeFunctional& f, std::size_t m, double kappa) {
+  double sum = 0;
+  for (std::size_t i = 0; i < f.taps.size(); ++i)
+    sum += std::abs(f.taps[i]) * std::pow(std::abs(f.first + static_cast<double>(i)), static_cast<double>(m));
+  const int order = f.order, left = order - static_cast<int>(m);
+  return sum + (left < 0 ? 0 : factorial_ratio(order, static_cast<int>(m)) * std::pow(std::abs(kappa), left));
+}
+
+// Of a sum of `f`'s terms in double precision: powers of exp(i kappa) by products, places by powers, the sum.
+double rounding(const NodeFunctional& f, double magnitude) {
+  return 8 * static_cast<double>(f.taps.size() + highest + 4) * 0x1p-53 * magnitude;
+}
+
+// e and its derivatives up to the `count`-th, exclusive.
+void symbol(const NodeFunctional& f, double kappa, std::size_t count, Complex* derivative) {
+  std::fill(derivative, derivative + count, Complex{});
+  const Complex turn = std::polar(1.0, kappa);
+  Complex wave = std::polar(1.0, kappa * f.first);
+  for (std::size_t i = 0; i < f.taps.size(); ++i) {
+    double term = f.taps[i];
+    const double place = f.first + static_cast<double>(i);
+    for (std::size_t m = 0; m < count; ++m, term *= place) derivative[m] += term * wave;
+    wave = {wave.real() * turn.real() - wave.imag() * turn.imag(),
+            wave.real() * turn.imag() + wave.imag() * turn.real()};
+  }
+  // i^m of the derivatives does not matter for magnitudes, but for what is taken off: i^order kappa^order.
+  for (std::size_t m = 0; m < count && static_cast<int>(m) <= f.order; ++m) {
+    const int left = f.order - static_cast<int>(m);
+    double power = factorial_ratio(f.order, static_cast<int>(m));
+    for (int i = 0; i < left; ++i) power *= kappa;
+    constexpr std::array<Complex, 4> powers_of_i{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
+    derivative[m] -= power * powers_of_i[static_cast<std::size_t>(left % 4)];
+  }
+}
+
+// At least |e^(m)| on [from, to], m <= highest: a function lies at most step^2 / 8 times its second
+// derivative above the largest of its values `step` apart. The highest two are bounded by `magnitude`.
+Derivatives largest_derivatives(const NodeFunctional& f, double from, double to, int steps) {
+  Derivatives largest{};
+  std::array<Complex, highest - 1> at{};
+  for (int s = 0; s <= steps; ++s) {
+    symbol(f, from + (to - from) * s / steps, at.size(), at.data());
+    for (std::size_t m = 0; m < at.size(); ++m) largest[m] = std::max(largest[m], std::abs(at[m]));
+  }
+  const double step = (to - from) / steps;
+  for (std::size_t m = highest + 1; m-- > 0;) {
+    const double all = magnitude(f, m, to);
+    largest[m] = m > highest - 2 ? all : largest[m] + rounding(f, all) + step * step / 8 * largest[m + 2];
+  }
+  return largest;
+}
+
+// The cut falls from 1 to 0 as 1 - t^6 (1 + 6 (1 - t) + .. + 252 (1 - t)^5), whose derivative is -2772 (t (1
+// - t))^5: five derivatives are continuous.
+double cut(double t) {
+  constexpr std::array binomial{252.0, 126.0, 56.0, 21.0, 6.0, 1.0};
+  double sum = 0;
+  for (const double b : binomial) sum = sum * (1 - t) + b;
+  return t <= 0 ? 1 : t >= 1 ? 0 : 1 - std::pow(t, 6) * sum;
+}
+
+// At least its m-th derivatives, m <= 6: with x = 2 t - 1, 2772 / 1024 (1 - x^2)^5 differentiated m - 1
+// times. The fifth derivative of that is 3840 times Legendre's polynomial: at most 3840. The others vanish at
+// both ends, and on a grid of x as above.
+std::array<double, smoothness + 1> cut_derivatives() {
+  std::array<double, 13> p{1, 0, -5, 0, 10, 0, -10, 0, 5, 0, -1};  // of (1 - x^2)^5, then of its derivatives
+  constexpr int steps = 512;
+  std::array<double, smoothness + 1> largest{1};
+  double scale = 2772.0 / 1024;
+  for (std::size_t m = 1; m < smoothness; ++m, scale *= 2) {
+    double second = 0;  // of the polynomial's second derivative, |x| <= 1
+    for (std::size_t i = 2; i < p.size(); ++i) second += std::abs(p[i]) * static_cast<double>(i * (i - 1));
+    for (int s = 0; s <= steps; ++s) {
+      const double x = 2.0 * s / steps - 1;
+      double value = 0;
+      for (std::size_t i = p.size(); i-- > 0;) value = value * x + p[i];
+      largest[m] = std::max(largest[m], std::abs(value));
+    }
+    largest[m] = scale * (largest[m] + second * 4.0 / steps / steps / 8);
+    for (std::size_t i = 0; i + 1 < p.size(); ++i) p[i] = static_cast<double>(i + 1) * p[i + 1];
+  }
+  largest[smoothness] = scale * 3840;
+  return largest;
+}
+
+// A bound of sum over |j| >= samples / 2 of |a_j|, a_j the Fourier coefficients of e cut(kappa) of period 2
+// `end`: |a_j| <= (end / (pi |j|))^6 mean |(e cut)^(6)|.
+double tail(const Derivatives& inside, const Derivatives& falling, double band, double end) {
+  static const auto of_cut = cut_derivatives();
+  constexpr std::array binomial{1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0};
+  double sixth = 0;
+  for (std::size_t m = 0; m <= smoothness; ++m)
+    sixth += binomial[m] * falling[m] * of_cut[smoothness - m] /
+             std::pow(end - band, static_cast<double>(smoothness - m));
+  const double mean = (band * inside[smoothness] + (end - band) * sixth) / end;
+  return 2 * std::pow(end / std::numbers::pi, 6) * mean / (5 * std::pow(samples / 2.0 - 1, 5));
+}
+
+// sum |a_j|: of the coefficients by FFT, what is beyond them, and what is beyond them folded onto them.
+double coefficient_sum(const NodeFunctional& f, const Derivatives& inside, double band, double end) {
+  static const fft::HostFft transform(samples);
+  constexpr std::size_t half = samples / 2;
+  std::vector<Complex> g(samples);
+  for (std::size_t s = 0; s <= half; ++s) {
+    const double kappa = end * static_cast<double>(s) / static_cast<double>(half);
+    const double factor = cut((kappa - band) / (end - band));
+    if (!(factor > 0)) continue;  // the last is half: it is 0
+    symbol(f, kappa, 1, &g[s]);
+    g[s] *= factor;
+    if (s > 0) g[samples - s] = std::conj(g[s]);
+  }
+  transform.forward(g);
+  double sum = 0;
+  for (const Complex& a : g) sum += std::abs(a) / samples;
+  const Derivatives falling = largest_derivatives(f, band, end, 64);
+  // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
+  // a_j.
+  const double noise = std::sqrt(double{samples}) * 8 * rounding(f, magnitude(f, 0, end));
+  return sum + 2 * tail(inside, falling, band, end) + noise;
+}
+
+}  // namespace
+
+double symbol_error(const NodeFunctional& functional, double kappa) {
+  Complex e;
+  symbol(functional, kappa, 1, &e);
+  return std::abs(e) + rounding(functional, magnitude(functional, 0, kappa));
+}
+
+double largest_symbol_error(const NodeFunctional& functional, double band) {
+  return largest_derivatives(functional, 0, band, 512)[0];
+}
+
+// A narrow fall is the better where e grows beyond the band, a wide one where it does not.
+double sup_constant(const NodeFunctional& functional, double band) {
+  const Derivatives inside = largest_derivatives(functional, 0, band, 128);
+  double least = HUGE_VAL;
+  for (const double ratio : {1.015, 1.2})
+    least = std::min(least, coefficient_sum(functional, inside, band, band * ratio));
+  return least;
+}
+
+}  // namespace vdvr

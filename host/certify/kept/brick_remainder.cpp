@@ -1,0 +1,343 @@
+// Launcher of kernels/certify/kept/fourth_differences.cl.
+#include "host/certify/kept/brick_remainder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <numbers>
+#include <stdexcept>
+
+#include "host/field/fbp/back_project.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/opencl/write_later.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "host/base/system/round_up.hpp"
+#include "host/volume/bricks.hpp"
+#include "shared/fourth_differences.h"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrFourthDifferences) == 44);
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Bricks of a block's side.
+constexpr std::int64_t block_bricks = 8;
+// Nodes that a fourth difference reads on either side.
+constexpr std::int64_t reach = 2;
+// fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
+constexpr double difference_rounding = 64;
+
+}  // namespace
+
+BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
+                               const FieldSups& sups, const Grid& grid, int granularity)
+    : state_(state),
+      kept_(kept),
+      scan_(scan),
+      sups_(sups),
+      coverage_(scan.geometry, scan.views),
+      grid_(grid),
+      granularity_(granularity) {
+  // A quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times as large. But
+  // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
+  if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};
+  if (!scan.views.empty())  // fewer where nodes are denser than half a pixel already
+    for (std::size_t a = 0; a < 3; ++a) nodes_.phases[a] = kept.rates()[a] > 2 ? 2 : 4;
+  for (std::size_t a = 0; a < 3; ++a) rates_[a] = kept.rates()[a] * nodes_.phases[a];
+  bricks_ = Bricks(grid, granularity).along();
+  slack_ = kept.fourth_errors(nodes_);
+  for (double& slack : slack_) slack += difference_rounding * unit_roundoff * kept.sup();
+  if (scan.views.empty()) set_parallel(scan, sups);
+  else set_cone();
+  Vec3 spacing{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    spacing[a] = grid.spacing[a] / static_cast<double>(rates_[a]);
+    const std::int64_t side = granularity * rates_[a];
+    rings_[a] = (stencil_[a] + side - 1) / side;
+  }
+  const Index3 all{bricks_[0] + 2 * rings_[0], bricks_[1] + 2 * rings_[1], bricks_[2] + 2 * rings_[2]};
+  maxima_.resize(at(all[0] * all[1] * all[2]));
+  looked_at_.resize(maxima_.size());
+  // Columns that a stencil of a tested cell reads: the cell meets the covered region.
+  constexpr double cell = 0.5;  // of gold at 2x
+  lowest_ = -(cell * std::hypot(grid.spacing[0], grid.spacing[1]) +
+              static_cast<double>(stencil_[0]) * std::hypot(spacing[0], spacing[1])) *
+            (1 + 1e-6);
+  lowest_z_ = -(cell * grid.spacing[2] + static_cast<double>(stencil_[2]) * spacing[2]) * (1 + 1e-6);
+  if (scan.views.empty()) return;
+  sixth_.resize(at(bricks_[0] * bricks_[1] * bricks_[2]));
+  has_sixth_.resize(sixth_.size());
+  const double read = static_cast<double>(reach) * std::hypot(spacing[0], spacing[1]) - lowest_,
+               read_z = static_cast<double>(reach) * spacing[2] - lowest_z_;
+  if (read > kept.claimed()[0] || read_z > kept.claimed()[2])
+    throw std::logic_error("BrickRemainder: reads gold beyond its bounds");
+  read_.emplace(coverage_, read);
+  read_z_ = {coverage_.heights().first - read_z, coverage_.heights().second + read_z};
+}
+
+void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sups) {
+  const ParallelGeometry& g = scan.geometry;
+  std::array<RemainderNorms, 3> norms;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double spacing = grid_.spacing[a] / static_cast<double>(rates_[a]),
+                 pitch = a == 2 ? g.pitch_v : g.pitch_u;
+    norms[a] = a == 1 && grid_.spacing[1] == grid_.spacing[0] && rates_[1] == rates_[0]
+                   ? norms[0]
+                   : remainder_norms(std::min(pi / 2, pi * spacing / pitch));
+    // The stencil of a point one step of gold outside the brick.
+    stencil_[a] = norms[a].taps / 2 + step_of_gold(a);
+  }
+  const std::array<std::array<std::size_t, 3>, 6> axes{
+      {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}}};
+  for (std::size_t d = 0; d < 6; ++d) {
+    const auto& [i, j, k] = axes[d];
+    const double factor = d < 3 ? pure_factor(norms[i], norms[j], norms[k])
+                                : mixed_factor(norms[i], norms[j], norms[k]),
+                 tail = d < 3 ? pure_tail(norms[i], norms[j], norms[k])
+                              : mixed_tail(norms[i], norms[j], norms[k]);
+    factor_[d] = round_up(factor);
+    addend_[d] = round_up(factor * slack_[d] + tail * sups.value);
+  }
+}
+
+// F has no band limit, but bounds of its sixth derivatives: a fourth derivative anywhere in a cell of nodes
+// is at most the largest at the cell's corners and what second derivatives of it allow between them; at a
+// corner a fourth difference errs by a sixth derivative (docs/error-bounds.md, section 16).
+void BrickRemainder::set_cone() {
+  for (std::size_t a = 0; a < 3; ++a) stencil_[a] = 1 + step_of_gold(a);
+  factor_.fill(1);
+  std::transform(slack_.begin(), slack_.end(), addend_.begin(), [](double slack) { return round_up(slack); });
+}
+
+// What sixth derivatives add to X on some bricks and a stencil around them; those of the differences' own
+// stencils count.
+BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Index3& bricks) const {
+  Vec3 low{}, high{}, square{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double node = grid_.spacing[a] / static_cast<double>(rates_[a]),
+                 around = static_cast<double>(stencil_[a] + reach) * node,
+                 side = static_cast<double>(granularity_) * grid_.spacing[a];
+    low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side - around;
+    high[a] = grid_.origin[a] + static_cast<double>(first[a] + bricks[a]) * side + around;
+    square[a] = node * node;
+  }
+  low[2] = std::max(low[2], read_z_.first);
+  high[2] = std::min(high[2], read_z_.second);
+  const Corners part = read_->part(low, high);
+  if (part.empty()) return {};
+  const SixthSups sixth = sixth_sups(scan_.views, sups_.by_view, part);
+  // h_i^2 h_j^2 h_k^2 |F_iijjkk|, at least.
+  const auto sup = [&](std::size_t i, std::size_t j, std::size_t k) {
+    return square[i] * square[j] * square[k] *
+           sixth.along(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
+  };
+  constexpr std::array<std::array<std::size_t, 2>, 6> axes{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  Maxima out{};
+  for (std::size_t d = 0; d < 6; ++d) {
+    const auto& [i, j] = axes[d];
+    const double at_corner = i == j ? sup(i, i, i) / 6 : (sup(i, i, j) + sup(i, j, j)) / 12,
+                 between = (sup(i, j, 0) + sup(i, j, 1) + sup(i, j, 2)) / 8;
+    out[d] = round_up(at_corner + between);
+  }
+  return out;
+}
+
+// Neighbours share theirs, since a sum over all views takes up to milliseconds: but no more of them than a
+// twenty-fourth of the region, where lambda differs by little.
+void BrickRemainder::add_sixth(const std::vector<std::uint8_t>& selected) {
+  const std::int64_t group =
+      std::clamp<std::int64_t>(*std::max_element(bricks_.begin(), bricks_.end()) / 24, 1, 4);
+  const Bricks bricks(grid_, granularity_);
+  std::set<Index3> firsts;
+  for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
+    if (!selected[at(brick)] || has_sixth_[at(brick)]) continue;
+    const Index3 p = bricks.position(brick);
+    firsts.insert({p[0] / group * group, p[1] / group * group, p[2] / group * group});
+  }
+  const std::vector<Index3> groups(firsts.begin(), firsts.end());
+  parallel_for(static_cast<std::int64_t>(groups.size()), {}, "", [&](std::int64_t n) {
+    const Index3& first = groups[at(n)];
+    Index3 size{};
+    for (std::size_t a = 0; a < 3; ++a) size[a] = std::min(group, bricks_[a] - first[a]);
+    const Maxima of_group = addends_of(first, size);
+    for (std::int64_t z = first[2]; z < first[2] + size[2]; ++z)
+      for (std::int64_t y = first[1]; y < first[1] + size[1]; ++y)
+        for (std::int64_t x = first[0]; x < first[0] + size[0]; ++x) {
+          const std::size_t i = at((z * bricks_[1] + y) * bricks_[0] + x);
+          sixth_[i] = of_group;
+          has_sixth_[i] = 1;
+        }
+  });
+}
+
+std::size_t BrickRemainder::slot(const Index3& p) const {
+  return at(((p[2] + rings_[2]) * (bricks_[1] + 2 * rings_[1]) + p[1] + rings_[1]) *
+                (bricks_[0] + 2 * rings_[0]) +
+            p[0] + rings_[0]);
+}
+
+void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Progress& progress) {
+  if (!scan_.views.empty()) add_sixth(selected);
+  look_at(open(selected), progress);
+}
+
+void BrickRemainder::look_at(std::span<const Block> blocks, const Progress& progress) {
+  std::vector<GoldBox> boxes;
+  for (const Block& block : blocks) boxes.push_back(box_of(block.first, block.bricks));
+  kept_.prepare(nodes_, boxes, progress);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    look_at(blocks[i].first, blocks[i].bricks);
+    report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
+  }
+}
+
+template <class Visit>
+void BrickRemainder::for_each_block(Visit&& visit) const {
+  Block block;
+  Index3& first = block.first;
+  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += block_bricks)
+    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
+      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
+        for (std::size_t a = 0; a < 3; ++a)
+          block.bricks[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
+        visit(block);
+      }
+}
+
+template <class Visit>
+void BrickRemainder::for_each_slot(const Block& block, Visit&& visit) const {
+  const Index3 &f = block.first, &n = block.bricks;
+  for (std::int64_t z = 0; z < n[2]; ++z)
+    for (std::int64_t y = 0; y < n[1]; ++y)
+      for (std::int64_t x = 0; x < n[0]; ++x) visit(slot({f[0] + x, f[1] + y, f[2] + z}));
+}
+
+// Blocks that hold a brick nobody has looked at, whole.
+std::vector<BrickRemainder::Block> BrickRemainder::open(const std::vector<std::uint8_t>& selected) const {
+  const Bricks bricks(grid_, granularity_);
+  std::vector<std::uint8_t> wanted(maxima_.size(), 0);
+  for (std::int64_t brick = 0; brick < bricks.size(); ++brick) {
+    if (!selected[at(brick)]) continue;
+    const Index3 p = bricks.position(brick);
+    for (std::int64_t z = p[2] - rings_[2]; z <= p[2] + rings_[2]; ++z)
+      for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
+        for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x) wanted[slot({x, y, z})] = 1;
+  }
+  std::vector<Block> out;
+  for_each_block([&](const Block& block) {
+    bool open = false;
+    for_each_slot(block, [&](std::size_t i) { open = open || (wanted[i] && !looked_at_[i]); });
+    if (open) out.push_back(block);
+  });
+  return out;
+}
+
+std::vector<BrickRemainder::Block> BrickRemainder::known() const {
+  std::vector<Block> out;
+  for_each_block([&](const Block& block) {
+    if (looked_at_[slot(block.first)]) out.push_back(block);
+  });
+  return out;
+}
+
+std::vector<float> BrickRemainder::found(const Block& block) const {
+  std::vector<float> out;
+  for_each_slot(block, [&](std::size_t i) { out.insert(out.end(), maxima_[i].begin(), maxima_[i].end()); });
+  return out;
+}
+
+void BrickRemainder::take(const Block& block, std::span<const float> found) {
+  const auto bricks = at(block.bricks[0] * block.bricks[1] * block.bricks[2]);
+  if (found.size() != 6 * bricks) throw std::logic_error("BrickRemainder: not six numbers a brick");
+  for_each_slot(block, [&](std::size_t i) {
+    std::copy_n(found.begin(), 6, maxima_[i].begin());
+    found = found.subspan(6);
+    looked_at_[i] = 1;
+  });
+}
+
+GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const {
+  GoldBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t side = granularity_ * rates_[a];
+    box.first[a] = first[a] * side - reach;
+    box.nodes[a] = bricks[a] * side + 1 + 2 * reach;
+  }
+  return box;
+}
+
+// Of the box' heights, two before the bricks not counted, the first and last that a tested cell's stencil
+// reads: of cone beam others are not kept.
+std::pair<int, int> BrickRemainder::heights_read(const GoldBox& box) const {
+  const std::int64_t last = box.nodes[2] - 1 - 2 * reach;
+  if (scan_.views.empty()) return {0, to_int(last)};
+  std::pair<int, int> read{to_int(last + 1), -1};
+  for (std::int64_t k = 0; k <= last; ++k) {
+    const double z = grid_.origin[2] + static_cast<double>(box.first[2] + reach + k) * grid_.spacing[2] /
+                                           static_cast<double>(rates_[2]);
+    if (coverage_.margin_z(z) < lowest_z_) continue;
+    read.first = std::min(read.first, to_int(k));
+    read.second = to_int(k);
+  }
+  return read;
+}
+
+void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
+  const GoldBox box = box_of(first, bricks);
+  // Room for eight lanes that begin at the last node of the last brick.
+  const std::int64_t stride = column_stride(box.nodes[2] + 8);
+  opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "gold of bricks");
+  gold.fill(0.0f);
+  kept_.fill(nodes_, box, gold, 0, stride);
+  std::vector<float> margins;
+  for (std::int64_t y = 0; y < box.nodes[1]; ++y)
+    for (std::int64_t x = 0; x < box.nodes[0]; ++x)
+      margins.push_back(static_cast<float>(
+          coverage_.margin_above(grid_.origin[0] + static_cast<double>(box.first[0] + x) * grid_.spacing[0] /
+                                                       static_cast<double>(rates_[0]),
+                                 grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
+                                                       static_cast<double>(rates_[1]),
+                                 2 * lowest_)));
+  const auto margin = opencl::copied<float>(state_, margins, "coverage margins");
+  const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
+                                       "fourth differences");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences, cl::LocalSpaceArg> kernel(
+      state_, "certify/kept/fourth_differences", "fourth_differences",
+      opencl::height_defines(state_.info, 8));
+  const auto side = [&](std::size_t a) { return to_int(granularity_ * rates_[a]); };
+  const auto [first_z, last_z] = heights_read(box);
+  kernel(opencl::shared_groups(state_.info, {count(bricks[0]), count(bricks[1]), count(bricks[2])}),
+         out.buffer(), gold.buffer(), margin.buffer(),
+         VdvrFourthDifferences{to_int(bricks[0]), to_int(bricks[1]), to_int(bricks[2]), side(0), side(1),
+                               side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
+                               static_cast<float>(lowest_)},
+         opencl::shared_room(state_.info));
+  take({first, bricks}, out.to_host());
+}
+
+float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
+  const Index3 p = Bricks(grid_, granularity_).position(brick);
+  Maxima largest{};
+  for (std::int64_t z = p[2] - rings_[2]; z <= p[2] + rings_[2]; ++z)
+    for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
+      for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x)
+        for (std::size_t d = 0; d < 6; ++d) largest[d] = std::max(largest[d], maxima_[slot({x, y, z})][d]);
+  std::array<double, 3> square{};  // of gold's spacing over that of the nodes
+  for (std::size_t a = 0; a < 3; ++a)
+    square[a] = std::pow(static_cast<double>(lattice.step[a]) * nodes_.phases[a] / lattice.phases[a], 2);
+  const auto sup = [&](std::size_t d) {
+    return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) +
+           static_cast<double>(addend_[d]) +
+           (sixth_.empty() ? 0.0 : static_cast<double>(sixth_[at(brick)][d]));
+  };
+  const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) +
+                      square[2] * square[2] * sup(2),
+               mixed = square[0] * square[1] * sup(3) + square[0] * square[2] * sup(4) +
+                       square[1] * square[2] * sup(5);
+  return round_up(0.125 * (5.0 / 24 * pure + 2.0 / 8 * mixed));
+}
+
+}  // namespace vdvr

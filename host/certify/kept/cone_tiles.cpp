@@ -1,0 +1,342 @@
+#include "host/certify/kept/cone_tiles.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/back_project.hpp"
+#include "host/field/fdk/region_parts.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrConeNodes) == 64);
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Values of a table to a pixel, both ways: what six taps are made for.
+constexpr int density = 8;
+// Rows from which on tables are made by transforms along v.
+constexpr std::int64_t fewest_rows = 16;
+constexpr std::uint64_t most_table_bytes = std::uint64_t{256} << 20,
+                        most_view_bytes = std::uint64_t{16} << 20;
+constexpr std::int64_t side = VDVR_CONE_TILE, heights = VDVR_CONE_HEIGHTS;
+
+// What a view is about the middle of a block of nodes, as kernels/certify/kept/cone_nodes.cl reads it: places
+// in the table, steps by node.
+template <class Real>
+struct ViewNumbers {
+  Real step_u[3], part_u, step_v[3], part_v, step_lambda[3], lambda, whole_u, whole_v, unused[2];
+};
+
+template <class Real>
+ViewNumbers<Real> numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& spacing,
+                                const UpsampledColumns& columns, const UpsampledColumns& rows) {
+  const Vec3 seen = projected(m, middle);
+  const double u = columns.column_of(seen[0]), v = rows.column_of(seen[1]);
+  ViewNumbers<Real> out{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.step_u[a] = static_cast<Real>((m[0][a] - seen[0] * m[2][a]) * spacing[a] * density);
+    out.step_v[a] = static_cast<Real>((m[1][a] - seen[1] * m[2][a]) * spacing[a] * density);
+    out.step_lambda[a] = static_cast<Real>(m[2][a] * spacing[a]);
+  }
+  out.lambda = static_cast<Real>(seen[2]);
+  out.whole_u = static_cast<Real>(std::round(u));
+  out.whole_v = static_cast<Real>(std::round(v));
+  out.part_u = static_cast<Real>(u - std::round(u));
+  out.part_v = static_cast<Real>(v - std::round(v));
+  return out;
+}
+
+// Nodes that share a view's numbers: in double precision a whole tile's, else few enough for fp32 places.
+struct Blocks {
+  Blocks(bool in_double, std::int64_t all_groups)
+      : across(in_double ? side : 8), groups(in_double ? std::max<std::int64_t>(1, all_groups) : 2) {
+    per_side = side / across;
+    layers = (all_groups + groups - 1) / groups;
+  }
+  [[nodiscard]] std::int64_t count() const { return per_side * per_side * layers; }
+  std::int64_t across, groups, per_side = 1, layers = 1;
+};
+
+// Columns and rows of the table that a node's place may lie from that of its block's middle, half a block
+// away by axis, sums of magnitudes: with d_e the way there, u - u_middle = sum of X_e d_e / lambda_middle,
+// and the kernel's products are X_e at the middle, X_e - (u - u_middle) lambda_e, times d_e, over lambda at
+// the node.
+std::array<double, 2> places_from_middle(const ViewBox& seen, const Vec3& half) {
+  double u = 0, v = 0, growth = 0;
+  for (std::size_t e = 0; e < 3; ++e) {
+    u += seen.along_u[e] * half[e];
+    v += seen.along_v[e] * half[e];
+    growth += seen.growth[e] * half[e];
+  }
+  // Tiles reach no nearer to a source (KeptGold::room_to_sources).
+  const double middle = std::max(seen.lambda_min - growth, 0.25 * seen.lambda_min);
+  const double more = density * (1 + growth / middle) / seen.lambda_min;
+  return {u * more, v * more};
+}
+
+// A position is about x, y and z of the middle; nothing that would vary along z is left of u and lambda.
+bool is_upright(const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; }
+
+}  // namespace
+
+InputError source_too_close(std::size_t view) {
+  return InputError(
+      fmt::format("cone beam: nodes around the covered region reach the plane of the source of view {}; the "
+                  "source stands "
+                  "too close to what all views see: no certificate can be made",
+                  view));
+}
+
+ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler,
+                     const FieldSups& sups, const Coverage& coverage, const ConeLattice& lattice)
+    : state_(state), scan_(scan), upsampler_(upsampler), sups_(sups), lattice_(lattice) {
+  in_double_ = ColumnUpsampling::is_possible(state);
+  upright_ = std::all_of(scan.views.begin(), scan.views.end(), is_upright);
+  look_at_views(coverage);
+  if (DenseValues::suit(state, scan.geometry, fewest_rows))
+    dense_.emplace(state, upsampler, scan, columns_, rows_);
+  column_stride_ = column_stride(rows_.count + heights);
+  views_together_ = views_together();
+}
+
+// Places, frequencies and weights of all views, part by part of the region.
+void ConeTiles::look_at_views(const Coverage& coverage) {
+  const ParallelGeometry& g = scan_.geometry;
+  const Blocks blocks(in_double_, lattice_.groups);
+  const Vec3 half{0.5 * static_cast<double>(blocks.across) * lattice_.spacing[0],
+                  0.5 * static_cast<double>(blocks.across) * lattice_.spacing[1],
+                  0.5 * static_cast<double>(blocks.groups * heights) * lattice_.spacing[2]};
+  double beyond_u = 0, beyond_v = 0;
+  for (const Corners& part : RegionOutline(coverage, lattice_.claimed).parts(lattice_.claimed_z)) {
+    std::vector<ViewAtPart> at_part;
+    double sum = 0;
+    for (std::size_t k = 0; k < scan_.views.size(); ++k) {
+      const ViewBox seen = view_box(scan_.views[k], part);
+      if (!(seen.lambda_min > 0)) throw source_too_close(k);
+      for (const Vec3& corner : part) {
+        const Vec3 place = projected(scan_.views[k], corner);
+        beyond_u = std::max({beyond_u, -0.5 - place[0], place[0] - static_cast<double>(g.columns) + 0.5});
+        beyond_v = std::max({beyond_v, -0.5 - place[1], place[1] - static_cast<double>(g.rows) + 0.5});
+      }
+      const double weight = 1 / (seen.lambda_min * seen.lambda_min);
+      ViewAtPart view{weight * sups_.by_view[k].value, {}, {}};
+      const auto [places_u, places_v] = places_from_middle(seen, half);
+      for (std::size_t e = 0; e < 3; ++e) {
+        const double of_v = g.rows > 1 ? seen.along_v[e] : 0.0;
+        view.band[e] = pi * lattice_.spacing[e] * (seen.along_u[e] + of_v) / seen.lambda_min;
+        view.rho[e] = lattice_.spacing[e] * seen.growth[e] / seen.lambda_min;
+        band_[e] = std::max(band_[e], view.band[e]);
+      }
+      block_reach_ = std::max({block_reach_, places_u, places_v});
+      largest_weight_ = std::max(largest_weight_, weight);
+      sum += view.weight;
+      at_part.push_back(view);
+    }
+    sup_ = std::max(sup_, sum * (1 + 1e-12));
+    at_parts_.push_back(std::move(at_part));
+  }
+  columns_ = upsampled_columns(g.columns, density, std::ceil(beyond_u) + 1);
+  rows_ = upsampled_columns(g.rows, density, std::ceil(beyond_v) + 1);
+}
+
+// --- tables ---
+
+// Decided once: what sums err depends on it.
+std::int64_t ConeTiles::views_together() const {
+  const std::uint64_t table = sizeof(float) * count(columns_.count * column_stride_),
+                      each = table + (dense_ ? dense_->bytes(1) : table),
+                      share =
+                          std::min({state_.memory.left() / 3, most_table_bytes, state_.info.max_allocation});
+  if (state_.memory.left() / 2 < each)
+    throw ResourceError(
+        fmt::format("a view of {} x {} pixels, eight times finer both ways, needs {:.1f} MiB; "
+                    "raise `max_memory`",
+                    scan_.geometry.columns, scan_.geometry.rows, static_cast<double>(each) / 0x1p20));
+  return std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1,
+                                  std::min(most_views, scan_.geometry.views()));
+}
+
+ConeTiles::Table ConeTiles::table(std::int64_t first, std::int64_t views) {
+  Table out{opencl::DeviceArray<float>(state_, count(views * columns_.count * column_stride_), "dense views"),
+            first, views};
+  if (dense_) {
+    const opencl::DeviceArray<float>& values = (*dense_)(first, views);
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> join(
+        state_, "certify/kept/join_columns", "join_columns");
+    join({{count(column_stride_), count(columns_.count), count(views)}, {16, 1, 1}}, out.values.buffer(),
+         values.buffer(), to_int(views), to_int(columns_.count), to_int(rows_.count), to_int(column_stride_));
+    return out;
+  }
+  std::vector<double> rows;
+  for (std::int64_t r = 0; r < rows_.count; ++r) rows.push_back(rows_.position(r));
+  const UpsampledSlab slab = upsampler_(columns_, rows, 0, 0, density, first, views);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> join(state_, "certify/kept/join_rows",
+                                                                      "join_kept_rows");
+  const std::int64_t lines = views * columns_.count;
+  join({{count(column_stride_), count(lines), 1}, {16, 1, 1}}, out.values.buffer(), slab.values.buffer(),
+       to_int(lines), to_int(rows_.count), to_int(column_stride_));
+  opencl::finish(state_, "dense views");  // before the slab goes
+  return out;
+}
+
+// --- nodes ---
+
+template <class Real>
+void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes shape) {
+  const Blocks blocks(in_double_, lattice_.groups);
+  const std::int64_t of_tile = blocks.count() * table.views;
+  const auto together = static_cast<std::size_t>(std::max<std::int64_t>(
+      1, static_cast<std::int64_t>(most_view_bytes / sizeof(ViewNumbers<Real>)) / of_tile));
+  const int lanes = opencl::lanes_of(state_.info, to_int(heights));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes> kernel(
+      state_, "certify/kept/cone_nodes", "cone_nodes",
+      {{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
+       {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
+       {"VDVR_LANES", std::to_string(lanes)}});
+  for (std::size_t first = 0; first < page.first.size(); first += together) {
+    const std::size_t n = std::min(together, page.first.size() - first);
+    std::vector<ViewNumbers<Real>> numbers(n * at(of_tile));
+    parallel_for(static_cast<std::int64_t>(n) * blocks.count(), {}, "", [&](std::int64_t i) {
+      const auto& [x0, y0] = page.first[first + at(i / blocks.count())];
+      const std::int64_t b = i % blocks.count(), x = b % blocks.per_side,
+                         y = b / blocks.per_side % blocks.per_side,
+                         z = b / (blocks.per_side * blocks.per_side);
+      const auto middle = [&](std::int64_t block, std::int64_t nodes) {
+        return static_cast<double>(block * nodes) + 0.5 * static_cast<double>(nodes - 1);
+      };
+      const Vec3& h = lattice_.spacing;
+      const double height = static_cast<double>(lattice_.low) + middle(z, blocks.groups * heights);
+      const Vec3 place{x0 + middle(x, blocks.across) * h[0], y0 + middle(y, blocks.across) * h[1],
+                       lattice_.origin[2] + height * h[2]};
+      for (std::int64_t k = 0; k < table.views; ++k)
+        numbers[at(i * table.views + k)] =
+            numbers_about<Real>(scan_.views[at(table.first + k)], place, h, columns_, rows_);
+    });
+    std::vector<cl_int2> wanted;
+    for (std::size_t i = first * at(side); i < (first + n) * at(side); ++i)
+      wanted.push_back({{page.wanted[i][0], page.wanted[i][1]}});
+    const opencl::DeviceArray<ViewNumbers<Real>> views(state_, std::span<const ViewNumbers<Real>>(numbers),
+                                                       "views about blocks");
+    const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
+    shape.tiles = to_int(static_cast<std::int64_t>(n));
+    // On a CPU neighbours in y, which read the same columns and rows, follow one another.
+    kernel(opencl::in_groups(state_.info, {count(side), count(lattice_.groups * heights / lanes), n},
+                             {1, 1, 1}, 1),
+           page.out->buffer(), table.values.buffer(), views.buffer(), ranges.buffer(),
+           static_cast<cl_ulong>(first) * shape.tile, shape);
+    opencl::finish(state_, "kept nodes");  // before the views' numbers go
+  }
+}
+
+void ConeTiles::back_project(std::span<const ConePage> pages, const Progress& progress) {
+  const std::int64_t views = scan_.geometry.views(), chunk = views_together_;
+  const Blocks blocks(in_double_, lattice_.groups);
+  for (std::int64_t first = 0; first < views; first += chunk) {
+    const Table views_of_chunk = table(first, std::min(chunk, views - first));
+    VdvrConeNodes shape{};
+    shape.plane = count(columns_.count * column_stride_);
+    shape.tile = count(side * side * lattice_.stride);
+    shape.views = to_int(views_of_chunk.views);
+    shape.column_stride = to_int(column_stride_);
+    shape.last_column = to_int(columns_.count - 6);
+    shape.last_row = to_int(column_stride_ - heights);
+    shape.stride = to_int(lattice_.stride);
+    shape.groups = to_int(lattice_.groups);
+    shape.block_side = to_int(blocks.across);
+    shape.block_groups = to_int(blocks.groups);
+    shape.blocks_across = to_int(blocks.per_side);
+    shape.blocks = to_int(blocks.count());
+    for (std::size_t p = 0; p < pages.size(); ++p) {
+      if (in_double_) launch<double>(views_of_chunk, pages[p], shape);
+      else launch<float>(views_of_chunk, pages[p], shape);
+      const double share = static_cast<double>(p + 1) / static_cast<double>(pages.size());
+      report(progress, "gold",
+             (static_cast<double>(first) + share * static_cast<double>(views_of_chunk.views)) /
+                 static_cast<double>(views));
+    }
+  }
+}
+
+// --- bounds ---
+
+double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
+  return static_cast<double>(together + (views + together - 1) / together);
+}
+
+ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
+  const ParallelGeometry& g = scan_.geometry;
+  const SixTaps& six = six_tap_facts();
+  const double square = six.norm * six.norm, views = static_cast<double>(g.views());
+  Errors out;
+  // I_u I_v - 1 = (I_u - 1) + I_u (I_v - 1).
+  out.interpolation = six.sup * (1 + six.norm) * sup_;
+  const bool here = fp64 == Fp64::as_here, in_double = here ? in_double_ : fp64 == Fp64::present,
+             dense = here ? dense_.has_value() : in_double && g.rows >= fewest_rows;
+  double entries = 0;
+  if (dense) entries = dense_rounding(upsampler_, scan_, columns_, rows_, sup_, sup_, fp64);
+  else {
+    const double gain = upsampler_.gain_u(), largest = lebesgue_constant(g.rows) * sup_;
+    entries = unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * largest +
+              column_error(upsampler_, g.columns, columns_, largest, gain * largest, fp64);
+  }
+  // Places: numerator, lambda, quotient and sum; relative to what they move the values by, pi / 8 a column.
+  // Blocks are this device's: in double precision they do not matter, and those of single are smaller.
+  const double unit = in_double ? 0x1p-53 : unit_roundoff;
+  const double position = 2 * unit * (16 * block_reach_ + 4) * pi / density * sup_;
+  // Six products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
+  // lambda^-2, which a float place makes err more.
+  const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
+  out.rounding = square * entries + position + 2 * six.norm * six.rounding * sup_ +
+                 1.01 * unit_roundoff * roundings * square * sup_ +
+                 views * largest_weight_ * (2 * product_underflow(g, upsampler_.gain_u()) + 16 * 0x1p-126);
+  return out;
+}
+
+const ProjectiveError& ConeTiles::error_of(std::size_t axis, const GoldFilter& filter) {
+  const auto known = filters_.find(&filter);
+  return known != filters_.end()
+             ? known->second
+             : filters_.emplace(&filter, ProjectiveError(filter, highest(axis))).first->second;
+}
+
+// The largest sum over the views of what a filter errs along an axis.
+double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
+  double most = 0;
+  for (const auto& views : at_parts_) {
+    double sum = 0;
+    for (const ViewAtPart& view : views) sum += view.weight * error.at(view.band[axis], view.rho[axis]);
+    most = std::max(most, sum);
+  }
+  return most * (1 + 1e-12);
+}
+
+ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps) const {
+  BestFilter best{std::nullopt, HUGE_VAL};
+  if (highest(axis) > highest_gold_band) return best;
+  if (phases == 1) return {design_gold_filter(1, highest(axis), taps), 0};
+  for (const double share : {0.8, 0.85, 0.9, 0.95, 1.0}) {
+    GoldFilter filter = design_gold_filter(phases, share * highest(axis), taps);
+    const ProjectiveError error(filter, highest(axis));
+    const double errs = axis == 2 ? largest(2, error) : std::max(largest(0, error), largest(1, error));
+    if (best.filter && errs >= best.error) continue;
+    best = {std::move(filter), errs};
+  }
+  return best;
+}
+
+// I_x I_y I_z - 1 = (I_x - 1) + I_x (I_y - 1) + I_x I_y (I_z - 1).
+double ConeTiles::filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
+  return largest(0, error_of(0, x)) +
+         x.norm * (largest(1, error_of(1, y)) + y.norm * largest(2, error_of(2, z)));
+}
+
+}  // namespace vdvr

@@ -1,0 +1,122 @@
+// Kept nodes of cone beam: tiles of them back-projected from tables of the filtered views, and what they and
+// the filters between them err (docs/error-bounds.md, section 16). Launches
+// kernels/certify/kept/cone_nodes.cl.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "host/certify/bounds/dense_values.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
+#include "host/field/fbp/coverage.hpp"
+#include "host/certify/kept/gold_filters.hpp"
+#include "host/certify/kept/projective_error.hpp"
+#include "shared/cone_nodes.h"
+#include "vdvr/error.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
+
+namespace vdvr {
+
+/// Which nodes are kept: node (0, 0, 0) is the grid's first sample.
+struct ConeLattice {
+  Vec3 origin{}, spacing{};
+  double reach = 0;    ///< of nodes, across z, beyond the covered region
+  double claimed = 0;  ///< alike, at most `reach`: as far as bounds hold; beyond it nodes are finite
+  std::pair<double, double> claimed_z{};  ///< the heights between which they hold
+  std::int64_t low = 0, groups = 0;       ///< the lowest height, and how many groups of eight
+  std::int64_t stride = 0;                ///< floats from column to column of a tile, at least all heights
+};
+
+/// Tiles of 32 x 32 columns of nodes on the device, one after another: float [tile][y][x][stride].
+struct ConePage {
+  const opencl::DeviceArray<float>* out = nullptr;
+  std::vector<std::array<double, 2>> first;         ///< of each tile, where its first column stands
+  std::vector<std::array<std::int32_t, 2>> wanted;  ///< [tile][y]: first and last column
+};
+
+[[nodiscard]] InputError source_too_close(std::size_t view);
+
+class ConeTiles {
+ public:
+  /// Everything is referred to but the lattice. Throws InputError where nodes with bounds reach a source's
+  /// plane; others must not.
+  ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
+            const Coverage& coverage, const ConeLattice& lattice);
+
+  /// Adds F at the nodes to what the pages hold. Cost: 12 multiply-adds of eight lanes a view and node, and
+  /// tables of all views. Memory: tables of some views, at most a quarter of what is left.
+  void back_project(std::span<const ConePage> pages, const Progress& progress);
+
+  /// At least sum_k lambda^-2 sup |q_k| wherever bounds hold.
+  [[nodiscard]] double sup() const { return sup_; }
+  [[nodiscard]] double largest_weight() const { return largest_weight_; }  ///< at least lambda^-2, alike
+  /// At least the frequency of any view's part at such nodes, radians a node.
+  [[nodiscard]] double band(std::size_t axis) const { return band_[axis]; }
+  [[nodiscard]] const ConeLattice& lattice() const { return lattice_; }
+
+  /// What nodes err: by interpolation in the tables, and by fp32.
+  struct Errors {
+    double interpolation = 0, rounding = 0;
+  };
+  [[nodiscard]] Errors errors() { return errors(views_together_); }
+  /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device.
+  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here);
+  static constexpr std::int64_t most_views = 16;
+  /// Roundings of a sum over views, of which so many are added up before they are added to the others.
+  [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);
+  /// Of an axis, x and y alike: designed for the band with which it errs least, most views being below the
+  /// highest. Where a band exceeds what filters are designed for, none; `error` is infinite.
+  struct BestFilter {
+    std::optional<GoldFilter> filter;
+    double error = 0;  ///< at least |filtered - F| where exact nodes are filtered along the axis
+  };
+  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps) const;
+  /// At least |filtered - F| where exact nodes are filtered along z, then y, then x.
+  [[nodiscard]] double filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
+
+ private:
+  struct Table {
+    opencl::DeviceArray<float> values;
+    std::int64_t first = 0, views = 0;
+  };
+  // Of a view at the places of a part of the region: lambda^-2 sup |q|, and by axis the band and rho of
+  // projective_error.hpp.
+  struct ViewAtPart {
+    double weight = 0;
+    Vec3 band{}, rho{};
+  };
+  void look_at_views(const Coverage& coverage);
+  [[nodiscard]] std::int64_t views_together() const;
+  [[nodiscard]] Table table(std::int64_t first, std::int64_t views);
+  template <class Real>
+  void launch(const Table& table, const ConePage& page, VdvrConeNodes shape);
+  [[nodiscard]] double highest(std::size_t axis) const {
+    constexpr double least = 0.05;  // a single row does not vary along z
+    return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
+  }
+  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
+  const ProjectiveError& error_of(std::size_t axis, const GoldFilter& filter);
+
+  opencl::State& state_;
+  const FilteredScan& scan_;
+  Upsampler& upsampler_;
+  const FieldSups& sups_;
+  ConeLattice lattice_;
+  UpsampledColumns columns_, rows_;
+  std::int64_t column_stride_ = 0, views_together_ = 1;
+  std::optional<DenseValues> dense_;
+  bool upright_ = true, in_double_ = true;
+  double sup_ = 0, largest_weight_ = 0;
+  Vec3 band_{};
+  double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
+  std::vector<std::vector<ViewAtPart>> at_parts_;
+  std::map<const GoldFilter*, ProjectiveError> filters_;
+};
+
+}  // namespace vdvr

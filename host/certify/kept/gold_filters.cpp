@@ -1,0 +1,106 @@
+#include "host/certify/kept/gold_filters.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
+
+#include "host/certify/bounds/node_functional.hpp"
+#include "host/certify/bounds/tap_design.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+void check(int rate, double band, int taps) {
+  if (rate < 1 || rate > 32 || (rate & (rate - 1)) != 0)
+    throw InputError(fmt::format("a filter of rate {}: it must be 1, 2, 4, 8, 16 or 32", rate));
+  if (!(band > 0) || band > highest_gold_band)
+    throw InputError(fmt::format("a filter for the band {}: it must be above 0, at most 3/4 pi", band));
+  if (taps < 2 || taps > 32 || taps % 2 != 0)
+    throw InputError(fmt::format("a filter of {} taps: it must be an even number, 2 to 32", taps));
+}
+
+// Where the taps could do better than fp32 holds them, they are designed for a wider band, where their error
+// is about tan(band / 4)^taps = 1e-8. Else they would be nearly free, and neighbouring phases unlike each
+// other.
+double design_band(const GoldFilter& filter) {
+  return std::max(filter.band, 4 * std::atan(std::pow(1e-8, 1.0 / filter.taps)));
+}
+
+// `phase` of the filter, with its mirror image; the middle one is its own.
+void design_phase(GoldFilter& filter, int phase) {
+  const double place = static_cast<double>(phase) / filter.rate;
+  const std::vector<double> h = least_error_taps({filter.taps, place, design_band(filter), 0});
+  const auto taps = static_cast<std::size_t>(filter.taps);
+  float* const here = filter.weights.data() + static_cast<std::size_t>(phase) * taps;
+  float* const mirrored = filter.weights.data() + static_cast<std::size_t>(filter.rate - phase) * taps;
+  for (std::size_t i = 0; i < taps; ++i) {
+    const double tap = 2 * phase == filter.rate ? (h[i] + h[taps - 1 - i]) / 2 : h[i];
+    here[i] = mirrored[taps - 1 - i] = static_cast<float>(tap);
+  }
+}
+
+NodeFunctional functional(const GoldFilter& filter, int phase) {
+  const auto taps = static_cast<std::size_t>(filter.taps);
+  const auto h = std::span(filter.weights).subspan(static_cast<std::size_t>(phase) * taps, taps);
+  return {{h.begin(), h.end()}, filter.first() - static_cast<double>(phase) / filter.rate, 0};
+}
+
+// Largest sum of magnitudes, over positions of the finer lattice, of the difference of its interpolants.
+double difference_norm(const GoldFilter& filter, std::span<const double> difference) {
+  const int reach = static_cast<int>(difference.size()) / 2, wide = filter.taps + 2 * reach;
+  double largest = 0;
+  for (int centre = 0; centre < filter.rate; ++centre) {
+    std::vector<double> sum(static_cast<std::size_t>(wide), 0.0);
+    for (int k = -reach; k <= reach; ++k) {
+      const int place = centre + k + reach * filter.rate;  // of the finer lattice, counted from node -reach
+      for (int i = 0; i < filter.taps; ++i)
+        sum[static_cast<std::size_t>(place / filter.rate + i)] +=
+            difference[static_cast<std::size_t>(k + reach)] *
+            static_cast<double>(
+                filter.weights[static_cast<std::size_t>(place % filter.rate * filter.taps + i)]);
+    }
+    double norm = 0;
+    for (const double s : sum) norm += std::abs(s);
+    largest = std::max(largest, norm);
+  }
+  return largest;
+}
+
+}  // namespace
+
+GoldFilter design_gold_filter(int rate, double band, int taps) {
+  check(rate, band, taps);
+  GoldFilter filter;
+  filter.rate = rate;
+  filter.taps = taps;
+  filter.band = band;
+  filter.weights.assign(static_cast<std::size_t>(rate * taps), 0.0F);
+  filter.weights[static_cast<std::size_t>(-filter.first())] = 1;
+  for (int phase = 1; 2 * phase <= rate; ++phase) {
+    design_phase(filter, phase);
+    const NodeFunctional at = functional(filter, phase);
+    filter.error = std::max(filter.error, largest_symbol_error(at, band));
+    filter.sup = std::max(filter.sup, sup_constant(at, band));
+    double norm = 0;
+    for (const double h : at.taps) norm += std::abs(h);
+    filter.norm = std::max(filter.norm, norm);
+  }
+  filter.second_difference = difference_norm(filter, std::array{1.0, -2.0, 1.0});
+  filter.fourth_difference = difference_norm(filter, std::array{1.0, -4.0, 6.0, -4.0, 1.0});
+  return filter;
+}
+
+double gold_filter_error(const GoldFilter& filter, double kappa) {
+  double largest = 0;
+  for (int phase = 1; 2 * phase <= filter.rate; ++phase)
+    largest = std::max(largest, symbol_error(functional(filter, phase), kappa));
+  return largest;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,121 @@
+// Launcher of kernels/certify/kept/interpolate.cl.
+#include "host/certify/kept/interpolate_gold.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "host/base/opencl/column_tuning.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/opencl/write_later.hpp"
+#include "host/base/system/casts.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrColumns) == 24 && sizeof(VdvrAlongZ) == 56 && sizeof(VdvrAcross) == 96);
+
+namespace {
+
+constexpr std::int64_t lanes_of_group = 16;
+
+opencl::Defines defines(int lanes, int phases, int taps) {
+  return {{"VDVR_LANES", std::to_string(lanes)},
+          {"VDVR_RUN", std::to_string(AlongZ::run)},
+          {"VDVR_PHASES", std::to_string(phases)},
+          {"VDVR_TAPS", std::to_string(taps)}};
+}
+
+// Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
+// not fit into those of a CPU with 8 lanes.
+int lanes_along_z(opencl::State& state) {
+  const int tuned = column_tuning(state.info).lanes;
+  return tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8 ? 8 : tuned;
+}
+
+// Whole groups of the phases that a work-item makes together.
+std::vector<float> padded(int phases, int taps, std::span<const float> weights) {
+  const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
+  std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
+                         0.0f);
+  std::copy(weights.begin(), weights.end(), out.begin());
+  return out;
+}
+
+}  // namespace
+
+HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs) {
+  if (inputs < 1) throw std::logic_error("height_weights: no input");
+  HeightWeights out;
+  const std::int64_t groups = (outputs + lanes_of_group - 1) / lanes_of_group;
+  std::vector<std::int64_t> low(at(groups), inputs), high(at(groups), -1);
+  for (std::int64_t i = 0; i < outputs; ++i)
+    for (std::int64_t j = 0; j < inputs; ++j)
+      if (matrix[at(i * inputs + j)] != 0) {
+        low[at(i / lanes_of_group)] = std::min(low[at(i / lanes_of_group)], j);
+        high[at(i / lanes_of_group)] = std::max(high[at(i / lanes_of_group)], j);
+      }
+  constexpr std::int64_t run = AlongZ::run;
+  const auto in_runs = [](std::int64_t n) { return (n + run - 1) / run * run; };
+  out.terms = run;
+  for (std::int64_t group = 0; group < groups; ++group)
+    out.terms = std::max(out.terms, in_runs(high[at(group)] + 1) - low[at(group)] / run * run);
+  out.weights.assign(at(groups * out.terms * lanes_of_group), 0.0f);
+  for (std::int64_t group = 0; group < groups; ++group) {
+    const std::int64_t first =
+        std::clamp<std::int64_t>(low[at(group)] / run * run, 0, in_runs(inputs) - out.terms);
+    out.first.push_back(to_int(first));
+    for (std::int64_t lane = 0; lane < lanes_of_group && group * lanes_of_group + lane < outputs; ++lane)
+      for (std::int64_t j = 0; j < std::min(out.terms, inputs - first); ++j)
+        out.weights[at((group * out.terms + j) * lanes_of_group + lane)] =
+            static_cast<float>(matrix[at((group * lanes_of_group + lane) * inputs + first + j)]);
+  }
+  return out;
+}
+
+AlongZ::AlongZ(opencl::State& state, const HeightWeights& weights)
+    : weights_(opencl::copied<float>(state, weights.weights, "weights of heights")),
+      first_(opencl::copied<cl_int>(state, weights.first, "first heights")),
+      terms_(weights.terms),
+      groups_(weights.groups()) {}
+
+void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                        const opencl::DeviceArray<float>& out, std::span<const VdvrColumns> parts,
+                        VdvrAlongZ shape) const {
+  if (parts.empty()) return;
+  shape.terms = to_int(terms_);
+  shape.groups = to_int(groups_);
+  shape.parts = to_int(static_cast<std::int64_t>(parts.size()));
+  shape.columns_x = shape.columns_y = 0;
+  for (const VdvrColumns& p : parts) {
+    shape.columns_x = std::max(shape.columns_x, p.columns_x);
+    shape.columns_y = std::max(shape.columns_y, p.columns_y);
+  }
+  const auto on_device = opencl::copied<VdvrColumns>(state, parts, "columns to interpolate");
+  const int lanes = lanes_along_z(state);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
+      state, "certify/kept/interpolate", "along_z", defines(lanes, 1, 2));
+  kernel(opencl::in_groups(state.info,
+                           {count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
+                            count(std::int64_t{shape.columns_y} * shape.parts)},
+                           {1, 4, 1}),
+         out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
+}
+
+Across::Across(opencl::State& state, int phases, int taps, std::span<const float> weights)
+    : phases_(phases),
+      taps_(taps),
+      weights_(state, std::span<const float>(padded(phases, taps, weights)), "weights of gold") {}
+
+void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                        const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
+  const int lanes = column_tuning(state.info).lanes;
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(
+      state, "certify/kept/interpolate", "across", defines(lanes, phases_, taps_));
+  kernel(opencl::in_groups(state.info,
+                           {count(shape.z / lanes), count(shape.others),
+                            count(std::int64_t{shape.intervals} * shape.boxes)},
+                           {1, 4, 4}),
+         out.buffer(), in.buffer(), weights_.buffer(), shape);
+}
+
+}  // namespace vdvr

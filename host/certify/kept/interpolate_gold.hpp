@@ -1,0 +1,61 @@
+// Gold from fewer nodes: products along z and filters across it, on the device.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/base/opencl/array.hpp"
+#include "shared/interpolate_gold.h"
+
+namespace vdvr {
+
+/// Heights out of heights: out[16 group + i] = sum_j weights[group][j][i] in[first[group] + j], j < terms.
+struct HeightWeights {
+  std::int64_t terms = 0;
+  std::vector<float> weights;  ///< [group][terms][16]
+  std::vector<cl_int> first;   ///< [group]
+
+  [[nodiscard]] std::int64_t groups() const { return static_cast<std::int64_t>(first.size()); }
+};
+
+/// Of float matrix[output][input] whose entries outside a band are 0: groups of 16 outputs, each over as many
+/// inputs as the widest has, in whole runs of AlongZ that begin at a multiple of one: an output is rounded in
+/// the same way whatever outputs share its group. Reads up to a run beyond the last input. Throws
+/// std::logic_error where there is no input.
+HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs);
+
+/// The same on the device.
+class AlongZ {
+ public:
+  AlongZ(opencl::State& state, const HeightWeights& weights);
+  /// Of these rectangles of columns, by one launch; of `shape` only the distances between columns are read.
+  /// Enqueues. Cost: columns * groups * 16 * terms multiply-adds; error: that of a product in runs of `run`
+  /// terms.
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                  const opencl::DeviceArray<float>& out, std::span<const VdvrColumns> parts,
+                  VdvrAlongZ shape) const;
+
+  static constexpr int run = 8;
+
+ private:
+  opencl::DeviceArray<float> weights_;
+  opencl::DeviceArray<cl_int> first_;
+  std::int64_t terms_ = 0, groups_ = 0;
+};
+
+/// Filters across z. `weights` float[phase - 1][taps] as gold_filters.hpp has them; `phases` outputs an
+/// interval, which half of the taps lie before.
+class Across {
+ public:
+  Across(opencl::State& state, int phases, int taps, std::span<const float> weights);
+  /// Enqueues. Cost: `taps` multiply-adds an output; error: taps + 1 roundings of sum |weight| |input|.
+  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
+                  const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const;
+
+ private:
+  int phases_ = 1, taps_ = 2;
+  opencl::DeviceArray<float> weights_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,33 @@
+// What a filter between kept nodes errs on what a cone-beam view adds to F, which has no band limit in space
+// (docs/error-bounds.md, section 16).
+#pragma once
+
+#include <vector>
+
+#include "host/certify/kept/gold_filters.hpp"
+
+namespace vdvr {
+
+/// Along a line of kept nodes, t nodes from the place that is filled, a view adds
+///   f(t) = lambda^-2 (1 + rho t)^-2 g(t / (1 + rho t)) ,
+/// where g is what the filtered view holds along a line, of at most `band` radians a node at that place, rho
+/// is by how much lambda grows from node to node there, over lambda itself. In powers of rho,
+///   f(t) = lambda^-2 sum over m, i of C(m + 1 + i, i) / m! (-rho)^(m + i) t^(2m + i) g^(m)(t) ,
+/// and of each term the filter makes a sum over band-limited values, which sup_constant bounds.
+class ProjectiveError {
+ public:
+  /// Of bands up to `highest`. Cost: some 200 sup_constants for each pair of phases.
+  ProjectiveError(const GoldFilter& filter, double highest);
+  /// At least |filtered - f| / (lambda^-2 sup |g|), at any phase. Infinite where `band` exceeds the highest
+  /// or lambda vanishes among the taps.
+  [[nodiscard]] double at(double band, double rho) const;
+
+ private:
+  // `magnitude`: what it is at most whatever the band.
+  [[nodiscard]] double constant(std::size_t moment, std::size_t band, double magnitude) const;
+
+  double highest_ = 0, reach_ = 0, norm_ = 0;
+  std::vector<std::vector<double>> constants_;  // [moment][band]; none of a copy
+};
+
+}  // namespace vdvr

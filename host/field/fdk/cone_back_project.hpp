@@ -1,0 +1,53 @@
+// Back-projection of cone-beam views onto a band of sample columns.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "host/field/fbp/filter_projections.hpp"
+#include "host/base/opencl/column_tuning.hpp"
+#include "vdvr/expert/grid.hpp"
+
+namespace vdvr {
+
+/// float values[view][column][row % rate][row / rate]: filtered views, `rate` columns and rows to a pixel,
+/// with columns and rows of the mirror extension around them.
+struct ConeTable {
+  opencl::DeviceArray<float> values;
+  int rate = 1;
+  std::int64_t columns = 0, rows = 0, row_stride = 0;
+  double first_column = 0, first_row = 0;  ///< detector places of the first ones
+  std::int64_t first_view = 0, views = 0;
+};
+
+/// How many columns and rows of a table are mirrored on each side, in pixels.
+struct ConeMargins {
+  std::int64_t columns = 0, rows = 0;
+};
+
+/// Views [first, first + count). Cost: rate 1: a copy; else as Upsampler's. `upsampler`: of the same scan.
+ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,
+                     const ConeMargins& margins, std::int64_t first, std::int64_t count);
+std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeMargins& margins,
+                               std::int64_t views);
+
+/// Samples of `grid` with x, all rows from `first_y` and planes from `first_z`.
+struct ConeBand {
+  const Grid* grid = nullptr;
+  std::int64_t first_y = 0, ny = 0, first_z = 0, nz = 0;
+  /// [y][x]: first and last plane wanted, counted from first_z; others hold anything or what they held.
+  std::vector<std::array<std::int32_t, 2>> wanted{};
+  bool adds = false;    ///< to what `out` holds
+  int depth_power = 2;  ///< samples are weighed with lambda to minus this: 2, or 4 for squared weights
+
+  [[nodiscard]] std::int64_t nx() const { return grid->samples()[0]; }
+};
+
+/// float out[y][x][column_stride(nz)]. Enqueues; does not wait. Cost: wanted samples times views updates.
+void cone_back_project(opencl::State& state, const FilteredScan& scan, const ConeTable& table,
+                       const ConeBand& band, opencl::DeviceArray<float>& out);
+/// The same with vectors of so many lanes.
+void cone_back_project(opencl::State& state, const FilteredScan& scan, const ConeTable& table,
+                       const ConeBand& band, opencl::DeviceArray<float>& out, int lanes);
+
+}  // namespace vdvr

@@ -1,0 +1,229 @@
+// F by its definition: direct sums in double precision over host threads (docs/geometry.md). Shares nothing
+// with the device path but the angular weights and the ramp kernel.
+#include "vdvr/expert/exact_field.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+#include "host/field/fdk/cone_coverage.hpp"
+#include "host/field/fbp/coverage.hpp"
+#include "host/field/fdk/fdk_weights.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fbp/view_weights.hpp"
+#include "host/base/system/parallel.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+
+namespace vdvr {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// cos(pi m (i + 1/2) / n) for all m, i: [m][i].
+std::vector<double> cosine_table(std::int64_t n) {
+  std::vector<double> table(static_cast<std::size_t>(n * n));
+  for (std::int64_t m = 0; m < n; ++m)
+    for (std::int64_t i = 0; i < n; ++i)
+      table[static_cast<std::size_t>(m * n + i)] =
+          std::cos(pi * static_cast<double>(m * (2 * i + 1) % (4 * n)) / static_cast<double>(2 * n));
+  return table;
+}
+
+double absolute_sum(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0,
+                         [](double s, double x) { return s + std::abs(x); });
+}
+
+// Trigonometric interpolation in 2n points makes errors at them grow by no more.
+double growth(std::int64_t n) { return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5; }
+
+// Clenshaw's recurrence for sum_m a[m * stride] cos(m x).
+double cosine_sum(const double* a, std::int64_t n, double x) {
+  const double c = 2 * std::cos(x);
+  double b1 = 0, b2 = 0;
+  for (std::int64_t m = n - 1; m > 0; --m) {
+    const double b0 = a[m] + c * b1 - b2;
+    b2 = b1;
+    b1 = b0;
+  }
+  return a[0] + 0.5 * c * b1 - b2;
+}
+
+// n zeros, in memory or in scratch.
+std::shared_ptr<double[]> zeros(std::size_t n, const std::shared_ptr<Scratch>& scratch) {
+  if (!scratch) return std::make_shared<double[]>(n);
+  return {scratch->map<double>(n, "the cosine coefficients").data(),
+          [scratch](double* first) { scratch->unmap(first); }};
+}
+
+// The samples that the ramp filter is given, and what each view weighs.
+struct WeighedViews {
+  WeighedViews(const ProjectionSet& of, const FieldOptions& field) : scan(of), columns(of.geometry.columns) {
+    if (!scan.cone) {
+      weight = view_weights(scan.geometry.theta_rad).weight;
+      return;
+    }
+    const ConeGeometry cone = used_cone(scan, field);
+    fdk.emplace(cone, columns, scan.geometry.rows);
+    pad_before = fdk->pad_before();
+    columns += pad_before + fdk->pad_after();
+    for (std::size_t k = 0; k < cone.views.size(); ++k) {
+      const ViewMatrix& m = cone.views[k];
+      matrices.push_back(recentred(m, m[0][3] / m[2][3] + static_cast<double>(pad_before)));
+      weight.push_back(fdk->of_view(k) / fdk->view(k).pitch_u);
+    }
+  }
+  // double [row][column] of view k.
+  [[nodiscard]] std::vector<double> samples(std::int64_t k) const {
+    const ParallelGeometry& g = scan.geometry;
+    const float* first = scan.data.data() + k * g.rows * g.columns;
+    if (!fdk) return {first, first + g.rows * g.columns};
+    std::vector<double> out(static_cast<std::size_t>(g.rows * columns));
+    fdk->apply(static_cast<std::size_t>(k), {first, static_cast<std::size_t>(g.rows * g.columns)}, out);
+    return out;
+  }
+
+  const ProjectionSet& scan;
+  std::int64_t columns, pad_before = 0;
+  std::optional<FdkWeights> fdk;
+  std::vector<ViewMatrix> matrices;
+  std::vector<double> weight;
+};
+
+}  // namespace
+
+ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress)
+    : geometry_(scan.geometry) {
+  if (field.center) geometry_.center = *field.center;
+  const WeighedViews views(scan, field);
+  if (scan.cone) {
+    cone_coverage_ = std::make_shared<ConeCoverage>(cone_coverage(scan, field));
+    views_ = views.matrices;
+    geometry_.center += static_cast<double>(views.pad_before);
+    geometry_.columns = views.columns;
+  }
+  const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
+  const auto g = ramp_kernel(field, scan.cone ? 1.0 : geometry_.pitch_u, U);
+  const auto cos_u = cosine_table(U), cos_v = cosine_table(V);
+  const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
+  std::vector<double> mirrored(at(2 * U - 1));  // [U - 1 + i - j]: the kernel at i - j
+  for (std::int64_t i = 0; i < 2 * U - 1; ++i) mirrored[at(i)] = g[at(std::abs(i - (U - 1)))];
+  const std::shared_ptr<double[]> coefficients = zeros(at(K * U * V), scan.data.scratch());
+  const double kernel_norm = std::accumulate(mirrored.begin(), mirrored.end(), 0.0,
+                                             [](double s, double x) { return s + std::abs(x); });
+  std::vector<double> rounding(at(K));
+  parallel_for(K, progress, "exact field", [&](std::int64_t k) {
+    double largest_sample = 0, row_norm = 0, rows_norm = 0, norm = 0;
+    std::vector<double> rows(at(V * U));  // [v][m]: cosine coefficients in u
+    std::vector<double> q(at(U));
+    const std::vector<double> p = views.samples(k);
+    for (std::int64_t v = 0; v < V; ++v) {
+      // Sums side by side over i: they vectorise where a sum over j would not.
+      std::fill(q.begin(), q.end(), 0.0);
+      for (std::int64_t j = 0; j < U; ++j) {
+        const double sample = p[at(v * U + j)] * views.weight[at(k)];
+        const double* shifted = mirrored.data() + (U - 1 - j);
+        for (std::int64_t i = 0; i < U; ++i) q[at(i)] += shifted[i] * sample;
+        largest_sample = std::max(largest_sample, std::abs(sample));
+      }
+      row_norm = std::max(row_norm, absolute_sum(q));
+      for (std::int64_t m = 0; m < U; ++m) {
+        double sum = 0;
+        for (std::int64_t i = 0; i < U; ++i) sum += q[at(i)] * cos_u[at(m * U + i)];
+        rows[at(v * U + m)] = sum * (m == 0 ? 1.0 : 2.0) / static_cast<double>(U);
+      }
+    }
+    for (std::int64_t m = 0; m < U; ++m)
+      for (std::int64_t l = 0; l < V; ++l) {
+        double sum = 0;
+        for (std::int64_t v = 0; v < V; ++v) sum += rows[at(v * U + m)] * cos_v[at(l * V + v)];
+        const double a = sum * (l == 0 ? 1.0 : 2.0) / static_cast<double>(V);
+        coefficients[(k * U + m) * V + l] = a;
+        norm += std::abs(a);
+      }
+    rows_norm = absolute_sum(rows);
+    // docs/error-bounds.md, "What verify does": convolution, both transforms, and sums over coefficients.
+    const auto u = static_cast<double>(U), v = static_cast<double>(V);
+    rounding[at(k)] = 0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +
+                                 2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm +
+                                 (2 * u + 10 * v + 32) * norm);
+  });
+  coefficients_ = coefficients;
+  rounding_ = std::accumulate(rounding.begin(), rounding.end(), 0.0);
+}
+
+// lambda^-2 times the series in u and v, view by view.
+std::vector<double> ExactField::at_cone(std::span<const Vec3> points, const Progress& progress) const {
+  const std::int64_t U = geometry_.columns, V = geometry_.rows;
+  const auto columns = static_cast<std::size_t>(U), rows = static_cast<std::size_t>(V);
+  std::vector<double> values(points.size());
+  parallel_for(static_cast<std::int64_t>(points.size()), progress, "exact points", [&](std::int64_t i) {
+    double& value = values[static_cast<std::size_t>(i)];
+    std::vector<double> line(columns), basis(rows);
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+      const auto [u, v, lambda] = projected(views_[k], points[static_cast<std::size_t>(i)]);
+      for (std::size_t l = 0; l < rows; ++l)
+        basis[l] = std::cos(static_cast<double>(l) * pi * (v + 0.5) / static_cast<double>(V));
+      for (std::size_t m = 0; m < columns; ++m) {
+        const double* a = coefficients_.get() + (k * columns + m) * rows;
+        line[m] = std::inner_product(basis.begin(), basis.end(), a, 0.0);
+      }
+      value += cosine_sum(line.data(), U, pi * (u + 0.5) / static_cast<double>(U)) / (lambda * lambda);
+    }
+  });
+  return values;
+}
+
+std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress& progress) const {
+  if (!views_.empty()) return at_cone(points, progress);
+  const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
+  std::map<double, std::vector<std::size_t>> by_height;
+  for (std::size_t i = 0; i < points.size(); ++i) by_height[points[i][2]].push_back(i);
+  std::vector<std::pair<double, const std::vector<std::size_t>*>> heights;
+  for (const auto& [z, members] : by_height) heights.emplace_back(z, &members);
+
+  // Heights go together in groups, so that one pass over the coefficients serves the whole group and the
+  // innermost sums run side by side.
+  constexpr std::size_t group = 16;
+  std::vector<double> values(points.size());
+  const auto groups = static_cast<std::int64_t>((heights.size() + group - 1) / group);
+  parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
+    const std::size_t first = static_cast<std::size_t>(g) * group,
+                      count = std::min(group, heights.size() - first);
+    const auto rows = static_cast<std::size_t>(V), columns = static_cast<std::size_t>(U);
+    std::vector<double> basis(rows * group), line(columns * group);  // [l][height], [height][m]
+    for (std::size_t h = 0; h < count; ++h) {
+      const double row = heights[first + h].first / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
+      const double y = pi * (row + 0.5) / static_cast<double>(V);
+      for (std::size_t l = 0; l < rows; ++l) basis[l * group + h] = std::cos(static_cast<double>(l) * y);
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(K); ++k) {
+      const double c = std::cos(geometry_.theta_rad[k]), s = std::sin(geometry_.theta_rad[k]);
+      for (std::size_t m = 0; m < columns; ++m) {
+        const double* a = coefficients_.get() + (k * columns + m) * rows;
+        std::array<double, group> sum{};
+        for (std::size_t l = 0; l < rows; ++l)
+          for (std::size_t h = 0; h < group; ++h) sum[h] += a[l] * basis[l * group + h];
+        for (std::size_t h = 0; h < count; ++h) line[h * columns + m] = sum[h];
+      }
+      for (std::size_t h = 0; h < count; ++h)
+        for (const std::size_t i : *heights[first + h].second) {
+          const double t = points[i][0] * c + points[i][1] * s;
+          const double column = t / geometry_.pitch_u + geometry_.center;
+          values[i] += cosine_sum(line.data() + h * columns, U, pi * (column + 0.5) / static_cast<double>(U));
+        }
+    }
+  });
+  return values;
+}
+
+bool ExactField::covered(const Vec3& point) const {
+  return cone_coverage_ ? cone_coverage_->margin(point) >= 0 : is_covered(geometry_, geometry_.center, point);
+}
+
+}  // namespace vdvr

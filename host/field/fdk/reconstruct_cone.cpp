@@ -1,0 +1,179 @@
+// Uniform FDK in slabs of planes, bands of columns and chunks of views (docs/geometry.md, "Cone beam").
+#include "host/field/fdk/reconstruct_cone.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/field/fbp/back_project.hpp"
+#include "host/field/fbp/coverage.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/field/fdk/cone_back_project.hpp"
+#include "host/field/fdk/cone_coverage.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "shared/cone_back_project.h"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+// Samples that may share a cell with the covered region are kept.
+double kept_distance(const Grid& grid) {
+  return std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]) * (1 + 1e-6);
+}
+
+// Pixels beyond the detector that kept samples fall on: the margin where it looks largest, closest to a
+// source.
+ConeMargins margins_of(const FilteredScan& scan, const Grid& grid) {
+  double columns = 0, rows = 0;
+  for (const ViewMatrix& matrix : scan.views) {
+    const ConeView view = cone_view(matrix);
+    // Covered points lie at least as far from the source's plane as the nearer edge of what it sees of the
+    // axis' cylinder; a margin that is small beside that is seen at no more than twice the pitch at the axis.
+    columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
+    rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
+  }
+  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1};
+}
+
+// The planes of a slab that are kept of each column.
+std::vector<std::array<std::int32_t, 2>> kept_planes(const ConeCoverage& coverage, const Grid& grid,
+                                                     std::int64_t first_z, std::int64_t nz) {
+  const Index3 n = grid.samples();
+  std::vector<std::array<std::int32_t, 2>> kept(at(n[0] * n[1]), {0, -1});
+  parallel_for(n[1], {}, "", [&](std::int64_t y) {
+    for (std::int64_t x = 0; x < n[0]; ++x) {
+      const Vec3 p = grid.position({x, y, 0});
+      const auto [low, high] = coverage.heights(p[0], p[1], -kept_distance(grid));
+      if (!(low <= high)) continue;
+      const auto plane = [&](double z) {
+        return (z - grid.origin[2]) / grid.spacing[2] - static_cast<double>(first_z);
+      };
+      const double last = static_cast<double>(nz - 1), from = std::max(0.0, std::ceil(plane(low))),
+                   to = std::min(last, std::floor(plane(high)));
+      if (from <= to)
+        kept[at(y * n[0] + x)] = {static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)};
+    }
+  });
+  return kept;
+}
+
+// What lies outside is 0: vectors compute more than is wanted.
+void clear_unwanted(std::span<float> columns, std::int64_t stride, std::int64_t nz,
+                    std::span<const std::array<std::int32_t, 2>> wanted) {
+  for (std::size_t x = 0; x < wanted.size(); ++x) {
+    float* column = columns.data() + static_cast<std::int64_t>(x) * stride;
+    const std::int64_t from = wanted[x][0] > wanted[x][1] ? nz : wanted[x][0], to = wanted[x][1] + 1;
+    std::fill(column, column + from, 0.0f);
+    if (to < nz && from < nz) std::fill(column + to, column + nz, 0.0f);
+  }
+}
+
+struct Sizes {
+  std::int64_t planes, band, views;  // of a slab, rows of a band, views of a chunk
+};
+
+// A slab's planes and a band's columns take a quarter of what is left each, views another.
+Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeMargins& margins,
+                const Index3& n, std::uint64_t plane_bytes) {
+  const std::uint64_t share = std::min(state.memory.left() / 4, state.info.max_allocation);
+  Sizes s{};
+  const auto most = [&](std::uint64_t each, std::int64_t all) {
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(share / std::max<std::uint64_t>(each, 1)), 0,
+                                    all);
+  };
+  s.planes = plane_bytes == 0 ? n[2] : most(plane_bytes, n[2]);
+  s.planes = std::min(s.planes, std::int64_t{1024});
+  s.band = most(sizeof(float) * count(n[0] * column_stride(std::max<std::int64_t>(s.planes, 1))), n[1]);
+  if (s.band > VDVR_CONE_BLOCK) s.band = s.band / VDVR_CONE_BLOCK * VDVR_CONE_BLOCK;
+  // Upsampled views pass through a slab of their own.
+  const std::uint64_t per_view = cone_table_bytes(scan, rate, margins, 1) * (rate == 1 ? 1 : 2);
+  s.views = most(per_view, scan.geometry.views());
+  if (s.planes < 1 || s.band < 1 || s.views < 1)
+    throw ResourceError(
+        fmt::format("a view of {} x {} pixels at `upsampling` {} needs {:.1f} MiB, a plane of the volume "
+                    "{:.1f} MiB; raise `max_memory`",
+                    scan.geometry.columns, scan.geometry.rows, rate, static_cast<double>(per_view) / 0x1p20,
+                    static_cast<double>(n[0] * n[1] * 4) / 0x1p20));
+  return s;
+}
+
+}  // namespace
+
+void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
+                      const ReconstructOptions& options, const Planes& planes, const Progress& progress,
+                      StageWatch& watch) {
+  if (options.interpolation != Interpolation::linear)
+    throw InputError("cone beam: `u_filter` can only be linear; raise `upsampling` instead");
+  const int rate = options.upsampling;
+  const FilteredScan filtered =
+      filter_cone(state, scan, options.field, progress, rate == 1 ? Precision::fp32 : Precision::fp64, units);
+  watch.lap(state, "filter");
+  back_project_views(state, filtered, grid, rate, 2, planes, progress, watch);
+}
+
+void back_project_views(opencl::State& state, const FilteredScan& filtered, const Grid& grid, int rate,
+                        int depth_power, const Planes& planes, const Progress& progress, StageWatch& watch) {
+  const ParallelGeometry& g = filtered.geometry;
+  const ConeCoverage coverage(filtered.views, g.columns, g.rows);
+  const ConeMargins margins = margins_of(filtered, grid);
+  const Index3 n = grid.samples();
+  const Sizes sizes = sizes_for(state, filtered, rate, margins, n, planes.bytes);
+  HostMemory host(state);
+  host.count(filtered.samples.resident_bytes(), "the filtered projections");
+  Upsampler upsampler(state, filtered);
+  bool any = false;
+  std::optional<ConeTable> table;  // the last one: of all views it serves all bands
+  for (std::int64_t z0 = 0; z0 < n[2]; z0 += sizes.planes) {
+    const std::int64_t nz = std::min(sizes.planes, n[2] - z0), stride = column_stride(nz);
+    const auto kept = kept_planes(coverage, grid, z0, nz);
+    float* target = planes.target(z0, nz);
+    for (std::int64_t y0 = 0; y0 < n[1]; y0 += sizes.band) {
+      const std::int64_t ny = std::min(sizes.band, n[1] - y0);
+      ConeBand band{&grid, y0, ny, z0, nz, {kept.begin() + y0 * n[0], kept.begin() + (y0 + ny) * n[0]}};
+      band.depth_power = depth_power;
+      if (std::none_of(band.wanted.begin(), band.wanted.end(), [](const auto& w) { return w[0] <= w[1]; }))
+        continue;
+      any = true;
+      opencl::DeviceArray<float> out(state, count(ny * n[0] * stride), "reconstructed columns");
+      for (std::int64_t first = 0; first < g.views(); first += sizes.views) {
+        report(progress, "reconstruct",
+               (static_cast<double>(z0) + static_cast<double>(nz * y0) / static_cast<double>(n[1])) /
+                   static_cast<double>(n[2]));
+        const std::int64_t views = std::min(sizes.views, g.views() - first);
+        if (!table || table->first_view != first || table->views != views) {
+          table.reset();
+          table = cone_table(state, filtered, upsampler, rate, margins, first, views);
+          watch.lap(state, "upsample");
+        }
+        band.adds = first > 0;
+        cone_back_project(state, filtered, *table, band, out);
+        watch.lap(state, "back-project");
+      }
+      out.read_mapped([&](std::span<const float> columns) {
+        parallel_for(ny, {}, "", [&](std::int64_t y) {
+          std::vector<float> row(columns.begin() + y * n[0] * stride,
+                                 columns.begin() + (y + 1) * n[0] * stride);
+          clear_unwanted(row, stride, nz, std::span(band.wanted).subspan(at(y * n[0]), at(n[0])));
+          transpose_row(row, stride, nz, {0, static_cast<std::int32_t>(n[0] - 1)}, target + (y0 + y) * n[0],
+                        n[0] * n[1]);
+        });
+      });
+      watch.lap(state, "read back");
+    }
+    planes.done(z0, nz);
+  }
+  if (!any)
+    throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
+}
+
+Grid make_cone_grid(const ProjectionSet& scan, const GridOptions& options) {
+  const ConeCoverage coverage = cone_coverage(scan, {});
+  return grid_around(scan.geometry, coverage.inner_radius(), coverage.heights(0, 0, 0), options);
+}
+
+}  // namespace vdvr

@@ -1,0 +1,67 @@
+// The variance of F by back-projection with squared weights.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/base/opencl/state.hpp"
+#include "vdvr/expert/field_options.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/line_noise.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+
+namespace vdvr {
+
+/// The filter's band-limited kernel of pitch 1, squared, as a filter of variances.
+class SquaredFilter {
+ public:
+  explicit SquaredFilter(const FieldOptions& field);
+
+  /// g(m / 2)^2 within 12 columns.
+  [[nodiscard]] double at(std::int64_t half_columns) const;
+  /// sum_i g(place / 2 - i)^2 v_i over a row. `blocks`: blocks_of(row). At columns g^2 falls with the fourth
+  /// power of the distance: what lies beyond 12 of them, 5e-5 of the sum, is left out. Between columns it
+  /// falls with the second alone, where the window has not closed at Nyquist; the whole sum is known (it is
+  /// that at columns, by Parseval), so what lies beyond is its rest over the square of the distance.
+  [[nodiscard]] double operator()(std::span<const double> row, std::span<const double> blocks,
+                                  std::int64_t place) const;
+  static std::vector<double> blocks_of(std::span<const double> row);
+
+ private:
+  std::vector<double> kernel_;
+  double rest_ = 0;  // g(t)^2 t^2 far from 0 between columns
+};
+
+/// Weights S_v(z, r)^2 of detector rows for a height between them, those that matter: (row, weight). Of rows
+/// that are correlated (LineIntegralNoise) all by what their products add.
+struct RowShare {
+  std::int64_t row;
+  double weight;
+};
+std::vector<RowShare> squared_row_shares(double place, std::int64_t rows,
+                                         std::span<const float> correlation = {});
+
+/// The share of white noise's variance that a noise of this spectrum (LineIntegralNoise) has after the ramp.
+double passed_share(const FieldOptions& field, std::span<const float> spectrum);
+
+/// v of one pixel's line integral.
+class PixelVariance {
+ public:
+  explicit PixelVariance(const LineIntegralNoise& noise) : noise_(noise) {}
+  [[nodiscard]] double operator()(std::size_t pixel, double p) const;
+
+ private:
+  const LineIntegralNoise& noise_;
+};
+
+/// float variance[z][y][x] / scale on the grid's samples, world units; scale brings them to order one.
+struct FieldVariance {
+  std::vector<float> samples;
+  double scale = 1;
+};
+FieldVariance field_variance(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
+                             const LineIntegralNoise& noise, const Grid& grid, const Progress& progress);
+
+}  // namespace vdvr

@@ -1,0 +1,326 @@
+// What build computes beside |V - F|, made again by its own code and compared with the certificate. This says
+// whether the certificate is the one that build writes; whether V is near F is measured by other means.
+#include "host/verify/claims/verify_terms.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/crew/gold_rates.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/base/opencl/host_memory.hpp"
+#include "host/scan/units.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/volume/covered_range.hpp"
+#include "host/volume/result_units.hpp"
+
+namespace vdvr {
+namespace {
+
+// Sups and tables are sums in fp32 over at most a few thousand terms: devices agree on them better than this.
+constexpr double table_rounding = 0x1p-10;
+// Bricks that are measured by themselves: each takes its rows of all views.
+constexpr std::size_t most_alone = 16;
+
+/// The scan filtered as build does, and what follows from that, in `units`.
+struct Filtered {
+  Filtered(opencl::State& device, const ProjectionSet& projections, const Units& of_scan,
+           const FieldOptions& field, Interpolation interpolation, const Progress& progress)
+      : state(device),
+        units(of_scan),
+        scan(filter_scan(device, projections, field, progress, Precision::fp64, units)),
+        upsampler(device, scan, ColumnMethod::accurate) {
+    sups = is_cone()                                  ? cone_sups(device, upsampler, scan)
+           : interpolation == Interpolation::six_taps ? value_sups(device, upsampler, scan)
+                                                      : field_sups(device, upsampler, scan);
+  }
+  Filtered(const Filtered&) = delete;
+  Filtered& operator=(const Filtered&) = delete;
+
+  /// As the certificate's reader knows densities.
+  [[nodiscard]] double world(double density) const { return to_world(density, units); }
+  [[nodiscard]] bool is_cone() const { return !scan.views.empty(); }
+
+  opencl::State& state;
+  Units units;
+  FilteredScan scan;
+  Upsampler upsampler;
+  FieldSups sups;
+};
+
+/// Rounding as build bounds it, of blocks of samples with this spacing, so many along their sides; `base` is
+/// the grid that sets how far columns reach.
+double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double side, int upsampling,
+                     Interpolation interpolation, Fp64 fp64) {
+  const auto n = static_cast<std::int64_t>(side);
+  const ColumnBlocks blocks{n, n, spacing[0], spacing[1], {}, {}};
+  return arithmetic_bound(f.upsampler, f.scan, f.sups, columns_for(f.scan.geometry, base, upsampling), blocks,
+                          interpolation, fp64);
+}
+
+/// The field at the grid's samples as build makes it, and what it errs, here and where the file was built.
+struct BaseAgain {
+  Volume base;
+  double rounding = 0, rounding_of_build = 0, projection = 0;
+};
+
+// Of parallel beam a reconstruction with six taps at 8x, of cone beam gold at the samples.
+BaseAgain base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, bool same_device,
+                     const Progress& progress) {
+  if (f.is_cone()) {
+    const GoldLattice lattice = kept.lattice(v.grid, 1);
+    const GoldErrors errors = kept.errors(lattice);
+    return {base_of_gold(f.state, kept, Coverage(f.scan.geometry, f.scan.views), v.grid,
+                         kept_margin(v.grid, 1), progress),
+            errors.rounding + errors.ramp, kept.rounding_elsewhere(lattice, same_device).second + errors.ramp,
+            errors.interpolation};
+  }
+  const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2);
+  const auto rounding = [&](Fp64 fp64) {
+    return arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps, fp64);
+  };
+  const double here = rounding(Fp64::as_here);
+  return {reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress), here,
+          same_device ? here : std::max(rounding(Fp64::present), rounding(Fp64::absent)),
+          six_tap_facts().sup * f.sups.value};
+}
+
+// One made again has the same interpolation error but for rounding, and the extremes of two fields differ by
+// no more than the fields do.
+void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
+                   const Certificate& c, KeptGold& kept, bool same_device, const Progress& progress) {
+  const BaseAgain again = base_again(f, v, kept, same_device, progress);
+  const CoveredRange range = covered_range(again.base, Coverage(f.scan.geometry, f.scan.views));
+  const double found = range.high - range.low;
+  const double apart = 2 * (again.rounding + again.rounding_of_build);
+  if (!(std::abs(c.reference_range - found) <= apart))
+    out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
+                              f.world(found), f.world(apart)));
+  // F itself at the two extremes, by other means: the range cannot be smaller.
+  const std::array points{to_world(v.grid.position(range.low_at), f.units),
+                          to_world(v.grid.position(range.high_at), f.units)};
+  std::vector<double> F = exact.at(points);
+  for (double& value : F) value = from_world(value, f.units);
+  const double least =
+      F[1] - F[0] - 2 * (again.projection + again.rounding + from_world(exact.rounding(), f.units));
+  if (!(c.reference_range >= least))
+    out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
+                              f.world(c.reference_range), f.world(F[1] - F[0])));
+}
+
+/// |V - gold| + T + P of the selected bricks, as build measures them.
+class Totals {
+ public:
+  Totals(Filtered& f, const MixedVolume& v, const Certificate& c, bool same_device)
+      : f_(f),
+        volume_(v),
+        stored_(c),
+        field_(f.state, v),
+        gold_(f.state, f.scan, f.sups, settings(f, v, c)),
+        same_device_(same_device) {
+    for (GoldStream* gold : {&gold_.fine(), gold_.coarse()}) {
+      if (!gold) continue;
+      const GoldLattice lattice = kept().lattice(v.grid, gold->settings().rate);
+      const double ramp = kept().errors(lattice).ramp;
+      const auto [least, most] = kept().rounding_elsewhere(lattice, same_device);
+      least_arithmetic_ = std::max(least_arithmetic_, least + ramp);
+      most_arithmetic_ = std::max(most_arithmetic_, most + ramp);
+    }
+    for (const float b : decoded(v.base, v.step))
+      largest_ = std::max(largest_, std::abs(static_cast<double>(b)));
+  }
+
+  [[nodiscard]] KeptGold& kept() const { return gold_.fine().source()->kept; }
+
+  void compare(Differences& out, std::vector<std::uint8_t> selected, bool exhaustive,
+               const Progress& progress) {
+    const std::vector<std::uint8_t> near = gold_.fine().bricks_near_coverage();
+    for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = selected[i] && near[i];
+    // A brick has its total from either rate of gold: the coarse one explains most, for an eighth of the
+    // work.
+    if (GoldStream* coarse = gold_.coarse()) {
+      std::vector<std::uint8_t> resolved = selected;
+      for (std::size_t i = 0; i < resolved.size(); ++i) resolved[i] = resolved[i] && resolves(*coarse, i);
+      run(*coarse, resolved, progress, [&](const BrickMeasure& m) {
+        if (!agrees(m)) return;
+        selected[at(m.brick)] = 0;
+        // What build certified by coarse gold has no larger error between that gold's nodes.
+        if (m.total >= 0) most_ = std::max(most_, static_cast<double>(m.total) + tolerance(m));
+      });
+    }
+    std::vector<BrickMeasure> low;
+    run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
+      if (m.total >= 0) {
+        error_ = std::max(error_, static_cast<double>(m.error));
+        most_ = std::max(most_, static_cast<double>(m.error) + arithmetic() + arithmetic_of_build());
+      }
+      if (!agrees(m)) low.push_back(m);
+    });
+    compare_alone(out, std::move(low), progress);
+    compare_constants(out);
+    compare_largest(out, exhaustive);
+  }
+
+ private:
+  static GoldSettings settings(const Filtered& f, const MixedVolume& v, const Certificate& c) {
+    GoldSettings s{v.grid, v.granularity, v.rate, c.rates.upsampling, c.rates.interpolation, c.window};
+    s.coarsening = v.coarsening;
+    // As build's: what kept nodes are charged depends on how far they reach.
+    if (f.is_cone()) s.least_reach = reach_of_all(s);
+    return s;
+  }
+
+  void run(GoldStream& gold, const std::vector<std::uint8_t>& selected, const Progress& progress,
+           const std::function<void(const BrickMeasure&)>& visit) {
+    if (std::find(selected.begin(), selected.end(), 1) == selected.end()) return;
+    const opencl::DeviceArray<std::uint8_t> on_device(f_.state, std::span<const std::uint8_t>(selected),
+                                                      "bricks to measure");
+    gold.run(
+        selected,
+        [&](GoldStream::Batch& batch) {
+          for (const BrickMeasure& m :
+               batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device))
+            visit(m);
+        },
+        progress, "totals");
+  }
+
+  [[nodiscard]] double arithmetic() const { return gold_.arithmetic(); }
+  // Of a device without double precision it is several times as large, and its certificate says so.
+  [[nodiscard]] double arithmetic_of_build() const {
+    return same_device_ ? arithmetic() : std::max(arithmetic(), stored_.budget.arithmetic.value);
+  }
+
+  // A node takes T and P from the cells around it in its block, and blocks are cut to the bricks asked for:
+  // of a brick alone the total is the least that build can have found, by one rate of gold or the other.
+  void compare_alone(Differences& out, std::vector<BrickMeasure> low, const Progress& progress) {
+    const auto deficit = [&](const BrickMeasure& m) {
+      return static_cast<double>(m.total) - static_cast<double>(stored_.brick_totals[at(m.brick)]);
+    };
+    std::sort(low.begin(), low.end(),
+              [&](const BrickMeasure& a, const BrickMeasure& b) { return deficit(a) > deficit(b); });
+    std::int64_t different = 0;
+    std::string first;
+    for (std::size_t i = 0; i < std::min(low.size(), most_alone); ++i) {
+      std::vector<std::uint8_t> one(volume_.level.size(), 0);
+      one[at(low[i].brick)] = 1;
+      bool right = false;
+      for (GoldStream* gold : {&gold_.fine(), gold_.coarse()})
+        if (gold && !right && (gold == &gold_.fine() || resolves(*gold, at(low[i].brick))))
+          run(*gold, one, progress, [&](const BrickMeasure& m) { right = agrees(m); });
+      if (right) continue;
+      if (++different == 1)
+        first = fmt::format("the total of brick {} is {}, not {} within {:.3g}", low[i].brick,
+                            f_.world(static_cast<double>(stored_.brick_totals[at(low[i].brick)])),
+                            f_.world(static_cast<double>(low[i].total)), f_.world(tolerance(low[i])));
+    }
+    if (different > 0)
+      out.push_back(different > 1 ? fmt::format("{} totals of bricks differ; {}", different, first) : first);
+  }
+
+  [[nodiscard]] bool resolves(const GoldStream& gold, std::size_t brick) const {
+    const LevelTriple finest = gold.settings().finest();
+    const LevelTriple& level = volume_.level[brick];
+    return level[0] <= finest[0] && level[1] <= finest[1] && level[2] <= finest[2];
+  }
+
+  // Of two computations each: gold errs by A, a second difference by 4 A and T, an eighth of three of them,
+  // by 1.5 A. One device computes a brick in two boxes alike, but for how products along z are cut into runs:
+  // far below 2^-15 of the largest sample (see build's classify).
+  [[nodiscard]] double tolerance(const BrickMeasure& m) const {
+    const double gold = 2.5 * (arithmetic() + arithmetic_of_build());
+    // Build may have had other memory, or double precision that this device lacks: a total has its rounding
+    // in nodes and in differences, 5.25 times at most.
+    return (same_device_ ? std::min(gold, 0x1p-15 * largest_) : gold) +
+           5.25 * (arithmetic() - least_arithmetic_) +
+           table_rounding * static_cast<double>(std::max(m.total, 0.0f));
+  }
+
+  [[nodiscard]] bool agrees(const BrickMeasure& m) const {
+    if (stored_.brick_totals.empty()) return true;
+    const auto stored = static_cast<double>(stored_.brick_totals[at(m.brick)]);
+    if (m.total < 0) return true;
+    return stored >= 0 && stored >= static_cast<double>(m.total) - tolerance(m);
+  }
+
+  // What follows from sups alone. The filter's own error is measured, and another device's may be smaller.
+  void compare_constants(Differences& out) const {
+    // Programs from before kept gold bounded curvature where this one takes constants: other terms, not wrong
+    // ones.
+    if (stored_.brick_totals.empty() || stored_.budget.projection.method.starts_with("curvature")) return;
+    const double projection = gold_.fine().projection(), found = stored_.budget.projection.value;
+    if (!(std::abs(found - projection) <= table_rounding * projection))
+      out.push_back(fmt::format("the projection term is {}, not {}", f_.world(found), f_.world(projection)));
+    const double value = stored_.budget.arithmetic.value,
+                 least = same_device_ ? least_arithmetic_ : least_arithmetic_ - kept().errors({}).ramp;
+    if (!(value >= least * (1 - table_rounding)))
+      out.push_back(fmt::format("the arithmetic term is {}, below {}", f_.world(value), f_.world(least)));
+    if (same_device_ && !(value <= most_arithmetic_ * (1 + table_rounding)))
+      out.push_back(
+          fmt::format("the arithmetic term is {}, above {}", f_.world(value), f_.world(most_arithmetic_)));
+  }
+
+  void compare_largest(Differences& out, bool exhaustive) const {
+    const double value = stored_.measured_max;
+    if (!(value >= error_ - arithmetic() - arithmetic_of_build()) || (exhaustive && !(value <= most_)))
+      out.push_back(fmt::format("measured_max is {}, not {}{}", f_.world(value),
+                                exhaustive ? "" : "at least ", f_.world(error_)));
+  }
+
+  Filtered& f_;
+  const MixedVolume& volume_;
+  const Certificate& stored_;
+  DeviceField field_;
+  GoldRates gold_;
+  bool same_device_;
+  // What the arithmetic term is, whatever memory allows, and of another device whatever its precision.
+  double least_arithmetic_ = 0, most_arithmetic_ = 0;
+  double largest_ = 0;  // sample of the base
+  double error_ = 0;    // largest seen on the gold that certifies
+  double most_ = 0;     // what measured_max can be
+};
+
+// All but the scan, F and what is reported in `units`.
+void compare_in_units(Differences& out, Device& device, const ProjectionSet& scan, const Units& units,
+                      const ExactField& exact, const MixedVolume& volume, const Certificate& stored,
+                      const std::vector<std::uint8_t>& selected, bool exhaustive, const Progress& progress) {
+  Filtered f(device.state(), scan, units, stored.field, stored.rates.interpolation, progress);
+  const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
+  Totals totals(f, volume, stored, same_device);
+  compare_range(out, f, exact, volume, stored, totals.kept(), same_device, progress);
+  if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
+    out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
+  totals.compare(out, selected, exhaustive, progress);
+}
+
+}  // namespace
+
+Differences compare_terms(Device& device, const ProjectionSet& scan, const ExactField& exact,
+                          const MixedVolume& volume, const Certificate& stored,
+                          const std::vector<std::uint8_t>& selected, bool exhaustive,
+                          const Progress& progress) {
+  Differences out;
+  HostMemory host(device.state());
+  host.count(scan.data.resident_bytes(), "the projections, filtered,");
+  host.count(4 * static_cast<std::uint64_t>(volume.grid.sample_count()), "the base samples");
+  const Units units = units_of(scan);
+  if (!units.are_world()) host.count(volume.base.bytes(), "the stored field in other units");
+  std::optional<MixedVolume> scaled;
+  if (!units.are_world()) {
+    scaled = volume;
+    scaled->grid = from_world(volume.grid, units);
+    scale(*scaled, -units.density());
+  }
+  compare_in_units(out, device, scan, units, exact, scaled ? *scaled : volume, from_world(stored, units),
+                   selected, exhaustive, progress);
+  return out;
+}
+
+}  // namespace vdvr

@@ -1,0 +1,43 @@
+#include "host/verify/residual/covered_chords.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/base/system/parallel.hpp"
+
+namespace vdvr {
+
+CoveredChords covered_chords(const ParallelGeometry& g) {
+  const auto columns = static_cast<std::size_t>(g.columns), views = g.theta_rad.size();
+  const double low = (-0.5 - g.center) * g.pitch_u,
+               high = (static_cast<double>(g.columns) - 0.5 - g.center) * g.pitch_u;
+  CoveredChords out;
+  for (std::size_t i = 0; i < columns; ++i) out.u.push_back((static_cast<double>(i) - g.center) * g.pitch_u);
+  out.first.assign(views * columns, -INFINITY);
+  out.last.assign(views * columns, INFINITY);
+  parallel_for(g.views(), {}, "chords", [&](std::int64_t view) {
+    const auto j = static_cast<std::size_t>(view);
+    double *first = out.first.data() + j * columns, *last = out.last.data() + j * columns;
+    for (std::size_t k = 0; k < views; ++k) {
+      const double turn = g.theta_rad[k] - g.theta_rad[j], c = std::cos(turn), s = std::sin(turn);
+      // Rays of this view, or seen from behind: they lie in its strip or beside it, whatever s.
+      const bool along = std::abs(s) < 1e-12;
+      for (std::size_t i = 0; i < columns; ++i) {
+        const double at = out.u[i] * c;
+        if (along) {
+          if (!(at >= low && at <= high)) last[i] = -INFINITY;
+          continue;
+        }
+        const double a = (low - at) / s, b = (high - at) / s;
+        first[i] = std::max(first[i], std::min(a, b));
+        last[i] = std::min(last[i], std::max(a, b));
+      }
+    }
+    // Views in one direction bound nothing along their rays.
+    for (std::size_t i = 0; i < columns; ++i)
+      if (!(std::isfinite(first[i]) && std::isfinite(last[i]) && first[i] < last[i])) first[i] = last[i] = 0;
+  });
+  return out;
+}
+
+}  // namespace vdvr

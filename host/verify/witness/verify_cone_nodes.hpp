@@ -1,0 +1,71 @@
+// Nodes of cone beam for `verify`: back-projected where they lie, by eight points of Lagrange both ways from
+// tables of its own (docs/error-bounds.md, "What verify does", "Cone beam"). Shares nothing with build but
+// the views' matrices. Launches kernels/verify/witness/verify_cone.cl.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "host/field/fbp/coverage.hpp"
+#include "host/base/opencl/array.hpp"
+#include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/grid.hpp"
+
+namespace vdvr {
+
+/// Values of the table to a pixel, along u and along v, and points of Lagrange between them.
+constexpr std::int64_t cone_density = 6;
+constexpr int cone_points = 8;
+
+/// Nodes to a cell of the grid with which they lie at most a quarter of the shortest wave's half apart, in
+/// every view at the covered region's rim: powers of two, the same for x and y. 2^24 where none does.
+struct ConeNodeRates {
+  int across = 1, along = 1;
+};
+ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing);
+
+/// What the errors of nodes depend on (verify_cone_bounds.hpp).
+struct ConeNodeFacts {
+  double place_u = 0, place_v = 0;  ///< by how much places err, in pixels
+  double cancellation = 1;          ///< largest sum of magnitudes of what lambda is made of, over lambda
+  std::int64_t together = 1;        ///< views that are summed before they are added to the others
+  std::int64_t calls = 1;           ///< so many such sums
+};
+
+class VerifyConeNodes {
+ public:
+  /// Refers to the field and the coverage. Values are in `unit`. `furthest`: how far beyond the covered
+  /// region, across z, a node may lie that is used.
+  VerifyConeNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, double unit,
+                  double furthest);
+
+  /// An array of nodes [y][x][heights] in tiles of VDVR_VERIFY_TILE columns a side.
+  struct Nodes {
+    Vec3 first{}, spacing{};                         ///< where the first lies, and how far apart they are
+    std::int64_t nx = 0, heights = 0;                ///< of the array; heights to a multiple of 16
+    std::int64_t used = 0;                           ///< of the heights
+    std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
+  };
+  /// Writes those of the wanted tiles that are not too far out. Throws InputError where such a tile reaches a
+  /// source's plane. Cost: columns * rows * (columns + 6 rows) * 6 multiply-adds a view on the host, or fewer
+  /// where the nodes see but some of the rows; 64 a view and node on the device.
+  ConeNodeFacts make(const Nodes& wanted, const opencl::DeviceArray<float>& nodes);
+
+ private:
+  struct Window;
+  struct Table;
+  [[nodiscard]] Window window_of(const Nodes& wanted, const std::vector<cl_int2>& tiles) const;
+  void fill(Table& table, std::int64_t first_view) const;
+  void back_project(const Nodes& wanted, const std::vector<cl_int2>& tiles, const Table& table,
+                    const opencl::DeviceArray<cl_int2>& device_tiles, const opencl::DeviceArray<float>& nodes,
+                    ConeNodeFacts& facts);
+
+  opencl::State& state_;
+  const ExactField& field_;
+  const Coverage& coverage_;
+  double unit_, furthest_;
+  bool upright_;
+};
+
+}  // namespace vdvr

@@ -1,0 +1,344 @@
+// Double precision on the host up to the table of fine columns and the matrix along z, fp32 on the device
+// from there on.
+#include "host/verify/witness/verify_nodes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/opencl/work_groups.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "host/verify/witness/verify_cosines.hpp"
+#include "host/verify/witness/verify_lagrange.hpp"
+
+namespace vdvr {
+
+static_assert(sizeof(VdvrVerifyRows) == 36 && sizeof(VdvrVerifyHeights) == 28 &&
+              sizeof(VdvrVerifyBetween) == 28);
+static_assert(VDVR_VERIFY_VIEWS == views_per_run && VDVR_VERIFY_ROWS == rows_per_run);
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr std::int64_t lanes = 16;               // of a vector along z
+constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
+constexpr std::int64_t room = 64;                // floats after a buffer's end that vectors may touch
+constexpr std::int64_t before = 5;               // nodes that a polynomial takes before the place
+
+std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
+
+std::int64_t floor_of(std::int64_t n, std::int64_t by) { return n >= 0 ? n / by : -((-n + by - 1) / by); }
+
+std::int64_t rows_of(const VerifyNodes::Part& part, std::int64_t rows) { return part.rows ? rows : part.nz; }
+
+/// Nodes of a block's side from which so many of a lattice `factor` times as dense are made.
+std::int64_t nodes_before(std::int64_t after, std::int64_t factor) {
+  return factor == 1 ? after : (after - 3 + factor) / factor + lagrange_points;
+}
+
+}  // namespace
+
+int nodes_across(const Grid& grid, const ParallelGeometry& g) {
+  const double spacing = std::max(grid.spacing[0], grid.spacing[1]);
+  int n = 1;
+  while (n < (1 << 24) && !(spacing / static_cast<double>(n) <= 0.25 * g.pitch_u)) n *= 2;
+  return n;
+}
+
+VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Grid& grid, double unit,
+                         double furthest)
+    : state_(state), field_(field), grid_(grid), unit_(unit), gain_(row_gain(field.geometry().rows)) {
+  const ParallelGeometry& g = field.geometry();
+  pad_ = static_cast<std::int64_t>(std::ceil(furthest / g.pitch_u * static_cast<double>(fine_columns))) + 6;
+  columns_ = fine_columns * g.columns + 1 + 2 * pad_;
+}
+
+VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage,
+                         const Grid& grid, double unit, double furthest)
+    : state_(state), field_(field), grid_(grid), unit_(unit) {
+  cone_.emplace(state, field, coverage, unit, furthest);
+}
+
+std::uint64_t VerifyNodes::bytes_of(const Part& part) const {
+  return 4 * count(tiles_across(part.nx) * tile * tiles_across(part.ny) * tile) *
+         count(up(rows_of(part, field_.geometry().rows), lanes));
+}
+
+std::int64_t VerifyNodes::views_at_once() const {
+  const auto budget =
+      static_cast<std::int64_t>(std::min(state_.memory.left() / 8, state_.info.max_allocation));
+  return std::clamp<std::int64_t>(budget / (4 * columns_ * lanes), 1, field_.geometry().views());
+}
+
+/// 16 rows of the fine columns of some views, on the host and on the device.
+struct VerifyNodes::Table {
+  Table(opencl::State& of, std::int64_t columns, std::int64_t at_once)
+      : state(of),
+        per_view(columns * lanes),
+        views(at_once),
+        counted(of, bytes(), "fine columns of the filtered projections") {
+    host.resize(at(views * per_view));
+    device = opencl::DeviceArray<float>(state, count(views * per_view + room),
+                                        "fine columns of the filtered projections");
+  }
+  ~Table() = default;
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+  [[nodiscard]] std::uint64_t bytes() const { return 4 * count(views * per_view); }
+
+  opencl::State& state;
+  std::int64_t per_view, views;  // floats; views at a time
+  HostMemory counted;
+  std::int64_t first_view = 0, filled = 0;
+  std::vector<float> host;
+  opencl::DeviceArray<float> device;
+};
+
+void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_view) {
+  const ParallelGeometry& g = field_.geometry();
+  const std::int64_t U = g.columns, V = g.rows, last = fine_columns * U;
+  table.first_view = first_view;
+  table.filled = std::min(table.views, g.views() - first_view);
+  std::vector<double> basis(at(V * lanes));
+  for (std::int64_t r = 0; r < lanes; ++r) {
+    // Places beyond the last are computed like it: what is never read is finite at least.
+    const auto row = static_cast<double>(std::min(first_row + r, rows_of(part_, V) - 1));
+    const double z = grid_.origin[2] + (static_cast<double>(part_.first_z) + row) /
+                                           static_cast<double>(part_.along) * grid_.spacing[2];
+    const double half = part_.rows ? row + 0.5 : z / g.pitch_v + 0.5 * static_cast<double>(V);
+    for (std::int64_t l = 0; l < V; ++l)
+      basis[at(l * lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
+  }
+  const auto cosine = verify_cosines::cosine_period(last);
+  parallel_for(table.filled, {}, "", [&](std::int64_t k) {
+    std::vector<double> line(at(U * lanes));
+    verify_cosines::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, lanes,
+                             line);
+    float* out = table.host.data() + k * table.per_view;
+    verify_cosines::sum_columns(
+        line, U, lanes, fine_columns, cosine,
+        [&](std::int64_t n, std::int64_t r, const std::array<double, verify_cosines::lanes>& values) {
+          for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
+            out[(n + pad_) * lanes + r + i] = static_cast<float>(values[at(i)] / unit_);
+        });
+    // Beyond the detector's edges the series is its own mirror image.
+    for (std::int64_t n = 0; n < columns_; ++n) {
+      std::int64_t m = std::abs(n - pad_) % (2 * last);
+      if (m > last) m = 2 * last - m;
+      if (m != n - pad_) std::copy_n(out + (m + pad_) * lanes, lanes, out + n * lanes);
+    }
+  });
+  table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view)));
+}
+
+void VerifyNodes::make(const Part& part) {
+  const ParallelGeometry& g = field_.geometry();
+  part_ = part;
+  nodes_.reset();
+  tiles_.reset();
+  steps_.reset();
+  tile_columns_ = tiles_across(part.nx);
+  const std::int64_t rows = rows_of(part, g.rows);
+  rows_padded_ = up(rows, lanes);
+  nodes_.emplace(state_, bytes_of(part) / 4 + count(room), "nodes of the field to verify against");
+  nodes_->fill(0.0f);
+  if (cone_) {
+    make_cone_nodes(part);
+    return;
+  }
+  std::vector<cl_int2> tiles;
+  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
+    if (part.tiles[at(t)])
+      tiles.push_back({{to_int(t % tile_columns_ * tile), to_int(t / tile_columns_ * tile)}});
+  if (tiles.empty()) return;
+  const std::size_t K = g.theta_rad.size();
+  const double scale = static_cast<double>(fine_columns) / g.pitch_u;
+  std::vector<cl_float4> steps(tiles.size() * K);
+  for (std::size_t b = 0; b < tiles.size(); ++b)
+    for (std::size_t k = 0; k < K; ++k) {
+      const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]), n = part.across;
+      const double t =
+          (grid_.origin[0] + static_cast<double>(part.first_x + tiles[b].s[0]) / n * grid_.spacing[0]) * c +
+          (grid_.origin[1] + static_cast<double>(part.first_y + tiles[b].s[1]) / n * grid_.spacing[1]) * s;
+      // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
+      // padding.
+      const double column =
+          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(fine_columns) + static_cast<double>(pad_);
+      const double along_x = c * grid_.spacing[0] / n * scale, along_y = s * grid_.spacing[1] / n * scale;
+      const double whole =
+          std::floor(column + std::min(0.0, along_x * tile) + std::min(0.0, along_y * tile)) - 1;
+      steps[b * K + k] = {{static_cast<float>(along_x), static_cast<float>(along_y),
+                           static_cast<float>(column - whole), static_cast<float>(whole)}};
+    }
+  tiles_.emplace(state_, std::span<const cl_int2>(tiles), "tiles of nodes");
+  steps_.emplace(state_, std::span<const cl_float4>(steps), "view positions");
+  Table table(state_, columns_, views_at_once());
+  for (std::int64_t row = 0; row < rows; row += lanes) back_project(table, row);
+}
+
+void VerifyNodes::make_cone_nodes(const Part& part) {
+  VerifyConeNodes::Nodes wanted;
+  const std::array<std::int64_t, 3> first{part.first_x, part.first_y, part.first_z};
+  for (std::size_t a = 0; a < 3; ++a) {
+    wanted.spacing[a] = grid_.spacing[a] / static_cast<double>(a < 2 ? part.across : part.along);
+    wanted.first[a] = grid_.origin[a] + static_cast<double>(first[a]) * wanted.spacing[a];
+  }
+  wanted.nx = tile_columns_ * tile;
+  wanted.heights = rows_padded_;
+  wanted.used = part.nz;
+  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
+    if (part.tiles[at(t)]) wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
+  cone_facts_ = cone_->make(wanted, *nodes_);
+}
+
+void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
+  const std::int64_t K = field_.geometry().views();
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
+      state_, "verify/witness/verify_nodes", "verify_nodes",
+      opencl::height_defines(state_.info, to_int(lanes)));
+  const std::uint64_t in_row = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
+  for (std::int64_t first = 0; first < K; first += table.views) {
+    fill(table, first_row, first);
+    const VdvrVerifyRows rows{.accumulate = first > 0 ? 1 : 0,
+                              .first_view = to_int(first),
+                              .views = to_int(table.filled),
+                              .all_views = to_int(K),
+                              .columns = to_int(columns_),
+                              .tiles = to_int(static_cast<std::int64_t>(tiles_->size())),
+                              .nx = to_int(tile_columns_ * tile),
+                              .rows_padded = to_int(rows_padded_),
+                              .first_row = to_int(first_row)};
+    kernel(opencl::in_groups(state_.info, {in_row, count(tile), tiles_->size()}, {1, count(tile), 1}),
+           nodes_->buffer(), table.device.buffer(), steps_->buffer(), tiles_->buffer(), rows);
+  }
+}
+
+/// The product along z: what gold's heights are as sums over the part's.
+struct VerifyNodes::Heights {
+  std::vector<cl_int4> bands;  // per 16 heights: first row, rows, where the weights begin
+  std::vector<float> weights;  // [row][16]
+};
+
+VerifyNodes::Heights VerifyNodes::heights_of(const Blocks& blocks) const {
+  const ParallelGeometry& g = field_.geometry();
+  const std::int64_t all = rows_of(part_, g.rows);
+  const auto factor = std::max<std::int64_t>(1, blocks.rate / part_.along),
+             stride = std::max<std::int64_t>(1, part_.along / blocks.rate);
+  const LagrangeFilter filter = lagrange_filter(to_int(factor));
+  Heights h;
+  for (std::int64_t first = 0; first < blocks.z_padded; first += lanes) {
+    // Of heights: those around the group's. Places beyond the part's are nobody's.
+    const auto node_of = [&](std::int64_t i) {
+      return floor_of((blocks.first_z + first + i) * stride, factor) - part_.first_z;
+    };
+    const std::int64_t around = factor > 1 ? before : 0,
+                       begin = part_.rows ? 0 : std::clamp<std::int64_t>(node_of(0) - around, 0, all - 1),
+                       end = part_.rows
+                                 ? all
+                                 : std::clamp<std::int64_t>(
+                                       node_of(lanes - 1) + (factor > 1 ? before + 2 : 1), begin + 1, all);
+    h.bands.push_back({{to_int(begin), to_int(end - begin),
+                        to_int(static_cast<std::int64_t>(h.weights.size()) / lanes), 0}});
+    for (std::int64_t row = begin; row < end; ++row)
+      for (std::int64_t i = 0; i < lanes; ++i) {
+        const std::int64_t height = blocks.first_z + first + i;
+        if (part_.rows) {
+          const double z = grid_.origin[2] +
+                           static_cast<double>(height) / static_cast<double>(blocks.rate) * grid_.spacing[2];
+          h.weights.push_back(static_cast<float>(
+              row_weight(g.rows, z / g.pitch_v + 0.5 * static_cast<double>(g.rows - 1), row)));
+          continue;
+        }
+        const std::int64_t tap = row - node_of(i) + before,
+                           phase = height * stride - floor_of(height * stride, factor) * factor;
+        h.weights.push_back(
+            tap >= 0 && tap < lagrange_points ? filter.weights[at(phase * lagrange_points + tap)] : 0.0f);
+      }
+  }
+  return h;
+}
+
+std::int64_t VerifyNodes::floats_per_block(int rate, std::int64_t nx, std::int64_t z_padded) const {
+  const std::int64_t factor = rate / part_.across, n = nodes_before(nx, factor);
+  return factor == 1 ? 0 : (n + nx) * n * z_padded;
+}
+
+void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values) {
+  const std::int64_t factor = b.rate / part_.across, n = nodes_before(b.nx, factor),
+                     blocks = static_cast<std::int64_t>(b.first.size()), groups = b.z_padded / lanes;
+  std::vector<cl_int2> places;
+  for (const auto& first : b.first)
+    places.push_back({{to_int(floor_of(first[0], factor) - (factor > 1 ? before : 0) - part_.first_x),
+                       to_int(floor_of(first[1], factor) - (factor > 1 ? before : 0) - part_.first_y)}});
+  const Heights h = heights_of(b);
+  const opencl::DeviceArray<cl_int2> device_places(state_, std::span<const cl_int2>(places),
+                                                   "blocks of gold to verify");
+  const opencl::DeviceArray<cl_int4> bands(state_, std::span<const cl_int4>(h.bands), "heights to verify");
+  const opencl::DeviceArray<float> weights(state_, std::span<const float>(h.weights), "product along z");
+  const opencl::Defines defines = opencl::height_defines(state_.info, to_int(lanes));
+  const std::uint64_t in_group = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights> along(
+      state_, "verify/witness/verify_nodes", "verify_heights", defines);
+  const VdvrVerifyHeights shape{.blocks = to_int(blocks),
+                                .nx = to_int(n),
+                                .ny = to_int(n),
+                                .groups = to_int(groups),
+                                .all_x = to_int(tile_columns_ * tile),
+                                .all_y = to_int(tiles_across(part_.ny) * tile),
+                                .rows_padded = to_int(rows_padded_)};
+  const opencl::Range heights =
+      opencl::in_groups(state_.info, {in_group * count(groups), count((n + 7) / 8), count(n * blocks)},
+                        {count(groups), count((n + 7) / 8), 1});
+  if (factor == 1) {
+    along(heights, values.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(),
+          device_places.buffer(), shape);
+    return;
+  }
+  const opencl::DeviceArray<float> first(state_, count(blocks * n * n * b.z_padded + room),
+                                         "nodes at heights"),
+      second(state_, count(blocks * b.nx * n * b.z_padded + room), "rows of gold");
+  along(heights, first.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(), device_places.buffer(),
+        shape);
+  const LagrangeFilter filter = lagrange_filter(to_int(factor));
+  const opencl::DeviceArray<float> taps(state_, std::span<const float>(filter.weights), "Lagrange's weights");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(
+      state_, "verify/witness/verify_nodes", "verify_between", defines);
+  // Blocks begin two places before a node.
+  const auto pass = [&](const auto& out, const auto& in, std::int64_t outer, std::int64_t inner,
+                        std::uint64_t together) {
+    const VdvrVerifyBetween s{.outer = to_int(outer),
+                              .inner = to_int(inner),
+                              .before = to_int(n),
+                              .after = to_int(b.nx),
+                              .factor = to_int(factor),
+                              .node = to_int(before),
+                              .phase = to_int(factor - 2)};
+    between(opencl::in_groups(state_.info, {in_group * count(inner), count(b.nx), count(outer)},
+                              {count(inner), together, 1}),
+            out.buffer(), in.buffer(), taps.buffer(), s);
+  };
+  pass(second, first, blocks, n * groups, 1);
+  pass(values, second, blocks * b.nx, groups, count(b.nx));
+}
+
+NodePath VerifyNodes::path(const Part& part, int rate) const {
+  const ParallelGeometry& g = field_.geometry();
+  NodePath p;
+  p.across = rate / part.across;
+  p.rows = part.rows;
+  p.along = std::max(1, rate / part.along);
+  p.terms = part.rows ? g.rows : lanes + lagrange_points;
+  p.gain = part.rows ? gain_ : 1;
+  if (cone_) return p;
+  p.calls = (g.views() + views_at_once() - 1) / views_at_once();
+  const auto n = static_cast<double>(part.across);
+  p.reach = static_cast<double>(fine_columns) / g.pitch_u *
+            std::hypot(grid_.spacing[0] / n, grid_.spacing[1] / n) * static_cast<double>(tile);
+  for (std::size_t a = 0; a < 3; ++a)
+    p.band[a] = pi * grid_.spacing[a] / (a < 2 ? n * g.pitch_u : static_cast<double>(part.along) * g.pitch_v);
+  return p;
+}
+
+}  // namespace vdvr

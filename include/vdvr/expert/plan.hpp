@@ -1,0 +1,85 @@
+// Bounds at each rate, and the choice of rates that fit a tolerance. Builds nothing.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/comparison.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/reconstruct.hpp"
+
+namespace vdvr {
+
+struct Tolerance {
+  std::optional<double> relative{};  ///< fraction of the reference range, or as the settings' comparison says
+  std::optional<double> absolute{};  ///< density units; one of the two is set
+};
+
+/// What is not given is chosen by trial.
+struct RateOptions {
+  std::optional<int> upsampling;
+  std::optional<Interpolation> interpolation;
+  std::optional<int> gold;
+};
+
+/// What is stored, and what is foreseen.
+struct PlanSettings {
+  Comparison comparison{};
+  Levels levels = Levels::anisotropic;
+  int granularity = 4;  ///< 1, 2, 4 or 8; less on grids thinner than a brick
+  /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to
+  /// store least, and 0 with isotropic levels.
+  std::optional<LevelTriple> coarsening{};
+  bool foresee =
+      true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
+  /// Of a large scan judge by a part: some views for bounds, a window of rows for everything. What is
+  /// foreseen then are estimates, as the plan's notes say, and it cannot be built.
+  bool estimate = false;
+  /// What is foreseen is for this tolerance, no smaller than the plan's: where bricks begin that pictures
+  /// then refine. None: the plan's.
+  std::optional<Tolerance> everywhere{};
+};
+
+struct PreparedScan;
+class Foresight;
+
+struct Plan {
+  Grid grid;
+  PlanSettings settings;
+  FieldOptions field;
+  double epsilon = 0, epsilon_abs = 0, reference_range = 0;
+  Rates rates;
+  VolumeLayout layout;
+  std::vector<Bound> bounds;       ///< all that were computed
+  ErrorBudget budget;              ///< foreseen shares at the chosen rates; grid: what is left for it
+  std::uint64_t gold_samples = 0;  ///< to be back-projected, per pass
+  std::uint64_t memory_bytes = 0;  ///< peak of our allocations foreseen
+  std::uint64_t memory_of_rows = 0,
+                memory_of_cells = 0;  ///< of those, what grows with the rows, with the grid
+  std::uint64_t tile_bytes = 0;       ///< of tiles before closing, wherever they lie
+  double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
+  double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
+  double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks
+  std::int64_t not_covered_count = 0;
+  double not_covered_fraction = 0;
+  Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows
+  bool estimated = false;  ///< from a part of the scan
+  std::vector<std::string> notes;
+  /// The filtered scan and the gold that was kept, on the device: a build of the same scan on it goes on from
+  /// there. Reset it to free their memory.
+  std::shared_ptr<PreparedScan> prepared{};
+  /// Where something was foreseen: foresees builds of other tolerances.
+  std::shared_ptr<Foresight> foresight{};
+};
+
+/// Throws ToleranceError naming the binding term and the smallest epsilon that would do.
+VDVR_API Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid,
+                        const FieldOptions& field, const RateOptions& rates, const Tolerance& tolerance,
+                        const PlanSettings& settings = {}, const Progress& progress = {});
+
+}  // namespace vdvr

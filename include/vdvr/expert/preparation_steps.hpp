@@ -1,0 +1,50 @@
+// What may be done to projections before F is made of them: F is that of the prepared projections. Recorded
+// in the certificate's `field`, done again by whoever reads the scan to verify it (docs/preparation.md).
+#pragma once
+
+#include <array>
+#include <optional>
+
+namespace vdvr {
+
+/// A pixel whose transmission lies above the median of its window x window neighbours by more than
+/// `threshold`, a fraction of the open beam, becomes that median (zingers: X-rays that hit the camera).
+struct Outliers {
+  double threshold = 0.1;
+  int window = 3;  ///< odd
+  bool operator==(const Outliers&) const = default;
+};
+
+/// Paganin's single-distance phase retrieval (Journal of Microscopy 206, 2002, 33) of parallel beam: each
+/// transmission is divided, in frequency, by 1 + (d lambda / 4 pi) (delta / beta) |k|^2.
+struct PhaseRetrieval {
+  double distance_mm = 0;  ///< d, object to detector
+  double energy_kev = 0;
+  double delta_beta = 0;  ///< the object's delta / beta
+  bool operator==(const PhaseRetrieval&) const = default;
+};
+
+/// Stripes of a sinogram, rings in a slice (after Vo et al., Optics Express 26, 2018, 28396): dead and
+/// fluctuating columns, columns off those around them for long, small differences of all others. A window of
+/// 0 is set when the scan is read: a sixth and a fifteenth of the columns, at most 51 and 21.
+struct Stripes {
+  double ratio = 3;  ///< of a stripe to noise, above which a column is dead, fluctuating or off
+  int large = 0;     ///< columns that a dead or fluctuating one is compared with; odd
+  int small = 0;     ///< columns of the median of sorted columns, twice the widest stripe; odd
+  bool operator==(const Stripes&) const = default;
+};
+
+/// Steps in the order in which they are done. By default none.
+struct Preparation {
+  std::optional<Outliers> outliers;
+  std::optional<PhaseRetrieval> phase;
+  std::optional<Stripes> stripes;
+  int median = 1;                        ///< side of a square window, odd; 1: none
+  std::array<double, 2> gaussian{0, 0};  ///< standard deviations in columns and rows; 0: none
+  int binning = 1;                       ///< columns and rows of a detector pixel that become one
+
+  [[nodiscard]] bool none() const { return *this == Preparation{}; }
+  bool operator==(const Preparation&) const = default;
+};
+
+}  // namespace vdvr

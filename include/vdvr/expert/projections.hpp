@@ -1,0 +1,63 @@
+// A scan: projections with their geometry (docs/geometry.md). Parallel beam:
+//
+// Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column
+// `center`. u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdvr/expert/cone_geometry.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/preparation_steps.hpp"
+#include "vdvr/expert/sample_array.hpp"
+
+namespace vdvr {
+
+struct ParallelGeometry {
+  std::int64_t columns = 0;  ///< U
+  std::int64_t rows = 0;     ///< V
+  double pitch_u = 1.0;      ///< world units per column
+  double pitch_v = 1.0;      ///< world units per row
+  double center = 0.0;       ///< column onto which the rotation axis projects; (U - 1)/2 in a centred scan
+  std::string unit = "pixel";
+  std::vector<double> theta_rad;  ///< one angle per view
+
+  [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
+};
+
+/// What reading and pre-processing did, reported to the user and stored with the certificate.
+struct InputReport {
+  std::string name;                ///< file or folder name as given, without its directory
+  std::string sha256;              ///< of the file, or of a folder's sorted lines "sha256 name"
+  std::string format;              ///< "data-exchange", "nxtomo", "scan.json", "mha", "simulated"
+  std::int64_t dead_pixels = 0;    ///< samples replaced by the median of their neighbours
+  double transmission_floor = 0;   ///< the floor under -log
+  std::string center_source;       ///< "file", "option", "found", "default"
+  double source_to_detector = 0;   ///< of cone beam, in world units; 0: not stated, as matrices do not
+  bool air_background = false;     ///< a linear air background was fitted and taken off
+  Preparation preparation;         ///< what else was done to the projections
+  std::vector<std::string> notes;  ///< one line each, shown to the user
+};
+
+/// Line integrals, float data[view][row v][column u].
+struct ProjectionSet {
+  /// The detector, and where rays are parallel all there is to say. Of a cone-beam scan its limit for a
+  /// source infinitely far away: pitches at the axis, and angles and centre of the matrices.
+  ParallelGeometry geometry;
+  std::optional<ConeGeometry> cone;  ///< none: rays are parallel
+  SampleArray data;
+  InputReport report;
+
+  [[nodiscard]] std::int64_t size() const { return geometry.views() * geometry.rows * geometry.columns; }
+};
+
+/// What `geometry` of a cone-beam scan is.
+VDVR_API ParallelGeometry parallel_limit(const ConeGeometry& cone, std::int64_t columns, std::int64_t rows,
+                                         const std::string& unit);
+/// Throws InputError, which names what is wanted, for a cone-beam scan.
+VDVR_API void require_parallel(const ProjectionSet& scan, const std::string& what);
+
+}  // namespace vdvr

@@ -1,0 +1,45 @@
+// What interpolation can do to the waves of a scan: the spectrum of one filtered projection or of a volume,
+// times the map of worst errors (docs/error-bounds.md, section 3). Comparison only, it decides nothing.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/error_map.hpp"
+#include "vdvr/api.hpp"
+#include "vdvr/expert/grid.hpp"
+#include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/projections.hpp"
+
+namespace vdvr {
+
+/// Ramp-filtered, times the view's weight: its share of F.
+struct FilteredView {
+  std::int64_t view = 0, columns = 0, rows = 0;
+  std::vector<float> samples;  ///< [v][u]
+  double largest = 0;          ///< max |q|
+};
+
+/// The view with the most energy, the first of several. Cost: the ramp filter of the whole scan.
+VDVR_API FilteredView strongest_view(Device& device, const ProjectionSet& scan, const FieldOptions& field,
+                                     const Progress& progress = {});
+
+/// The frequencies of cosine coefficients 0 .. n - 1 of n samples, in radians per sample.
+VDVR_API FrequencyAxis cosine_axis(std::int64_t n);
+
+/// Sums over all coefficients A of |A| times an error at spacing d / rate.
+struct AmplitudeSum {
+  int rate = 1;
+  double centre =
+      0;  ///< with 1 - prod cos: what the error would be with all waves peaking at one cell's centre
+  double bound = 0;          ///< with wave_error_bound: proved
+  double sum_over_axes = 0;  ///< with the sum of 1 - cos(kappa_j / 2), capped at 2: proved, looser
+  double largest_term = 0;   ///< the largest |A| wave_error_bound
+};
+/// `spectrum` as cosine_spectrum leaves it. Cost: one map entry on the device per coefficient, in slabs.
+VDVR_API AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size,
+                                    int rate);
+
+}  // namespace vdvr

@@ -1,0 +1,125 @@
+// Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by six taps both ways from
+// tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
+// VIEW views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in columns
+// and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the same
+// columns and rows, follow one another. Called by host/certify/kept/cone_tiles.cpp.
+#include "device/lanes.h"
+#include "shared/cone_nodes.h"
+#include "shared/six_taps.h"
+
+// As host/certify/kept/cone_tiles.cpp fills it.
+typedef struct {
+  REAL step_u[3], part_u;
+  REAL step_v[3], part_v;
+  REAL step_lambda[3], lambda;
+  REAL whole_u, whole_v, unused[2];
+} View;
+
+// Of taps -2 .. 3, and two that read what is not used.
+#define LANES(a, b, c, d, e, f) (float8)(a, b, c, d, e, f, 0.0f, 0.0f)
+#define FIRST_OF(a, b, c) a
+#define SECOND_OF(a, b, c) b
+#define THIRD_OF(a, b, c) c
+// A list becomes arguments where it is handed on: OpenCL C has no macros of any number of them.
+#define TAKE(pick, list) pick(list)
+#define TAP(pick, kind, tap) TAKE(pick, VDVR_SIX_##kind##_##tap)
+#define COEFFICIENTS(pick, kind, sign)                                                        \
+  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), sign(TAP(pick, kind, C)), \
+        sign(TAP(pick, kind, B)), sign(TAP(pick, kind, A)))
+#define SAME(x) (x)
+#define OPPOSITE(x) (-(x))
+#define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)
+#define ODD_OF(pick) COEFFICIENTS(pick, ODD, OPPOSITE)
+
+static inline __attribute__((always_inline)) float8 taps(float g) {
+  const float s = g * g;
+  return fma((float8)(g),
+             VDVR_SIX_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
+             VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
+}
+
+static inline __attribute__((always_inline)) float sum_of(float8 v) {
+  const float4 four = v.lo + v.hi;
+  const float2 two = four.lo + four.hi;
+  return two.x + two.y;
+}
+
+#define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
+// What a view adds at one height: six columns of eight rows, by weights along u, then along v.
+#define ADD(n, at_u, weight, at_v, share_v)                                                         \
+  {                                                                                                 \
+    __global const float* from =                                                                    \
+        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row); \
+    float8 across = (float8)(weight.s1) * COLUMN(1);                                                \
+    across = fma((float8)(weight.s0), COLUMN(0), across);                                           \
+    across = fma((float8)(weight.s2), COLUMN(2), across);                                           \
+    across = fma((float8)(weight.s3), COLUMN(3), across);                                           \
+    across = fma((float8)(weight.s4), COLUMN(4), across);                                           \
+    across = fma((float8)(weight.s5), COLUMN(5), across);                                           \
+    sum##n = fma(taps(share_v), across, sum##n);                                                    \
+  }
+
+#if VDVR_LANES > 8
+#error "each height has eight sums: eight lanes at most"
+#endif
+#define CLEAR(n) float8 sum##n = (float8)(0.0f);
+#define UPRIGHT_PART(n) ADD(n, column, weight_u, LANE(row, n), LANE(g_v, n))
+#define TILTED_PART(n)                                                                         \
+  {                                                                                            \
+    const float8 weight_u = (float)(LANE(inverse, n) * LANE(inverse, n)) * taps(LANE(g_u, n)); \
+    ADD(n, LANE(column, n), weight_u, LANE(row, n), LANE(g_v, n))                              \
+  }
+#define PUT(n) to[n] += sum_of(sum##n);
+
+__kernel void cone_nodes(__global float* out, __global const float* table, __global const View* views,
+                         __global const int2* wanted, ulong first, VdvrConeNodes s) {
+  const int y = (int)get_global_id(0), height = (int)get_global_id(1) * VDVR_LANES,
+            tile = (int)get_global_id(2), group = height / VDVR_CONE_HEIGHTS;
+  if (y >= VDVR_CONE_TILE || group >= s.groups || tile >= s.tiles) return;
+  const int2 range = wanted[tile * VDVR_CONE_TILE + y];
+  const int column_stride = s.column_stride, views_all = s.views, block_z = group / s.block_groups,
+            block_y = y / s.block_side;
+  const float half_side = 0.5f * (float)(s.block_side - 1),
+              half_height = 0.5f * (float)(s.block_groups * VDVR_CONE_HEIGHTS - 1);
+  const REAL dy = (REAL)((float)(y - block_y * s.block_side) - half_side);
+  const SUM dz = WIDE(TO_VEC(height - block_z * s.block_groups * VDVR_CONE_HEIGHTS + INDEX) - half_height);
+  for (int x = range.x; x <= range.y; ++x) {
+    const int block_x = x / s.block_side;
+    const REAL dx = (REAL)((float)(x - block_x * s.block_side) - half_side);
+    __global const View* v =
+        views + ((size_t)tile * s.blocks + (size_t)(block_z * s.blocks_across + block_y) * s.blocks_across +
+                 block_x) *
+                    views_all;
+    __global const float* plane = table;
+    FOR_LANES(CLEAR)
+    for (int k = 0; k < views_all; ++k, ++v, plane += s.plane) {
+      const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
+                 u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
+                 v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
+#if VDVR_UPRIGHT
+      const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
+      const int column = (int)v->whole_u + (int)whole_u - 2;
+      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
+      const SUM v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), (SUM)(inverse), (SUM)(v->part_v));
+#else
+      const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
+                u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
+                whole_u = floor(u8),
+                v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), inverse, (SUM)(v->part_v));
+      const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
+      const VEC g_u = NARROW(u8 - whole_u - 0.5f);
+#endif
+      const SUM whole_v = floor(v8);
+      const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
+      const VEC g_v = NARROW(v8 - whole_v - 0.5f);
+#if VDVR_UPRIGHT
+      FOR_LANES(UPRIGHT_PART)
+#else
+      FOR_LANES(TILTED_PART)
+#endif
+    }
+    __global float* to =
+        out + first + (size_t)tile * s.tile + ((size_t)y * VDVR_CONE_TILE + x) * s.stride + height;
+    FOR_LANES(PUT)
+  }
+}
