@@ -18,7 +18,7 @@
 #include "apps/common/progress.hpp"
 #include "apps/mpi/mpi_messenger.hpp"
 #include "apps/vdvr/command.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 
 namespace vdvr::cli {

@@ -1,11 +1,11 @@
-#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/certify.hpp"
 
 #include <fmt/format.h>
 
 #include <utility>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"

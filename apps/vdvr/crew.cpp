@@ -1,4 +1,4 @@
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 
 #include <fmt/format.h>
 

@@ -13,7 +13,7 @@
 #include <sstream>
 #include <vector>
 
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "vdvr/expert/output_file.hpp"
 #include "vdvr/expert/stop.hpp"
 

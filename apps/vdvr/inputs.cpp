@@ -4,7 +4,7 @@
 
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"

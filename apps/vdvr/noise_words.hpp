@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/noise_forecast.hpp"

@@ -12,7 +12,7 @@
 #include "apps/common/output_folder.hpp"
 #include "apps/common/volume_json.hpp"
 #include "apps/vdvr/options.hpp"
-#include "apps/vdvr/expert/understood.hpp"
+#include "apps/vdvr/understood.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/mixed_volume.hpp"

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "apps/vdvr/expert/certify.hpp"
+#include "apps/vdvr/certify.hpp"
 
 namespace vdvr::cli {
 

@@ -4,7 +4,7 @@
 
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/clip.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/inputs.hpp"

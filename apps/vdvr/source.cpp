@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"

@@ -1,4 +1,4 @@
-#include "apps/vdvr/expert/understood.hpp"
+#include "apps/vdvr/understood.hpp"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,6 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/expert/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/source.hpp"

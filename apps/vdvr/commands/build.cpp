@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/expert/certify.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/output.hpp"
 
 namespace vdvr::cli {

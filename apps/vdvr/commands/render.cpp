@@ -5,7 +5,7 @@
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/certify_render.hpp"
 #include "apps/vdvr/clip.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/frames.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"

@@ -8,8 +8,8 @@
 #include <iterator>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/expert/certify.hpp"
-#include "apps/vdvr/expert/crew.hpp"
+#include "apps/vdvr/certify.hpp"
+#include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/overlay.hpp"
