@@ -357,7 +357,7 @@ Json row_of(const TuneCandidate& c) {
           {"tiles", c.tiles}, {"local", c.local}, {"gups", c.gups}};
 }
 
-/// Launch parameters measured on this device, as a row for the table of host/opencl/column_tuning.cpp.
+/// Launch parameters measured on this device, as a row for the table of host/base/opencl/column_tuning.cpp.
 int bench_tune(Arguments& args) {
   args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
       .value("angles", "180", "views (default 180)")
